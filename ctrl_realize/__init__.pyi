@@ -17,6 +17,7 @@ from . import plots as plots
 from . import report as report
 from . import results as results
 from . import validation as validation
+from . import valves as valves
 from .data import ImpulseResponse as ImpulseResponse
 from .data import MeasuredFRF as MeasuredFRF
 from .data import Record as Record

@@ -42,7 +42,7 @@ def test_every_public_name_has_an_entry(reference):
         if name.startswith("_") or inspect.ismodule(getattr(cr, name)):
             continue
         assert f"ctrl_realize.{name}" in entries
-    for submodule in ("actuators", "design", "export", "plots", "bench", "paper"):
+    for submodule in ("actuators", "design", "export", "plots", "bench", "paper", "valves"):
         module = import_module(f"ctrl_realize.{submodule}")
         for name in dir(module):
             value = getattr(module, name)

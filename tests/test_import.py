@@ -27,6 +27,7 @@ SUBMODULES = {
     "report",
     "results",
     "validation",
+    "valves",
 }
 MOST = 33  # names that a user learns
 
@@ -81,6 +82,7 @@ def test_every_public_name_is_there_and_documented():
         "plots",
         "report",
         "validation",
+        "valves",
         None,
     ],
 )

@@ -35,6 +35,7 @@ MODULES = (
     cr.plots,
     cr.report,
     cr.validation,
+    cr.valves,
 )
 
 # Words that meant several things, or that only the package used, and what stands for them.

@@ -1,8 +1,33 @@
-"""Control valves: step tests, their metrics and reports."""
+"""Tests of control valves: metrics with intervals, report, test plan."""
 
 from __future__ import annotations
 
-__all__: list[str] = []
+from .definitions import DEFINITIONS, Definition
+from .evaluate import valve_report
+from .groups import Interval, SizeAndDirection
+from .metrics import Metric
+from .parts import TestPart, split_test
+from .plan import ValveTestPlan, valve_test_plan
+from .result import ValveReport
+from .statics import StaticCurve
+from .steps import Ranges, StepMetrics
+
+__all__ = [
+    "DEFINITIONS",
+    "Definition",
+    "Interval",
+    "Metric",
+    "Ranges",
+    "SizeAndDirection",
+    "StaticCurve",
+    "StepMetrics",
+    "TestPart",
+    "ValveReport",
+    "ValveTestPlan",
+    "split_test",
+    "valve_report",
+    "valve_test_plan",
+]
 
 
 def __dir__() -> list[str]:

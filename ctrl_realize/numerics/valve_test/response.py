@@ -1,0 +1,235 @@
+"""Times at which a step response crosses levels, with the standard error from the noise.
+
+A crossing is read off a polynomial that is fitted to the samples about it: a parabola or a
+cubic in the window in which the smoothed response is near the level. The error is propagated
+from the noise of those samples and of the two levels (first-order propagation, [1]_ section 5.1.2);
+the choice of the window is our own.
+
+References
+----------
+.. [1] JCGM 100:2008, Evaluation of measurement data: Guide to the expression of uncertainty in
+   measurement.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..arrays import FloatArray
+from ..signals.filters import moving_mean
+from ..signals.noise import correlation_time
+from ..signals.onset import first_motion
+
+_REACH = 0.1
+"""Half height of the window about a crossing, of the whole change."""
+_T86 = 1 - float(np.exp(-2))
+_CLEAR = 3.0
+"""Standard errors by which something must stand out of the noise."""
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """A number and its standard error; NaN if it cannot be told."""
+
+    value: float
+    std: float
+
+
+UNKNOWN = Estimate(float("nan"), float("nan"))
+
+
+@dataclass(frozen=True)
+class Noise:
+    """Noise of a signal: standard deviation and samples per independent sample."""
+
+    sigma: float
+    correlation: float
+    quantum: float
+
+    def of_mean(self, count: int) -> float:
+        """Standard error of the mean of `count` neighbouring samples."""
+        return self.sigma * float(np.sqrt(min(self.correlation / max(count, 1), 1.0)))
+
+
+@dataclass(frozen=True, eq=False)
+class UnitResponse:
+    """Response scaled to 0 before and 1 after; ``shape[0]`` is the sample of the command's step.
+
+    `before` and `after` are the standard errors of the two levels, `noise` the noise, all scaled
+    alike; times are in samples.
+    """
+
+    shape: FloatArray
+    smooth: FloatArray
+    noise: Noise
+    width: int
+    before: float
+    after: float
+
+    @classmethod
+    def of(
+        cls, output: FloatArray, levels: tuple[Estimate, Estimate], noise: Noise
+    ) -> UnitResponse:
+        """Scale the samples from the step on."""
+        (before, after), change = levels, levels[1].value - levels[0].value
+        scale = abs(change)
+        shape = (output - before.value) / change
+        scaled = Noise(noise.sigma / scale, noise.correlation, noise.quantum / scale)
+        width = _smoothing(shape, scaled)
+        return cls(
+            shape, _smoothed(shape, width), scaled, width, before.std / scale, after.std / scale
+        )
+
+    def crossing(self, level: float) -> Estimate:
+        """Time of the first lasting crossing of a level upwards."""
+        width = self._width_at(level)
+        smooth = _smoothed(self.shape, width)
+        over = smooth >= level
+        # a crossing lasts for as long as the window of the smoothing
+        lasting = np.convolve(over, np.ones(width), "full")[width - 1 :] >= 0.8 * width
+        first = np.flatnonzero(over & lasting[: over.size])
+        if not first.size or 4 * self.noise.of_mean(width) > 1 - level:
+            return UNKNOWN
+        return self._refined(level, int(first[0]), smooth)
+
+    def settling(self, band: float) -> Estimate:
+        """Time from which on the response stays within a band about its final level."""
+        width = self._width_at(1 - band)
+        smooth, noise = _smoothed(self.shape, width), self.noise.of_mean(width)
+        outside = np.flatnonzero(np.abs(smooth - 1) > band)
+        # at the end the window of the smoothing is not full
+        outside = outside[outside < smooth.size - width]
+        if not outside.size or outside[-1] + 1 >= smooth.size - width or 6 * noise > band:
+            return UNKNOWN
+        last = int(outside[-1])
+        level = 1 + np.sign(smooth[last] - 1) * band
+        return self._refined(float(level), last + 1, smooth)
+
+    def overshoot(self) -> Estimate:
+        """Height of the peak above the final level; 0 if it is within the noise."""
+        top = int(np.argmax(self.smooth))
+        error = float(np.hypot(self.noise.of_mean(self.width), self.after))
+        # The largest of m independent values exceeds their mean by sqrt(2 ln m) deviations.
+        alike = max(self.smooth.size / (self.width * self.noise.correlation), 2.0)
+        least = error * (float(np.sqrt(2 * np.log(alike))) + 1.0)
+        peak = float(self.smooth[top]) - 1
+        return Estimate(peak if peak > max(least, 0.5 * self.noise.quantum) else 0.0, error)
+
+    def first_motion(self) -> Estimate:
+        """Visible onset: the rise through one and three thresholds, extrapolated to the baseline.
+
+        The thresholds are five and fifteen standard deviations of the noise.
+        """
+        found = first_motion(self.shape, 0, self.noise.sigma, self.noise.quantum, 0.0)
+        if found is None or found.sign < 0:
+            return UNKNOWN
+        # The line through two points of one deviation each, five and fifteen of them high, meets
+        # the baseline with an error of sqrt(1.5^2 + 0.5^2) deviations over its slope.
+        rise = max(found.crossing - found.onset, 0.5)
+        return Estimate(max(found.onset, 0.0), float(np.hypot(1.58 * rise / 5, 0.29)))
+
+    def mean_delay(self) -> float:
+        """Area between the response and its final level: dead time plus lags, in samples."""
+        return float(np.sum(1 - self.smooth))
+
+    def _width_at(self, level: float) -> int:
+        """Window of the smoothing for a level: near the end of the response, little noise."""
+        wanted = int(np.ceil(self.noise.correlation * (5 * self.noise.sigma / (1 - level)) ** 2))
+        most = int(np.argmax(self.smooth >= _T86)) // 2
+        return max(self.width, min(wanted, most) // 2 * 2 + 1) if wanted > 1 else self.width
+
+    def _refined(self, level: float, near: int, smooth: FloatArray) -> Estimate:
+        """Fit a polynomial in the window about a crossing of the smoothed response."""
+        reach = min(_REACH, 0.7 * abs(1 - level))
+        inside = np.abs(smooth - level) <= reach
+        low = high = min(near, inside.size - 1)
+        while low > 0 and inside[low - 1]:
+            low -= 1
+        while high + 1 < inside.size and inside[high + 1]:
+            high += 1
+        low, high = max(min(low, near - 2), 0), min(max(high, near + 1), inside.size - 1)
+        index = np.arange(low, high + 1, dtype=np.float64) - near
+        part = self.shape[low : high + 1]
+        if index.size < 5:
+            return self._interpolated(level, near)
+        powers = np.arange(3 if index.size < 10 else 4)
+        inverse = np.linalg.pinv(index[:, None] ** powers)
+        curve = np.polynomial.Polynomial(inverse @ part)
+        root = _root(curve, level)
+        if not index[0] - 1 <= root <= index[-1] + 1:
+            return self._interpolated(level, near)
+        weights = root**powers @ inverse
+        own = self.noise.sigma * float(np.linalg.norm(weights) * np.sqrt(self.noise.correlation))
+        # the slope of the curve is noisy, that across the window is not
+        across = (smooth[high] - smooth[low]) / (high - low)
+        steepness = min(abs(float(curve.deriv()(root))), abs(float(across)))
+        return Estimate(near + root, self._error(own, level, steepness))
+
+    def _interpolated(self, level: float, near: int) -> Estimate:
+        """Interpolate between the two samples of a fast crossing."""
+        here = self.shape
+        for k in (near, near + 1, near - 1):
+            if 1 <= k < here.size and (here[k - 1] - level) * (here[k] - level) <= 0:
+                slope = float(here[k] - here[k - 1])
+                if slope:
+                    place = k - 1 + (level - float(here[k - 1])) / slope
+                    bend = np.abs(np.diff(here[max(k - 2, 0) : k + 2], 2)).max(initial=0.0)
+                    own = float(np.hypot(self.noise.sigma, bend / 8))
+                    return Estimate(place, self._error(own, level, slope))
+        return Estimate(float(near), 1.0)
+
+    def _error(self, own: float, level: float, slope: float) -> float:
+        levels = np.hypot((1 - level) * self.before, level * self.after)
+        return float(np.hypot(own, levels) / max(abs(slope), 1e-12))
+
+
+def steady_noise(parts: list[FloatArray], quantum: float) -> Noise:
+    """Noise about the levels of stretches in which nothing moves."""
+    residuals = [part - np.mean(part) for part in parts if part.size >= 4]
+    if not residuals:
+        return Noise(quantum / np.sqrt(12), 1.0, quantum)
+    # The median of the variances: a stretch that still moves does not count.
+    variances = [float(one @ one) / (one.size - 1) for one in residuals]
+    sigma = max(float(np.sqrt(np.median(variances))), quantum / np.sqrt(12))
+    longest = max(residuals, key=lambda one: one.size)
+    time = correlation_time(longest) if longest.size >= 30 and np.ptp(longest) > 0 else 1.0
+    return Noise(sigma, min(time, longest.size / 4), quantum)
+
+
+def _root(curve: np.polynomial.Polynomial, level: float) -> float:
+    """Where a polynomial crosses a level, by Newton's method from zero."""
+    place, slope = 0.0, curve.deriv()
+    for _ in range(20):
+        steepness = float(slope(place))
+        if steepness == 0:
+            return float("nan")
+        place -= (float(curve(place)) - level) / steepness
+        if abs(place) > 1e6:
+            return float("nan")
+    return place
+
+
+def _smoothing(shape: FloatArray, noise: Noise) -> int:
+    """Window of the moving mean: 1 % of noise if it stays below a quarter of the rise."""
+    wanted = int(np.ceil(noise.correlation * (noise.sigma / 0.01) ** 2))
+    if wanted <= 1:
+        return 1
+    for width in (1, 3, 5, 9, 15, 25, 41, 65, 101, 161, 257, 401):
+        smooth = _smoothed(shape, width)
+        high = int(np.argmax(smooth >= 0.8)) if (smooth >= 0.8).any() else shape.size
+        low = np.flatnonzero(smooth[: high + 1] <= 0.2)
+        rise = high - (int(low[-1]) if low.size else 0)
+        if width >= wanted or 4 * width > rise:
+            return width
+    return width
+
+
+def _smoothed(shape: FloatArray, width: int) -> FloatArray:
+    if width == 1:
+        return shape
+    half = width // 2
+    end = np.mean(shape[-max(half, 1) :])
+    padded = np.concatenate([np.zeros(half), shape, np.full(half, end)])
+    return np.asarray(moving_mean(padded, width)[half : half + shape.size])

@@ -1,0 +1,314 @@
+"""From records of a valve test to its report."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from ..data import Record
+from ..data.given import as_record
+from ..errors import CtrlRealizeError, DataError
+from ..identification.methods import identify
+from ..numerics.constants import Z_95
+from ..numerics.validation.own_response import homogeneity
+from ..results import Flag, ModelFit
+from .groups import STRUCTURES, Interval, SizeAndDirection, grouped
+from .metrics import check_limits, collected, judged
+from .parts import TestPart, range_of, split_test
+from .result import ValveReport
+from .statics import (
+    StaticCurve,
+    dead_band_and_resolution,
+    hysteresis_and_linearity,
+    joined,
+    static_curve,
+)
+from .steps import Ranges, StepMetrics, measured_steps, noise_of
+
+_KNOWN_RANGES = {"%": (0.0, 100.0), "mA": (4.0, 20.0)}
+"""Range of a command by its unit."""
+_BY_CHANCE = 1e-3
+_MOST_SAMPLES = 2000
+"""Samples of a record of operation that are fitted."""
+_LATER = 1.25
+"""Dead times that differ by less do not matter, whatever their errors."""
+
+
+def valve_report(
+    records: Record | Sequence[Record],
+    *,
+    command_range: Sequence[float] | None = None,
+    travel_range: Sequence[float] | None = None,
+    limits: Mapping[str, Any] | None = None,
+    fit: bool = True,
+) -> ValveReport:
+    """Measure the metrics of a step-response test of a control valve.
+
+    The command of each record is split into steps, staircases, full strokes and ramps (see
+    `split_test`); the responses of the position, or of a process variable, give the metrics of
+    `DEFINITIONS` with 95 % intervals: against step size and direction, and their worst case. What
+    the records cannot tell is listed with the test that is missing.
+
+    Parameters
+    ----------
+    records : Record or sequence of Record
+        Command (input) and position of the stem (output), or a process variable instead of the
+        position. Records of the same valve.
+    command_range, travel_range : (float, float), optional
+        Command and position of the closed and of the open valve, in the units of the records.
+        Default: 0 to 100 for %, 4 to 20 for a command in mA; for other units the range of the
+        command, and a travel with which the gain of the larger steps is one.
+    limits : mapping, optional
+        Largest permitted value, or (smallest, largest), of metrics by their key in `DEFINITIONS`;
+        in s, % and %/s. Of a metric that depends on the step also a mapping from step size in % to
+        such a limit: ``{"t86": {2: 0.4, 10: 0.8}}``. There are no default limits: they are those
+        of your specification.
+    fit : bool, default True
+        Fit the dead time of each size and direction with `identify`, too (about 0.3 s for each).
+
+    Returns
+    -------
+    ValveReport
+
+    Raises
+    ------
+    DataError
+        No record, several channels, or missing samples.
+    OptionError
+        Limits of unknown metrics, or that are not numbers.
+
+    Notes
+    -----
+    The interval of a mean is that of Student's distribution from three repeats on, and the
+    propagated noise before that. Interval of the dead band: widths of a play that the F-test does
+    not reject, given the levels of the staircase [1]_. All rules are stated in `DEFINITIONS`, with
+    the source of each as far as it was read.
+
+    References
+    ----------
+    .. [1] A. Visintin, Differential Models of Hysteresis, Springer 1994, section III.2.
+
+    Examples
+    --------
+    >>> import ctrl_realize as cr
+    >>> valve = cr.bench.valve(noise=5e-4)
+    >>> records = valve.step_campaign(1, amplitudes=(16.0, 8.0, 4.0), repeats=3)
+    >>> report = cr.valves.valve_report(records, command_range=(4, 20), limits={"overshoot": 10})
+    >>> print(report.verdict)
+    All limits are met: overshoot (25 % opening).
+    >>> print(f"{1e3 * report.metric('t86').interval.value:.0f} ms")
+    205 ms
+    """
+    given = (records,) if isinstance(records, Record) else tuple(map(as_record, records))
+    if not given:
+        raise DataError("there are no records; expected at least one")
+    for record in given:
+        if record.n_missing:
+            raise DataError(
+                f"{record!r}: a valve test needs complete records; cut them, or read them with "
+                "interpolation"
+            )
+    check_limits(limits)
+    choices: list[str] = []
+    command = _command_range(given, command_range, choices)
+    parts = tuple(tuple(split_test(record, command_range=command)) for record in given)
+    ranges = Ranges(command, _travel_range(given, parts, command, travel_range, choices))
+    steps = tuple(
+        step
+        for k, (record, own) in enumerate(zip(given, parts, strict=True))
+        for step in measured_steps(record, own, ranges, k)
+    )
+    groups = grouped(steps, given, fit=fit)
+    curve, statics = _statics(given, parts, steps, ranges)
+    metrics = collected(groups, statics)
+    flags = _flags(steps, groups, parts)
+    if fit and any(flag.code == "no_valve_test" for flag in flags):
+        model = _fit_of_operation(given, ranges)
+        flags += [model[1]] if model else []
+        metrics = tuple(
+            one if not model or one.key != "fitted_dead_time"
+            else type(one)(one.key, one.definition, model[0], "all records, not by steps")
+            for one in metrics
+        )  # fmt: skip
+    return ValveReport(
+        metrics=judged(metrics, groups, limits), groups=groups, steps=steps, parts=parts,
+        curve=curve,
+        ranges=ranges, records=given, choices=tuple(choices), flags=tuple(flags),
+    )  # fmt: skip
+
+
+def _command_range(
+    records: tuple[Record, ...], given: Sequence[float] | None, choices: list[str]
+) -> tuple[float, float]:
+    if given is not None:
+        return range_of(given)[:2]
+    unit = records[0].input_units[0] if records[0].ninputs == 1 else ""
+    if unit in _KNOWN_RANGES:
+        return _KNOWN_RANGES[unit]
+    low = min(float(np.min(record.input)) for record in records)
+    high = max(float(np.max(record.input)) for record in records)
+    if high == low:
+        high = low + 1.0
+    choices.append(
+        f"command range {low:.4g} to {high:.4g}: what the records cover; give command_range for "
+        "percentages of the span"
+    )
+    return low, high
+
+
+def _travel_range(
+    records: tuple[Record, ...], parts: tuple[tuple[TestPart, ...], ...],
+    command: tuple[float, float], given: Sequence[float] | None, choices: list[str],
+) -> tuple[float, float]:  # fmt: skip
+    if given is not None:
+        return range_of(given)[:2]
+    if records[0].noutputs == 1 and records[0].output_units[0] == "%":
+        return 0.0, 100.0
+    # levels as they are, then scaled such that the larger steps have a gain of one
+    span = command[1] - command[0]
+    plain = Ranges(command, (0.0, 100.0))
+    steps = [
+        step for k, (record, own) in enumerate(zip(records, parts, strict=True))
+        for step in measured_steps(record, own, plain, k) if step.moved
+    ]  # fmt: skip
+    if steps:
+        largest = max(abs(one.size) for one in steps)
+        large = [one for one in steps if abs(one.size) >= 0.5 * largest]
+        slope = float(np.median([one.values["gain"] for one in large])) * 100 / span
+        points = [(one.after, one.travel_after) for one in large]
+    else:
+        u = np.concatenate([np.ravel(record.input) for record in records])
+        y = np.concatenate([np.ravel(record.output) for record in records])
+        slope = float(np.polyfit(u, y, 1)[0]) if np.ptp(u) > 0 else 0.0
+        points = [(float(np.mean(u)), float(np.mean(y)))]
+    if not np.isfinite(slope) or slope == 0:
+        slope = 100 / span
+    low = float(np.median([y - slope * (u - command[0]) for u, y in points]))
+    choices.append(
+        f"travel range {low:.4g} to {low + slope * span:.4g}: with it the gain of the larger steps "
+        "is one; give travel_range for percentages of the stroke"
+    )
+    return low, low + slope * span
+
+
+def _statics(
+    records: tuple[Record, ...], parts: tuple[tuple[TestPart, ...], ...],
+    steps: tuple[StepMetrics, ...], ranges: Ranges,
+) -> tuple[StaticCurve | None, dict[str, Interval]]:  # fmt: skip
+    bands, resolutions = [], []
+    delays = [one.mean_delay for one in steps if np.isfinite(one.mean_delay) and not one.stroke]
+    delay = float(np.median(delays)) if delays else float("nan")
+    curves = []
+    for k, (record, own) in enumerate(zip(records, parts, strict=True)):
+        mine = [one for one in steps if one.record == k]
+        band, resolution = dead_band_and_resolution(mine, own, ranges)
+        bands += [band] if band.is_known else []
+        resolutions += [resolution] if resolution.is_known else []
+        found = static_curve(record, own, mine, ranges, noise_of(record, own), delay)
+        curves += [found] if found is not None else []
+    # a ramp before levels, the longer before the shorter
+    curve = max(curves, key=lambda one: (one.origin == "ramp", np.ptp(one.command)), default=None)
+    band, resolution = joined(bands), joined(resolutions)
+    hysteresis, linearity, width = hysteresis_and_linearity(curve, band)
+    backlash = Interval()
+    if band.is_known and resolution.is_known:
+        low, high = max(band.low - resolution.high, 0.0), max(band.high - resolution.low, 0.0)
+        # every step moved the valve: all of the dead band may be backlash
+        value = band.value - (resolution.value if resolution.low > 0 else 0.0)
+        backlash = Interval(float(np.clip(value, low, high)), low, high, band.count)
+    return curve, {
+        "dead_band": band if band.is_known else width,
+        "resolution": resolution,
+        "backlash": backlash,
+        "hysteresis": hysteresis,
+        "linearity": linearity,
+    }
+
+
+def _flags(
+    steps: tuple[StepMetrics, ...], groups: tuple[SizeAndDirection, ...],
+    parts: tuple[tuple[TestPart, ...], ...],
+) -> list[Flag]:  # fmt: skip
+    flags = []
+    if not steps and all(part.kind != "ramp" for own in parts for part in own):
+        flags.append(
+            Flag(
+                "no_valve_test",
+                "the command holds no level between its changes, and is no slow ramp: these are "
+                "records of operation; valve_test_plan writes a test, and valves.loops judges "
+                "whether the valve makes a loop oscillate",
+            )
+        )
+    still = [one for one in steps if not one.moved]
+    if still:
+        sizes = sorted({round(abs(one.size), 2) for one in still})
+        flags.append(
+            Flag(
+                "did_not_move",
+                f"the position did not follow {len(still)} of {len(steps)} steps (sizes "
+                f"{', '.join(f'{one:g}' for one in sizes[:6])} %): resolution or dead band is of "
+                "this size, or the noise hides it",
+            )
+        )
+    unsettled = [one for one in steps if one.moved and not one.settled]
+    if unsettled:
+        flags.append(
+            Flag(
+                "not_settled",
+                f"{len(unsettled)} of {len(steps)} responses had not settled when the next step "
+                "came: only their dead time is used; hold longer",
+            )
+        )
+    known = [one for one in groups if one.estimates["dead_time"].is_known and not one.stroke]
+    if len(known) > 1:
+        times = np.array([one.estimates["dead_time"].value for one in known])
+        errors = np.array(
+            [(one.estimates["dead_time"].high - one.estimates["dead_time"].low) for one in known]
+        ) / (2 * Z_95)
+        chance = homogeneity(times, errors)[1]
+        late, early = known[int(np.argmax(times))], known[int(np.argmin(times))]
+        if chance < _BY_CHANCE and times.max() > _LATER * times.min():
+            flags.append(
+                Flag(
+                    "dead_time_varies",
+                    f"the dead time depends on the step: {times.max():.3g} s for {late.size:.3g} % "
+                    f"{late.direction}, {times.min():.3g} s for {early.size:.3g} % "
+                    f"{early.direction} (p = {chance:.1g}): friction, play, or a rate limit",
+                )
+            )
+    return flags
+
+
+def _fit_of_operation(records: tuple[Record, ...], ranges: Ranges) -> tuple[Interval, Flag] | None:
+    """Dead time of a linear model of records that contain no test."""
+    found = []
+    for record in records:
+        try:
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore")
+                fit = identify(_few(record), structures=STRUCTURES).fit
+        except CtrlRealizeError:
+            continue
+        if isinstance(fit, ModelFit) and fit.dead_time is not None and fit.interval is not None:
+            found.append((fit, Interval(fit.dead_time, *fit.interval, 1)))
+    if not found:
+        return None
+    fit, interval = found[0]
+    gain = np.nan if fit.gain is None else fit.gain * ranges.command_span / ranges.travel_span
+    more = "".join(f"; {flag}" for flag in fit.flags[:2])
+    return interval, Flag(
+        "operation_fit",
+        f"a linear model of the record has a dead time of {interval.value:.3g} s and a gain of "
+        f"{gain:.3g} %/%{more}",
+    )
+
+
+def _few(record: Record) -> Record:
+    """The beginning of a long record."""
+    return record if record.n_samples <= _MOST_SAMPLES else Record(
+        record.time[:_MOST_SAMPLES], np.ravel(record.input)[:_MOST_SAMPLES],
+        np.ravel(record.output)[:_MOST_SAMPLES],
+    )  # fmt: skip

@@ -1,0 +1,206 @@
+"""Steps of one size and direction together: means, scatter, dead time of a fit."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..data import Record
+from ..errors import CtrlRealizeError
+from ..identification.methods import identify
+from ..numerics.constants import Z_95
+from ..results import ModelFit
+from .steps import STEP_METRICS, StepMetrics
+
+_SAME_SIZE = 0.15
+"""Relative difference up to which steps have one size."""
+_MOST_FITTED = 4
+"""Steps of one size and direction that are fitted together."""
+_MOST_SAMPLES = 1500
+"""Samples of a step for the fit; more are averaged in blocks."""
+STRUCTURES = ((1, 1), (2, 2), (3, 3))
+"""Lags of the linear models that are fitted."""
+
+
+@dataclass(frozen=True)
+class Interval:
+    """An estimate with its 95 % interval and the number of steps behind it.
+
+    Attributes
+    ----------
+    value, low, high : float
+        NaN if the records cannot tell it.
+    count : int
+        Steps, or reversals, that it comes from.
+
+    Examples
+    --------
+    >>> from ctrl_realize.valves import Interval
+    >>> Interval(0.25, 0.24, 0.26, 3).is_known, Interval().is_known
+    (True, False)
+    """
+
+    value: float = float("nan")
+    low: float = float("nan")
+    high: float = float("nan")
+    count: int = 0
+
+    @property
+    def is_known(self) -> bool:
+        """Whether there is a value."""
+        return bool(np.isfinite(self.value))
+
+
+@dataclass(frozen=True)
+class SizeAndDirection:
+    """The steps of one size and direction.
+
+    Attributes
+    ----------
+    size : float
+        Mean height in % of the command's span, without sign.
+    direction : {"opening", "closing"}
+    stroke : bool
+        Whether they are full strokes.
+    count, moved, settled : int
+        Steps; of them, those at which the output moved; of those, how many settled.
+    estimates : mapping of str to Interval
+        The metrics of `StepMetrics.values`, over the steps that moved; ``"gain"`` is over all
+        steps, ``"gain_scatter"`` is its standard deviation between steps.
+    fitted_dead_time : Interval
+        Dead time in s by `identify` on these steps together; unknown without a fit.
+
+    Examples
+    --------
+    >>> import ctrl_realize as cr
+    >>> records = cr.bench.valve().step_campaign(1, amplitudes=(16.0, 4.0), repeats=3)
+    >>> report = cr.valves.valve_report(records, command_range=(4, 20), fit=False)
+    >>> [(round(one.size), one.direction, one.count) for one in report.groups]
+    [(25, 'opening', 3), (100, 'opening', 3)]
+    """
+
+    size: float
+    direction: str
+    stroke: bool
+    count: int
+    moved: int
+    settled: int
+    estimates: dict[str, Interval]
+    fitted_dead_time: Interval
+
+
+def grouped(
+    steps: Sequence[StepMetrics], records: Sequence[Record], *, fit: bool
+) -> tuple[SizeAndDirection, ...]:
+    """Collect steps by size and direction."""
+    ordered = sorted(steps, key=lambda one: abs(one.size))
+    clusters: list[list[StepMetrics]] = []
+    for step in ordered:
+        if clusters and abs(step.size) <= (1 + _SAME_SIZE) * abs(clusters[-1][0].size):
+            clusters[-1].append(step)
+        else:
+            clusters.append([step])
+    return tuple(
+        _group(own, records, fit)
+        for cluster in clusters
+        for direction in ("opening", "closing")
+        if (own := [step for step in cluster if step.direction == direction])
+    )
+
+
+def _group(steps: list[StepMetrics], records: Sequence[Record], fit: bool) -> SizeAndDirection:
+    moved = [one for one in steps if one.moved]
+    estimates = {
+        name: mean_of([(one.values[name], one.errors[name]) for one in moved])
+        for name in STEP_METRICS
+    }
+    gains = [(one.values["gain"], one.errors["gain"]) for one in steps]
+    over = estimates["overshoot"]
+    estimates["overshoot"] = replace(over, low=max(over.low, 0.0)) if over.is_known else over
+    estimates["gain"] = mean_of(gains)
+    estimates["gain_scatter"] = scatter_of([gain for gain, _ in gains])
+    return SizeAndDirection(
+        size=float(np.mean([abs(one.size) for one in steps])),
+        direction=steps[0].direction,
+        stroke=all(one.stroke for one in steps),
+        count=len(steps),
+        moved=len(moved),
+        settled=sum(one.settled for one in moved),
+        estimates=estimates,
+        fitted_dead_time=_fitted_dead_time(moved, records) if fit else Interval(),
+    )
+
+
+def mean_of(pairs: Sequence[tuple[float, float]]) -> Interval:
+    """Mean of repeats with its 95 % interval.
+
+    From three repeats on by their scatter and Student's distribution; before that, and never less,
+    by their standard errors.
+    """
+    from scipy.special import stdtrit
+
+    known = np.array([pair for pair in pairs if np.isfinite(pair).all()])
+    if not known.size:
+        return Interval()
+    values, errors = known.T
+    count = values.size
+    half = Z_95 * float(np.sqrt(np.mean(errors**2) / count))
+    if count >= 3:
+        scatter = float(np.std(values, ddof=1)) / np.sqrt(count)
+        half = max(half, float(stdtrit(count - 1, 0.975)) * scatter)
+    elif count == 2:
+        half = max(half, 0.5 * float(np.ptp(values)))
+    value = float(np.mean(values))
+    return Interval(value, value - half, value + half, count)
+
+
+def scatter_of(values: Sequence[float]) -> Interval:
+    """Standard deviation of repeats with its 95 % interval, by chi-square; from three on."""
+    from scipy.special import chdtri
+
+    known = np.array([value for value in values if np.isfinite(value)])
+    if known.size < 3:
+        return Interval()
+    deviation, freedom = float(np.std(known, ddof=1)), known.size - 1
+    low, high = (deviation * float(np.sqrt(freedom / chdtri(freedom, tail)))
+                 for tail in (0.025, 0.975))  # fmt: skip
+    return Interval(deviation, low, high, known.size)
+
+
+def _fitted_dead_time(steps: list[StepMetrics], records: Sequence[Record]) -> Interval:
+    """Dead time of one model for all steps, by the output-error fit."""
+    settled = [one for one in steps if one.settled][:_MOST_FITTED]
+    if not settled:
+        return Interval()
+    cut = [_cut(records[one.record], one) for one in settled]
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            if len(cut) == 1:
+                system = identify(cut[0], structures=STRUCTURES)
+            else:
+                system = identify(cut, structures=STRUCTURES, gains="own")
+    except CtrlRealizeError:
+        return Interval()
+    fit = system.fit
+    # no linear model fits a response at a limited rate: it has no dead time to report
+    if not isinstance(fit, ModelFit) or fit.dead_time is None or fit.interval is None:
+        return Interval()
+    if fit.interval_kind != "confidence":
+        return Interval()
+    return Interval(fit.dead_time, *fit.interval, len(cut))
+
+
+def _cut(record: Record, step: StepMetrics) -> Record:
+    """The samples of one step with the hold before it."""
+    edge = step.command_edge
+    long = edge.stop - edge.index
+    start = max(edge.start + (edge.index - edge.start) // 2, edge.index - long)
+    block = max((edge.stop - start) // _MOST_SAMPLES, 1)
+    # every block-th sample, counted from the step, so that it stays at its sample
+    own = np.arange(start, edge.stop)[(edge.index - start) % block :: block]
+    command = np.where(own < edge.index, step.before, step.after)
+    return Record(record.time[own] - record.time[edge.index], command, np.ravel(record.output)[own])

@@ -1,0 +1,295 @@
+"""Report of a valve test."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+
+from .._wording import in_time, interval_in_time, number_within, numbers_alike, time_within
+from ..data import Record
+from ..errors import OptionError
+from ..results import Flag, Result
+from .definitions import DEFINITIONS
+from .groups import Interval, SizeAndDirection
+from .metrics import Metric, words_of
+from .parts import TestPart
+from .statics import StaticCurve
+from .steps import STEP_METRICS, Ranges, StepMetrics
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+Level = Literal["good", "caution", "poor"]
+
+
+@dataclass(frozen=True, eq=False)
+class ValveReport(Result):
+    """Metrics of a valve test, made by `valve_report`.
+
+    Times are in s, travel in % of `ranges`, and each number has a 95 % interval. What the records
+    cannot tell is unknown (NaN), and `missing_tests` names the test that it needs.
+
+    Attributes
+    ----------
+    metrics : tuple of Metric
+        One for each of `DEFINITIONS`; of those that depend on the step, the worst. After them
+        those with a limit for a step size.
+    groups : tuple of SizeAndDirection
+        Metrics against step size and direction.
+    steps : tuple of StepMetrics
+        Every step of the command.
+    parts : tuple of tuple of TestPart
+        Parts of each record.
+    curve : StaticCurve or None
+        Position against command at rest.
+    ranges : Ranges
+        Command and travel of the closed and the open valve.
+    records : tuple of Record
+    choices : tuple of str
+    flags : tuple of Flag
+
+    Examples
+    --------
+    >>> import ctrl_realize as cr
+    >>> records = cr.bench.valve().step_campaign(1, amplitudes=(16.0, 4.0), repeats=3)
+    >>> report = cr.valves.valve_report(records, command_range=(4, 20), fit=False)
+    >>> report
+    <ValveReport of 6 records: 6 steps, 10 of 18 metrics known>
+    >>> print(report.table()[["size", "direction", "count", "t86"]].round(2))
+        size direction  count   t86
+    0   25.0   opening      3  0.21
+    1  100.0   opening      3  0.21
+    """
+
+    metrics: tuple[Metric, ...]
+    groups: tuple[SizeAndDirection, ...]
+    steps: tuple[StepMetrics, ...] = field(repr=False)
+    parts: tuple[tuple[TestPart, ...], ...] = field(repr=False)
+    curve: StaticCurve | None = field(repr=False)
+    ranges: Ranges
+    records: tuple[Record, ...] = field(repr=False)
+    choices: tuple[str, ...] = ()
+    flags: tuple[Flag, ...] = ()
+
+    def __repr__(self) -> str:
+        known = sum(one.interval.is_known for one in self.metrics[: len(DEFINITIONS)])
+        many = len(self.records)
+        return (
+            f"<ValveReport of {many} record{'s' if many > 1 else ''}: {len(self.steps)} "
+            f"step{'s' if len(self.steps) != 1 else ''}, {known} of {len(DEFINITIONS)} metrics "
+            "known>"
+        )
+
+    def metric(self, key: str) -> Metric:
+        """Return one metric.
+
+        Parameters
+        ----------
+        key : str
+            One of `DEFINITIONS`.
+
+        Raises
+        ------
+        OptionError
+            There is no such metric.
+        """
+        for one in self.metrics:
+            if one.key == key:
+                return one
+        raise OptionError(f"metric {key!r}; expected one of {', '.join(DEFINITIONS)}")
+
+    @property
+    def missing_tests(self) -> dict[str, tuple[str, ...]]:
+        """Tests that would tell the unknown metrics: test -> names of these metrics."""
+        found: dict[str, list[str]] = {}
+        for one in self.metrics[: len(DEFINITIONS)]:
+            if not one.interval.is_known:
+                found.setdefault(one.definition.needs, []).append(one.definition.name)
+        return {test: tuple(names) for test, names in found.items()}
+
+    @property
+    def level(self) -> Level:
+        """``"poor"``: a limit is not met; ``"good"``: all limits are met; ``"caution"`` otherwise.
+
+        Without limits always ``"caution"``: the valve was measured but not judged.
+        """
+        judgements = {one.judgement for one in self.metrics} - {""}
+        if "not met" in judgements:
+            return "poor"
+        return "good" if judgements == {"met"} else "caution"
+
+    @property
+    def verdict(self) -> str:
+        """What the limits and the records say, in one sentence."""
+        by = {
+            word: [_named(one) for one in self.metrics if one.judgement == word]
+            for word in ("not met", "cannot tell", "met")
+        }
+        if by["not met"]:
+            return f"Limits not met: {', '.join(by['not met'])}."
+        if by["cannot tell"]:
+            names = ", ".join(by["cannot tell"])
+            return f"The records cannot tell whether these limits are met: {names}."
+        if by["met"]:
+            return f"All limits are met: {', '.join(by['met'])}."
+        known = sum(one.interval.is_known for one in self.metrics[: len(DEFINITIONS)])
+        if not self.steps and all(part.kind != "ramp" for one in self.parts for part in one):
+            return "Cannot tell: the records contain no valve test."
+        return f"Measured: {known} of {len(DEFINITIONS)} metrics; no limits were given."
+
+    def table(self) -> pd.DataFrame:
+        """List the metrics against step size and direction.
+
+        Returns
+        -------
+        pandas.DataFrame
+            A row for each size and direction: ``size`` in %, ``direction``, ``stroke``, ``count``,
+            ``moved``, ``settled``, then each metric of `StepMetrics.values` with ``_low`` and
+            ``_high``, the scatter of the gain and the dead time of the fit. Times in s.
+        """
+        import pandas as pd
+
+        rows = []
+        for one in self.groups:
+            row: dict[str, object] = {
+                "size": one.size, "direction": one.direction, "stroke": one.stroke,
+                "count": one.count, "moved": one.moved, "settled": one.settled,
+            }  # fmt: skip
+            named = {**one.estimates, "fitted_dead_time": one.fitted_dead_time}
+            for key, found in named.items():
+                row |= {key: found.value, f"{key}_low": found.low, f"{key}_high": found.high}
+            rows.append(row)
+        return pd.DataFrame(rows)
+
+    def step_table(self) -> pd.DataFrame:
+        """List every step.
+
+        Returns
+        -------
+        pandas.DataFrame
+            ``record``, ``time``, ``before``, ``after``, ``size``, ``moved``, ``settled``, then the
+            metrics of `StepMetrics.values`, each with its standard error ``_std``.
+        """
+        import pandas as pd
+
+        return pd.DataFrame(
+            [
+                {
+                    "record": self.records[one.record].name or one.record + 1,
+                    "time": one.time, "before": one.before, "after": one.after, "size": one.size,
+                    "reversal": one.reversal, "moved": one.moved, "settled": one.settled,
+                }
+                | {
+                    name: number
+                    for key in STEP_METRICS
+                    for name, number in ((key, one.values[key]), (f"{key}_std", one.errors[key]))
+                }
+                for one in self.steps
+            ]
+        )  # fmt: skip
+
+    def metric_table(self) -> pd.DataFrame:
+        """List the metrics.
+
+        Returns
+        -------
+        pandas.DataFrame
+            Index: key of `DEFINITIONS`. Columns ``name``, ``value``, ``low``, ``high``, ``unit``,
+            ``where``, ``smallest``, ``largest`` (limits), ``judgement``, ``definition``,
+            ``source``, ``needs``.
+        """
+        import pandas as pd
+
+        rows = [
+            {
+                "name": one.definition.name, "value": one.interval.value,
+                "low": one.interval.low, "high": one.interval.high, "unit": one.definition.unit,
+                "where": one.where, "smallest": one.limit[0], "largest": one.limit[1],
+                "judgement": one.judgement, "definition": one.definition.sentence,
+                "source": one.definition.source, "needs": one.definition.needs,
+            }
+            for one in self.metrics
+        ]  # fmt: skip
+        return pd.DataFrame(rows, index=[one.key for one in self.metrics])
+
+    def _title(self) -> str:
+        return "Valve test"
+
+    def _rows(self) -> list[tuple[str, str]]:
+        rows = [("verdict", self.verdict)]
+        for one in self.metrics:
+            if one.interval.is_known:
+                told = in_words(one.interval, one.definition.unit)
+                rows.append(
+                    (one.definition.name, " ".join(filter(None, (*told, where_in_words(one)))))
+                )
+        for group in self.groups:
+            t86 = group.estimates["t86"]
+            rows.append(
+                (
+                    f"T86, {words_of(group)}",
+                    " ".join(in_words(t86, "s")) if t86.is_known
+                    else f"unknown: {group.moved} of {group.count} moved, {group.settled} settled",
+                )
+            )  # fmt: skip
+        return rows
+
+    def _notes(self) -> list[str]:
+        lacking = [
+            f"missing: {test}; needed for {', '.join(names)}"
+            for test, names in self.missing_tests.items()
+        ]
+        return [*super()._notes(), *lacking]
+
+
+def _named(one: Metric) -> str:
+    return f"{one.definition.name} ({one.where})" if one.where else one.definition.name
+
+
+def in_words(one: Interval, unit: str) -> tuple[str, str]:
+    """Write a value and its interval.
+
+    Examples
+    --------
+    >>> from ctrl_realize.valves.groups import Interval
+    >>> from ctrl_realize.valves.result import in_words
+    >>> in_words(Interval(0.2468, 0.241, 0.2531, 3), "s")
+    ('247 ms', '(241 to 253 ms)')
+    """
+    if not one.is_known:
+        return "unknown", ""
+    if not np.isfinite([one.low, one.high]).all():
+        return (in_time(one.value) if unit == "s" else f"{one.value:.4g} {unit}"), ""
+    if unit == "s":
+        return (
+            time_within(one.value, one.low, one.high),
+            f"({interval_in_time(one.low, one.high)})",
+        )
+    ends = " to ".join(numbers_alike((one.low, one.high), one.low, one.high))
+    return f"{number_within(one.value, one.low, one.high)} {unit}", f"({ends} {unit})"
+
+
+def where_in_words(one: Metric) -> str:
+    """Steps behind a metric, and what its limit says."""
+    told = [one.where, one.judgement and f"limit {limit_in_words(one)}: {one.judgement}"]
+    return "; ".join(filter(None, told))
+
+
+def limit_in_words(one: Metric) -> str:
+    """Write a limit.
+
+    Examples
+    --------
+    >>> from ctrl_realize.valves import DEFINITIONS, Metric
+    >>> from ctrl_realize.valves.groups import Interval
+    >>> from ctrl_realize.valves.result import limit_in_words
+    >>> limit_in_words(Metric("gain", DEFINITIONS["gain"], Interval(), limit=(0.5, 2.0)))
+    '0.5 to 2 %/%'
+    """
+    low, high = one.limit
+    unit = one.definition.unit
+    if low is None:
+        return f"at most {high:g} {unit}"
+    return f"at least {low:g} {unit}" if high is None else f"{low:g} to {high:g} {unit}"

@@ -1,0 +1,274 @@
+"""Static metrics: dead band, resolution, hysteresis, linearity from levels and slow ramps."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..data import Record
+from ..numerics.arrays import FloatArray
+from ..numerics.constants import Z_95
+from ..numerics.valve_test.play import fit_play
+from ..numerics.valve_test.response import Noise
+from .groups import Interval
+from .parts import TestPart
+from .steps import Ranges, StepMetrics
+
+_LARGEST_STAIR = 6.0
+"""Largest step of a staircase that tells dead band and resolution, in % of the command's span."""
+_COARSER = 2.5
+"""Ratio to the finest staircase from which one is not used."""
+_FOLLOWED = 0.3
+"""The stem has followed a step if it moved by this fraction of it."""
+_GOOD_FIT = 4.0
+"""Residual variance over the noise up to which the play describes the levels."""
+_LEAST_COVERED = 50.0
+"""Range of the command in % of its span that linearity and hysteresis need."""
+_BINS = 40
+
+
+@dataclass(frozen=True, eq=False)
+class StaticCurve:
+    """Position at rest against the command, opening and closing, in % of their spans.
+
+    Attributes
+    ----------
+    command : ndarray, shape (K,)
+    opening, closing : ndarray, shape (K,)
+        NaN where the valve did not go in that direction.
+    std : float
+        Standard error of a point.
+    origin : {"ramp", "levels"}
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import ctrl_realize as cr
+    >>> t = 0.5 * np.arange(1000)
+    >>> u = np.interp(t, [0, 20, 240, 260, 480, 500], [0, 0, 100, 100, 0, 0])
+    >>> noise = 0.02 * np.random.default_rng(0).standard_normal(t.size)
+    >>> y = u - 0.5 * np.sign(np.gradient(u)) + noise  # a play of 1 %
+    >>> curve = cr.valves.valve_report(
+    ...     cr.Record(t, u, y, units={"u": "%", "y": "%"}), fit=False
+    ... ).curve
+    >>> print(curve.origin, round(float(np.nanmean(curve.closing - curve.opening)), 1))
+    ramp 1.0
+    """
+
+    command: FloatArray
+    opening: FloatArray
+    closing: FloatArray
+    std: float
+    origin: str
+
+
+def dead_band_and_resolution(
+    steps: Sequence[StepMetrics], parts: Sequence[TestPart], ranges: Ranges
+) -> tuple[Interval, Interval]:
+    """Dead band and resolution from the staircases of one record, in % of the command's span."""
+    bands, resolutions = [], []
+    stairs = [part for part in parts if part.kind == "staircase"]
+    # Coarse stairs tell less, and of a stem that sticks only the play.
+    finest = min((abs(part.edges[0].amplitude) for part in stairs), default=0.0)
+    for part in stairs:
+        own = [step for step in steps if step.command_edge in part.edges]
+        coarse = abs(part.edges[0].amplitude) > _COARSER * finest
+        if coarse or max(abs(one.size) for one in own) > _LARGEST_STAIR:
+            continue
+        band, resolution = _of_staircase(own, ranges)
+        bands += [band] if band.is_known else []
+        resolutions += [resolution] if np.isfinite(resolution.high) else []
+    return joined(bands), joined(resolutions)
+
+
+def joined(found: Sequence[Interval]) -> Interval:
+    """Of several estimates the intersection of the intervals, or the range if there is none."""
+    if not found:
+        return Interval()
+    count = sum(one.count for one in found)
+    low, high = max(one.low for one in found), min(one.high for one in found)
+    if low <= high:
+        best = min(found, key=lambda one: one.high - one.low)
+        return Interval(float(np.clip(best.value, low, high)), low, high, count)
+    value = float(np.mean([one.value for one in found]))
+    return Interval(value, min(one.low for one in found), max(one.high for one in found), count)
+
+
+def _of_staircase(steps: list[StepMetrics], ranges: Ranges) -> tuple[Interval, Interval]:
+    scale = 100 / ranges.command_span
+    command = np.array([steps[0].before, *(one.after for one in steps)])
+    command = (command - ranges.command[0]) * scale
+    travel = np.array([steps[0].travel_before, *(one.travel_after for one in steps)])
+    error = max(float(np.mean([one.travel_error for one in steps])), 1e-9)
+    fit = fit_play(command, travel, error)
+    gain = fit.gain if fit is not None and fit.gain > 0 else 1.0
+    change = np.diff(command)
+    followed = np.abs(np.diff(travel)) > np.maximum(4 * np.sqrt(2) * error,
+                                                    _FOLLOWED * gain * np.abs(change))  # fmt: skip
+    bands, resolutions = _waits(command, change, followed)
+    resolution = _bracket(resolutions)
+    if not np.isfinite(resolution.value) and followed.any():
+        step = float(np.min(np.abs(change)))
+        resolution = Interval(step, 0.0, step, int(followed.sum()))
+    if fit is not None and fit.excess <= _GOOD_FIT and fit.high < np.ptp(command):
+        reversals = int(np.sum(change[1:] * change[:-1] < 0))
+        return Interval(fit.width, fit.low, fit.high, reversals), resolution
+    return _bracket(bands), resolution
+
+
+def _waits(
+    command: FloatArray, change: FloatArray, followed: np.ndarray
+) -> tuple[list[tuple[float, float]], list[tuple[float, float]]]:
+    """Changes of the command between two movements: after a reversal, and in one direction.
+
+    Each is a pair (low, high): the last level without movement and the first with it.
+    """
+    bands, resolutions = [], []
+    last = None
+    for k in np.flatnonzero(followed):
+        if last is not None:
+            way = abs(float(command[k + 1] - command[last + 1]))
+            pair = max(way - abs(float(change[k])), 0.0), way
+            if change[k] * change[last] < 0:
+                bands.append(pair)
+            elif (change[last : k + 1] * change[k] > 0).all():
+                resolutions.append(pair)
+        last = int(k)
+    return bands, resolutions
+
+
+def _bracket(pairs: list[tuple[float, float]]) -> Interval:
+    """What all pairs (low, high] have in common; their mean and range if that is nothing."""
+    if not pairs:
+        return Interval()
+    lows, highs = np.array(pairs).T
+    low, high = float(lows.max()), float(highs.min())
+    if low < high:
+        return Interval(0.5 * (low + high), low, high, len(pairs))
+    return Interval(
+        float(np.mean(lows + highs)) / 2, float(lows.min()), float(highs.max()), len(pairs)
+    )
+
+
+def static_curve(
+    record: Record, parts: Sequence[TestPart], steps: Sequence[StepMetrics],
+    ranges: Ranges, noise: Noise, delay: float,
+) -> StaticCurve | None:  # fmt: skip
+    """Curve of one record from its ramps, or from the levels of its steps.
+
+    `delay` in s is the mean delay of the response; along a ramp the position is that which the
+    command asked for so much earlier.
+    """
+    ramps = [part for part in parts if part.kind == "ramp"]
+    output = 100 * (np.ravel(record.output) - ranges.travel[0]) / ranges.travel_span
+    scale = abs(100 / ranges.travel_span)
+    if ramps:
+        times = record.time - (delay if np.isfinite(delay) else 0.0)
+        command = np.interp(times, record.time, np.ravel(record.input))
+        command = 100 * (command - ranges.command[0]) / ranges.command_span
+        points = [
+            (command[part.start : part.stop], output[part.start : part.stop],
+             np.sign((part.after - part.before) * ranges.command_span))
+            for part in ramps
+        ]  # fmt: skip
+        return _binned(points, noise, scale)
+    return _of_levels(steps, ranges)
+
+
+def _binned(
+    points: list[tuple[FloatArray, FloatArray, float]], noise: Noise, scale: float
+) -> StaticCurve | None:
+    low = min(float(command.min()) for command, _, _ in points)
+    high = max(float(command.max()) for command, _, _ in points)
+    ends = np.linspace(low, high, _BINS + 1)
+    curves, fewest = [], np.inf
+    for way in (1, -1):
+        own = [(command, output) for command, output, sign in points if sign == way]
+        curve = np.full(_BINS, np.nan)
+        if own:
+            command = np.concatenate([one for one, _ in own])
+            output = np.concatenate([one for _, one in own])
+            place = np.clip(np.digitize(command, ends) - 1, 0, _BINS - 1)
+            count = np.bincount(place, minlength=_BINS)
+            # the position at the middle of the bin, whatever the samples in it
+            middle = 0.5 * (ends[1:] + ends[:-1])
+            slope = np.polyfit(command, output, 1)[0]
+            output = output - slope * (command - middle[place])
+            total = np.bincount(place, weights=output, minlength=_BINS)
+            full = count >= max(3, 0.5 * np.median(count))
+            curve[full] = total[full] / count[full]
+            fewest = min(fewest, float(np.median(count)))
+        curves.append(curve)
+    middle = 0.5 * (ends[1:] + ends[:-1])
+    # near its ends a ramp has not reached its steady speed, and the play is not crossed
+    inner = (middle > low + 0.05 * (high - low)) & (middle < high - 0.05 * (high - low))
+    if not inner.any() or not np.isfinite(curves).any():
+        return None
+    return StaticCurve(
+        middle[inner],
+        curves[0][inner],
+        curves[1][inner],
+        noise.of_mean(int(fewest)) * scale,
+        "ramp",
+    )
+
+
+def _of_levels(steps: Sequence[StepMetrics], ranges: Ranges) -> StaticCurve | None:
+    settled = [one for one in steps if one.settled]
+    if not settled:
+        return None
+    after = np.array([one.after for one in settled])
+    command = 100 * (after - ranges.command[0]) / ranges.command_span
+    travel = np.array([one.travel_after for one in settled])
+    opening = np.array([one.size > 0 for one in settled])
+    levels = np.unique(np.round(command))
+    curves = np.full((2, levels.size), np.nan)
+    for row, way in enumerate((opening, ~opening)):
+        for k, level in enumerate(levels):
+            own = way & (np.abs(command - level) <= 0.5)
+            if own.any():
+                curves[row, k] = np.mean(travel[own])
+    error = float(np.mean([one.travel_error for one in settled]))
+    return StaticCurve(levels, curves[0], curves[1], error, "levels")
+
+
+def hysteresis_and_linearity(
+    curve: StaticCurve | None, band: Interval
+) -> tuple[Interval, Interval, Interval]:
+    """Hysteresis, linearity, and the dead band by the width of the loop, in % of the spans."""
+    unknown = Interval()
+    if curve is None:
+        return unknown, unknown, unknown
+    half = Z_95 * curve.std
+    both = np.isfinite(curve.opening) & np.isfinite(curve.closing)
+    enough = int(both.sum()) >= 5 and np.ptp(curve.command[both]) >= 1.0
+    hysteresis = width = unknown
+    single = np.where(np.isfinite(curve.opening), curve.opening, curve.closing)
+    middle = np.where(both, 0.5 * (curve.opening + curve.closing), single)
+    known = np.isfinite(middle)
+    covered = float(np.ptp(curve.command[known])) if known.any() else 0.0
+    if enough:
+        apart = curve.closing[both] - curve.opening[both]
+        gain = float(np.polyfit(curve.command[known], middle[known], 1)[0])
+        count = int(both.sum())
+        if gain > 0.05:
+            mean = float(np.median(apart)) / gain
+            scatter = max(1.25 * float(np.std(apart, ddof=1)) / np.sqrt(count),
+                          np.sqrt(2) * curve.std / np.sqrt(count)) / gain  # fmt: skip
+            if curve.origin == "ramp":
+                width = Interval(max(mean, 0.0), max(mean - 2 * scatter, 0.0),
+                                 max(mean + 2 * scatter, 0.0), 1)  # fmt: skip
+            own = band if band.is_known else width
+            if own.is_known and covered >= _LEAST_COVERED:
+                most = float(np.max(np.abs(apart)))
+                spread = float(np.hypot(np.sqrt(2) * half, 0.5 * (own.high - own.low) * gain))
+                value = max(most - own.value * gain, 0.0)
+                hysteresis = Interval(value, max(value - spread, 0.0), value + spread, count)
+    linearity = unknown
+    if known.sum() >= 5 and covered >= _LEAST_COVERED:
+        line = np.polyval(np.polyfit(curve.command[known], middle[known], 1), curve.command[known])
+        most = float(np.max(np.abs(middle[known] - line)))
+        linearity = Interval(most, max(most - half, 0.0), most + half, int(known.sum()))
+    return hysteresis, linearity, width

@@ -1,0 +1,271 @@
+"""Valve tests on simulated valves whose metrics are known in closed form."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.signal import lfilter
+
+import ctrl_realize as cr
+from ctrl_realize import valves
+from ctrl_realize.errors import DataError, NoStepError, OptionError
+
+DT, DEAD_TIME, LAG = 0.05, 0.25, 0.3
+PERCENT = {"u": "%", "y": "%"}
+QUICK = {"fit": False}
+
+
+def command_of(levels, hold, dt=DT):
+    holds = np.broadcast_to(hold, np.shape(levels))
+    return np.concatenate(
+        [np.full(round(h / dt), float(u)) for u, h in zip(levels, holds, strict=True)]
+    )
+
+
+def stairs(step=0.25, count=8, middle=50.0):
+    way = np.repeat([step, -step, step, -step], [count, 2 * count, 2 * count, count])
+    return middle + np.r_[0, np.cumsum(way)]
+
+
+def stem_of(command, *, dt=DT, dead_time=DEAD_TIME, lag=LAG):
+    """First-order lag behind a dead time of whole samples, for a command that is held."""
+    late = np.r_[np.full(round(dead_time / dt), command[0]), command][: command.size]
+    decay = np.exp(-dt / lag)
+    return command[0] + lfilter([0, 1 - decay], [1, -decay], late - command[0])
+
+
+def record_of(command, moved, noise, seed, *, dt=DT, **options):
+    measured = stem_of(moved, dt=dt, **options)
+    measured = measured + noise * np.random.default_rng(seed).standard_normal(command.size)
+    return cr.Record(dt * np.arange(command.size), command, measured, units=PERCENT)
+
+
+def held(found, truth):
+    return found.low - 1e-9 <= truth <= found.high + 1e-9
+
+
+def test_times_of_a_lag_behind_a_dead_time_are_those_of_the_closed_form():
+    levels = [50, 52, 50, 60, 50] * 3
+    command = command_of(levels, 4.0, 0.02)
+    truth = {
+        "t63": DEAD_TIME + LAG - 0.02, "t86": DEAD_TIME + 2 * LAG, "gain": 1.0,
+        "t98": DEAD_TIME - LAG * np.log(0.02), "overshoot": 0.0, "dead_time": DEAD_TIME,
+    }  # fmt: skip
+    truth["t63"] = DEAD_TIME + LAG
+    hits: dict[str, list[bool]] = {key: [] for key in truth}
+    for seed in range(12):
+        # the dead time is 12.5 samples, rounded to 12
+        record = record_of(command, command, 0.04, seed, dt=0.02, dead_time=0.26)
+        report = valves.valve_report(record, **QUICK)
+        assert [one.count for one in report.groups] == [3, 3, 3, 3]
+        for group in report.groups:
+            for key, value in truth.items():
+                late = 0.01 if key in ("t63", "t86", "t98", "dead_time") else 0.0
+                found = group.estimates[key]
+                if found.is_known:
+                    hits[key].append(held(found, value + late))
+            assert group.estimates["t86"].value == pytest.approx(truth["t86"], rel=0.05)
+    # 48 intervals of 95 %: fewer than 40 have a probability of 3e-4 (T98: a small step in noise
+    # seldom tells it)
+    for key, told in hits.items():
+        assert np.mean(told) > 0.83, key
+    assert len(hits["t98"]) >= 24
+
+
+def test_a_limited_rate_gives_stroke_times_and_is_told_as_such():
+    command = command_of([50, 52, 50, 60, 50, 0, 100, 0, 50], [5, 5, 5, 5, 5, 9, 9, 9, 9])
+    moved = cr.actuators.SlewRateLimit(20.0, 25.0).simulate(command, DT)
+    report = valves.valve_report(record_of(command, moved, 0.02, 1), **QUICK)
+    for way, rate in (("opening", 20.0), ("closing", 25.0)):
+        slew = report.metric(f"slew_rate_{way}")
+        assert slew.interval.value == pytest.approx(rate, rel=0.01)
+        assert "the rate is limited" in slew.where
+        # at the end of the motion the stem is behind by lag x rate; steps of a held motion are
+        # half a sample late, the first of them comes one sample early
+        truth = DEAD_TIME + 100 / rate - DT / 2 + LAG * np.log(LAG * rate / 2)
+        found = report.metric(f"stroke_time_{way}").interval.value
+        assert found == pytest.approx(truth, abs=0.01)
+    table = report.table().set_index(["size", "direction"])["t86"].unstack().sort_index()
+    assert (table.diff().dropna() > 0).all(axis=None)
+
+
+@pytest.mark.parametrize("width", [0.0, 0.6, 1.0])
+def test_the_interval_of_the_dead_band_holds_a_backlash(width):
+    command = command_of(stairs(), 4.0)
+    moved = cr.actuators.Backlash(width).simulate(command) if width else command
+    hits = []
+    for seed in range(12):
+        report = valves.valve_report(record_of(command, moved, 0.05, seed), **QUICK)
+        band = report.metric("dead_band").interval
+        assert band.value == pytest.approx(width, abs=0.02)
+        hits.append(held(band, width))
+        assert held(report.metric("resolution").interval, 0.0)
+        assert held(report.metric("backlash").interval, width)
+    # fewer than 9 of 12 intervals of 95 % hold: 2e-3
+    assert sum(hits) >= 9
+
+
+@pytest.mark.parametrize(("S", "J"), [(2.0, 0.6), (1.5, 0.4), (1.1, 1.1)])
+def test_a_stem_that_sticks_has_the_dead_band_and_the_resolution_of_its_model(S, J):
+    command = command_of(stairs(), 4.0)
+    moved = cr.actuators.KanoStiction(S=S, J=J).simulate(command)
+    report = valves.valve_report(record_of(command, moved, 0.02, 3), **QUICK)
+    band, resolution = report.metric("dead_band").interval, report.metric("resolution").interval
+    assert held(band, S)
+    assert band.high - band.low <= 0.5 + 1e-9
+    assert held(resolution, J)
+    assert resolution.high - resolution.low <= 0.25 + 1e-9
+    assert held(report.metric("backlash").interval, S - J)
+    assert any(flag.code == "did_not_move" for flag in report.flags)
+
+
+def test_hysteresis_and_linearity_of_a_slow_ramp_are_those_of_its_curve():
+    u = np.interp(np.arange(6000), [0, 200, 2900, 3100, 5800, 6000], [0, 0, 100, 100, 0, 0])
+    bend, wide = 3.0, 4.0
+    # up: below the line by the bend; the branches are apart by a dead band of 1 and a loop of 4
+    way = np.sign(np.gradient(u))
+    loop = 0.5 + wide * (u / 100) * (1 - u / 100) / 0.5
+    y = u + bend * 4 * (u / 100) * (1 - u / 100) - way * 0.5 * loop
+    noisy = y + 0.05 * np.random.default_rng(0).standard_normal(u.size)
+    report = valves.valve_report(cr.Record(0.5 * np.arange(u.size), u, noisy, units=PERCENT))
+    x = report.curve.command
+    curve = x + bend * 4 * (x / 100) * (1 - x / 100)
+    line = np.polyval(np.polyfit(x, curve, 1), x)
+    linearity = report.metric("linearity").interval
+    assert linearity.value == pytest.approx(np.abs(curve - line).max(), rel=0.06)
+    apart = 0.5 + wide * 0.5
+    band = report.metric("dead_band").interval
+    assert report.metric("hysteresis").interval.value == pytest.approx(apart - band.value, abs=0.1)
+    assert report.curve.origin == "ramp"
+
+
+def test_small_steps_of_a_sticking_valve_are_late_in_table_and_flag_and_the_fit_agrees():
+    levels = [50, 52, 50, 52, 50, 60, 50, 60, 50]
+    command = command_of(levels, 6.0)
+    moved = stem_of(command, dead_time=0.0, lag=0.4)
+    moved = cr.actuators.Backlash(1.0).simulate(moved)
+    report = valves.valve_report(record_of(command, moved, 0.01, 1), **QUICK)
+    late, early = (
+        next(one for one in report.groups if round(one.size) == size and one.direction == "closing")
+        for size in (2, 10)
+    )
+    assert late.estimates["dead_time"].low > early.estimates["dead_time"].high
+    assert late.estimates["gain"].value < 0.7 < early.estimates["gain"].value
+    assert "dead_time_varies" in {flag.code for flag in report.flags}
+    steps = command_of([50, 52, 50, 60, 50], 6.0)
+    linear = valves.valve_report(record_of(steps, steps, 0.01, 1))
+    assert {flag.code for flag in linear.flags} == set()
+    for group in linear.groups:
+        assert held(group.fitted_dead_time, DEAD_TIME)
+
+
+def test_an_anti_surge_valve_gives_strokes_dead_time_and_overshoot_in_one_call():
+    dt, dead_time, damping, omega = 0.01, 0.1, 0.6, 12.0
+    levels = [50, 52, 50, 55, 50, 60, 50, 75, 50, 0, 100, 0, 100]
+    command = command_of(levels, 3.0, dt)
+    t = dt * np.arange(300)
+    ring = np.sqrt(1 - damping**2)
+    step = 1 - np.exp(-damping * omega * t) * (
+        np.cos(ring * omega * t) + damping / ring * np.sin(ring * omega * t)
+    )
+    shape = np.r_[np.zeros(round(dead_time / dt)), step]
+    moves = np.diff(command, prepend=command[0])
+    stem = command[0] + np.convolve(moves, np.r_[shape, np.ones(command.size)])[: command.size]
+    noise = 0.02 * np.random.default_rng(2).standard_normal(command.size)
+    record = cr.Record(dt * np.arange(command.size), command, stem + noise, units=PERCENT)
+    report = valves.valve_report(
+        record,
+        limits={"overshoot": 15, "stroke_time_opening": 2.0, "dead_time": {2: 0.2, 10: 0.05}},
+    )
+    overshoot = 100 * np.exp(-np.pi * damping / ring)
+    for group in report.groups:
+        assert group.estimates["overshoot"].value == pytest.approx(overshoot, abs=1.5)
+        assert group.estimates["dead_time"].value == pytest.approx(dead_time, abs=0.03)
+    ninety_eight = dt * np.argmax(step >= 0.98) + dead_time
+    assert report.metric("stroke_time_opening").interval.value == pytest.approx(
+        ninety_eight, abs=dt
+    )
+    by_size = [one.judgement for one in report.metrics if one.where.startswith(("2 %", "10 %"))]
+    assert by_size.count("met") >= 2
+    assert by_size.count("not met") == 2
+    assert report.level == "poor"
+    assert "dead time" in report.verdict
+    assert report.metric("stroke_time_opening").judgement == "met"
+    assert any("staircase" in test for test in report.missing_tests)
+
+
+def test_a_plan_is_written_and_its_measured_record_tells_every_metric(tmp_path):
+    first = record_of(command_of([50, 55], 5.0), command_of([50, 55], 5.0), 0.02, 1)
+    plan = valves.valve_test_plan(first, stroke_time=5.0, repeats=2, ramp_time=100.0, stairs=6)
+    written = np.loadtxt(plan.to_csv(tmp_path / "plan.csv"), delimiter=",", skiprows=1)
+    np.testing.assert_allclose(written, np.stack([plan.time, plan.command], axis=1), atol=1e-6)
+    u, dt = plan.command, plan.dt
+    moved = cr.actuators.Backlash(0.6).simulate(cr.actuators.SlewRateLimit(20.0).simulate(u, dt))
+    stem = stem_of(moved, dt=dt) + 0.02 * np.random.default_rng(4).standard_normal(u.size)
+    record = plan.record(stem, units=PERCENT)
+    report = plan.evaluate(record, **QUICK)
+    unknown = {one.key for one in report.metrics if not one.interval.is_known}
+    assert unknown == {"fitted_dead_time"}
+    assert held(report.metric("dead_band").interval, 0.6)
+    assert report.metric("linearity").interval.high < 0.1
+    kinds = [part.kind for part in report.parts[0]]
+    assert kinds.count("stroke") == 2
+    assert kinds.count("ramp") == 2
+    assert "staircase" in kinds
+    part = plan.evaluate(record.between(0, plan.sections[3][2]), **QUICK)
+    (flag,) = (flag for flag in part.flags if flag.code == "plan_incomplete")
+    assert "strokes, slow ramp" in str(flag)
+
+
+def test_records_of_operation_end_in_a_verdict_that_names_the_missing_tests():
+    measured = cr.datasets.load("sugar_actuator").record[0:400]
+    record = cr.Record(measured.time, measured.input, measured.output[0])
+    report = valves.valve_report(record, command_range=(0, 100), travel_range=(0, 100))
+    assert report.verdict == "Cannot tell: the records contain no valve test."
+    assert report.level == "caution"
+    assert "no_valve_test" in {flag.code for flag in report.flags}
+    assert len(report.missing_tests) == 5
+    # its command is about one sample of 1 s ahead of the stem
+    assert report.metric("fitted_dead_time").interval.high < 3.0
+    assert "valve_test_plan" in report.report()
+
+
+def test_noise_spikes_and_drives_in_milliamperes_leave_the_parts_as_they_are():
+    valve = cr.bench.valve()
+    records = valve.step_campaign(1, amplitudes=(16.0, 4.0), repeats=3)
+    report = valves.valve_report(records, command_range=(4, 20), **QUICK)
+    assert [[part.kind for part in own] for own in report.parts] == [["baseline", "stroke"]] * 3 + [
+        ["baseline", "step"]
+    ] * 3
+    assert report.metric("gain").interval.value == pytest.approx(1.0, abs=0.01)
+    assert len(report.choices) == 1
+    assert "travel range" in report.choices[0]
+
+
+@pytest.mark.parametrize(
+    ("call", "error", "match"),
+    [
+        (lambda r: valves.valve_report([]), DataError, "at least one"),
+        (lambda r: valves.valve_report(r, limits={"t87": 1}), OptionError, "'t87'"),
+        (lambda r: valves.valve_report(r, limits={"t86": "1"}), OptionError, "largest"),
+        (lambda r: valves.valve_report(r, limits={"linearity": {2: 1}}), OptionError, "by step"),
+        (lambda r: valves.valve_report(r, command_range=(1, 1)), OptionError, "positive"),
+        (lambda r: valves.valve_report(r, **QUICK).metric("x"), OptionError, "expected one of"),
+        (lambda r: valves.valve_test_plan(), OptionError, "dead_time=None"),
+        (lambda r: valves.valve_test_plan(r[0:2]), NoStepError, "no step"),
+        (
+            lambda r: valves.valve_test_plan(dead_time=1, time_constant=1, sizes=(60,)),
+            OptionError,
+            "leave the range",
+        ),
+        (
+            lambda r: valves.valve_test_plan(dead_time=1, time_constant=1).record([1.0, 2.0]),
+            DataError,
+            "position has shape",
+        ),
+    ],
+)
+def test_unusable_choices_are_refused(call, error, match):
+    command = command_of([50, 55], 4.0)
+    with pytest.raises(error, match=match):
+        call(record_of(command, command, 0.0, 0))
