@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from numpy.testing import assert_array_equal
 
 from ctrl_realize.plots import style
-from ctrl_realize.report.svg import envelope, inline_svg, laid_out
+from ctrl_realize.report.svg import envelope, inline_svg, laid_out, path_of
 
 
 def drawn(draw, key, size, description):
@@ -53,3 +53,14 @@ def test_the_envelope_keeps_ends_and_extremes_and_invents_nothing(values, points
     assert thin_y.min() == y.min()
     assert thin_y.max() == y.max()
     assert thin_x.size <= points + 4  # two of each stretch, and both ends
+
+
+def test_a_loop_that_is_thinned_out_is_the_same_curve():
+    corners = np.array([[0, 0], [0, 1], [1, 1], [1, 0], [0, 0]], dtype=np.float64)
+    along = np.linspace(0, 4, 40_001)
+    x, y = (np.interp(along, range(5), corners[:, k]) for k in (0, 1))
+    rest = np.repeat(x, 3), np.repeat(y, 3)  # a curve that rests
+    thin = np.stack(path_of(*rest), axis=1)
+    assert thin.shape[0] < 4000
+    for k in range(0, x.size, 97):
+        assert np.abs(thin - [x[k], y[k]]).max(axis=1).min() <= 1 / 400
