@@ -165,6 +165,32 @@ def test_a_model_is_compared_with_a_measured_frf(folder, first, tmp_path, capsys
     assert "written" not in capsys.readouterr().out
 
 
+def test_a_valve_test_gives_tables_and_a_report_and_limits_are_judged(tmp_path, capsys):
+    levels = [50, 52, 50, 60, 50, 0, 100, 0]
+    command = np.concatenate([np.full(100, float(level)) for level in levels])
+    time = 0.05 * np.arange(command.size)
+    stem = np.convolve(np.diff(command, prepend=50), 1 - np.exp(-time / 0.4))[: time.size] + 50
+    stem += 0.01 * np.random.default_rng(0).standard_normal(time.size)
+    file, out = tmp_path / "test.csv", tmp_path / "out"
+    pd.DataFrame({"time_s": time, "command": command, "stem": stem}).to_csv(file, index=False)
+    words = ["valve", str(file), "--command-range", "0", "100", "--travel-range", "0", "100",
+             "--no-fit", "--limit", "t86@2=0.5", "--limit", "stroke_time_opening=1:3"]  # fmt: skip
+    assert main([*words, "-o", str(out)]) == 0
+    said = capsys.readouterr().out
+    assert "Limits not met: T86 (2 % opening), T86 (2 % closing)." in said
+    metrics = pd.read_csv(out / "metrics.csv", index_col=0)
+    assert metrics.loc["stroke_time_opening", "judgement"] == "met"
+    # 2 lags and half a sample, from the sum in place of the integral
+    assert metrics.loc["t86"].iloc[0]["value"] == pytest.approx(0.8, abs=0.03)
+    assert pd.read_csv(out / "sizes.csv")["count"].sum() == 7
+    page = (out / "report.html").read_text(encoding="utf-8")
+    assert page.count("<svg ") == 6
+    assert "not verified against the document" in page
+    assert "t86@2=0.5" in page
+    assert main([*words, "--limit", "t86", "-o", str(tmp_path / "no")]) == 2
+    assert "expected metric=largest" in capsys.readouterr().err
+
+
 class Terminal(StringIO):
     def isatty(self):
         return True

@@ -17,7 +17,7 @@ from threadpoolctl import threadpool_limits
 from typer.main import get_command
 
 from ..errors import CtrlRealizeError
-from .signatures import compare, demo, identify
+from .signatures import compare, demo, identify, valve
 from .terminal import EXIT_CODES, complain, one_line, plain_warning
 
 app = typer.Typer(
@@ -30,6 +30,7 @@ app = typer.Typer(
 )
 app.command(epilog=EXIT_CODES)(identify)
 app.command(epilog=EXIT_CODES)(compare)
+app.command(epilog=EXIT_CODES)(valve)
 app.command(epilog=EXIT_CODES)(demo)
 
 

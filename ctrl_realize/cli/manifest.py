@@ -21,7 +21,7 @@ _MOST_BYTES = 16 * 2**20
 _RESULTS = (
     "model.json", "report.html", "records.csv", "frf_comparison.csv", "table_1.csv",
     "model_paper.json", "frf_simulated.csv", "record_simulated.csv", "models/*.json",
-    "figures/*.png",
+    "figures/*.png", "metrics.csv", "sizes.csv", "steps.csv",
 )  # fmt: skip
 """Names of results if there is no manifest."""
 

@@ -103,6 +103,26 @@ NoReport = Annotated[
     bool, _OPTION("--no-report", help="Write models and tables alone, without report and figures.")
 ]
 
+# how to judge a valve
+CommandRange = Annotated[
+    tuple[float, float] | None,
+    _OPTION(metavar="CLOSED OPEN", help="Command of the closed and the open valve. Default: 0 100 "
+            "for %, 4 20 for mA, otherwise the range of the records."),
+]  # fmt: skip
+TravelRange = Annotated[
+    tuple[float, float] | None,
+    _OPTION(metavar="CLOSED OPEN", help="Position of the closed and the open valve. Default: 0 100 "
+            "for %, otherwise such that the gain of the larger steps is one."),
+]  # fmt: skip
+Limit = Annotated[
+    list[str] | None,
+    _OPTION(help="Permitted values, such as t86=0.5, gain=0.9:1.1, t86@2=0.4 (steps of 2 %); "
+            "repeatable."),
+]  # fmt: skip
+NoFit = Annotated[
+    bool, _OPTION("--no-fit", help="Do not fit the dead time of each size and direction.")
+]
+
 # how to read records
 Time = Annotated[str | None, _OPTION(help="Time column, name or number from 0.")]
 Input = Annotated[

@@ -176,6 +176,73 @@ def compare(
     )  # fmt: skip
 
 
+def valve(
+    files: o.Files,
+    output: o.Folder,
+    command_range: o.CommandRange = None,
+    travel_range: o.TravelRange = None,
+    limit: o.Limit = None,
+    no_fit: o.NoFit = False,
+    by: o.By = None,
+    split: o.Split = False,
+    time: o.Time = None,
+    input_column: o.Input = None,
+    output_column: o.OutputColumn = None,
+    dt: o.Dt = None,
+    time_unit: o.TimeUnit = None,
+    time_format: o.TimeFormat = None,
+    start: o.From = None,
+    stop: o.To = None,
+    na_values: o.NaValues = None,
+    quality: o.Quality = None,
+    good: o.Good = None,
+    resample: o.Resample = False,
+    rest: o.Rest = None,
+    delimiter: o.Delimiter = None,
+    decimal: o.Decimal = None,
+    encoding: o.Encoding = None,
+    comment: o.Comment = None,
+    no_header: o.NoHeader = False,
+    skip_rows: o.SkipRows = None,
+    variable: o.Variable = None,
+    max_bytes: o.MaxBytes = None,
+    no_report: o.NoReport = False,
+    overwrite: o.Overwrite = False,
+) -> int:
+    """Measure the metrics of a step test of a control valve.
+
+    The input is the command, the output the position of the stem, or a process variable. Steps,
+    staircases, full strokes and ramps are found in the command; dead time, T63, T86, T98,
+    overshoot, gain, dead band, resolution, hysteresis, linearity and stroke times come with 95 %
+    intervals, against step size and direction. What the records cannot tell is listed with the
+    test that is missing. The output contains report.html, metrics.csv, sizes.csv, steps.csv and
+    figures/.
+
+    \b
+    Examples:
+      ctrl-realize valve test.csv -o valve --command-range 0 100 --travel-range 0 100
+      ctrl-realize valve step_*.csv -o valve --command-range 4 20 --limit dead_band=1
+      ctrl-realize valve test.csv -o valve --input command --output-column stem --limit t86@2=0.4
+    """  # noqa: D301  # \b keeps the lines of the examples apart
+    check_files(files)
+    with loading():
+        from .valve.command import run_valve
+
+    reading = given(
+        time=time, input=input_column, output=output_column, dt=dt, time_unit=time_unit,
+        time_format=time_format, start=start, stop=stop, na_values=na_values, quality=quality,
+        good=good, resample=resample, rest=rest, delimiter=delimiter, decimal=decimal,
+        encoding=encoding, comment=comment, no_header=no_header, skip_rows=skip_rows,
+        variable=variable, max_bytes=max_bytes,
+    )  # fmt: skip
+    choices: dict[str, Any] = given(command_range=command_range, travel_range=travel_range)
+    return run_valve(
+        files, output, choices=choices | ({"fit": False} if no_fit else {}), limits=limit or (),
+        tests=given(by=by, split=split), reading=reading, report=not no_report,
+        overwrite=overwrite,
+    )  # fmt: skip
+
+
 def demo(
     output: o.Folder,
     seed: Annotated[int, typer.Option(min=0, help="Seed of the random numbers.")] = 1,

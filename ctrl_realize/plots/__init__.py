@@ -20,6 +20,14 @@ from .responses import impulse_estimate_plot, impulse_plot, mimo_realization_plo
 from .robustness import delay_robustness_plot, robustness_plot, uncertainty_plot
 from .scans import delay_plot, order_plot, singular_value_plot
 from .tuning import hankel_plot, pid_comparison_plot, process_model_plot
+from .valves.tests import (
+    valve_loop_plot,
+    valve_plan_plot,
+    valve_plot,
+    valve_signature_plot,
+    valve_sizes_plot,
+    valve_steps_plot,
+)
 
 __all__ = [
     "bootstrap_plot",
@@ -58,6 +66,12 @@ __all__ = [
     "track_plot",
     "truth_plot",
     "uncertainty_plot",
+    "valve_loop_plot",
+    "valve_plan_plot",
+    "valve_plot",
+    "valve_signature_plot",
+    "valve_sizes_plot",
+    "valve_steps_plot",
 ]
 
 

@@ -29,6 +29,7 @@ from .robustness import delay_robustness_plot, robustness_plot, uncertainty_plot
 from .scans import delay_plot, order_plot, singular_value_plot
 from .shared_docs import documented
 from .tuning import hankel_plot, pid_comparison_plot, process_model_plot
+from .valves.tests import valve_plan_plot, valve_plot
 
 
 @singledispatch
@@ -104,6 +105,8 @@ for _plot in (
     track_plot,
     truth_plot,
     uncertainty_plot,
+    valve_plan_plot,
+    valve_plot,
 ):
     draw.register(_plot)
 

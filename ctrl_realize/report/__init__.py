@@ -3,6 +3,7 @@
 from .build import write_campaign, write_comparison, write_identification
 from .page import Column, Page, Row, Table, pairs, write_page
 from .sketches import Sketch
+from .valves import write_valve_report
 from .verdict import verdict_of
 
 __all__ = [
@@ -17,6 +18,7 @@ __all__ = [
     "write_comparison",
     "write_identification",
     "write_page",
+    "write_valve_report",
 ]
 
 

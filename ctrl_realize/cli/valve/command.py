@@ -1,0 +1,114 @@
+"""``ctrl-realize valve``: metrics of a valve test."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from ...errors import OptionError
+from ...io.text.csv_files import write_csv
+from ...report.valves import write_valve_report
+from ...valves import ValveReport, valve_report
+from ..inputs import Reading, python_keywords, typed_call
+from ..manifest import Run, refuse_other_results
+from ..options import words_of
+from ..results import told_if_it_fails
+from ..staging import appearing
+from ..terminal import printable, say
+
+
+def run_valve(
+    files: list[Path],
+    output: Path,
+    *,
+    choices: Mapping[str, Any],
+    limits: Sequence[str],
+    tests: Mapping[str, Any],
+    reading: Mapping[str, Any],
+    report: bool,
+    overwrite: bool,
+) -> int:
+    """Measure, write the results, and return the exit code."""
+    how = Reading(reading, tests)
+    bounds = _limits(limits)
+    options = {**choices, **({"limits": bounds} if bounds else {})}
+    words = [str(file) for file in files]
+    for name, value in choices.items():
+        if isinstance(value, tuple):
+            words += [f"--{name.replace('_', '-')}", *(f"{end:.12g}" for end in value)]
+    words += ["--no-fit"] if choices.get("fit") is False else []
+    words += [word for one in limits for word in ("--limit", one)]
+    words += words_of({**tests, **reading})
+    run = Run(typed_call("valve", words), tuple(files), overwrite)
+    refuse_other_results(output, run)
+    sources = how.sources(files)
+    records = [source.record() for source in sources]
+    for source, record in zip(sources, records, strict=True):
+        say(printable(f"{source.file}: {record!r}"))
+    result = valve_report(records, **options)
+    say(result.report())
+    names = ["metrics.csv", "sizes.csv", "steps.csv"]
+    words += ["--output", str(output)]
+    calls = [
+        ("In a terminal", typed_call("valve", words)),
+        ("In Python", _in_python(files, how, options)),
+    ]
+    written: list[str] = []
+    with appearing(output, run) as folder:
+        _write_tables(folder, result)
+        if report:
+            with told_if_it_fails(folder, "the table of metrics") as written:
+                write_valve_report(
+                    folder / "report.html", result, files=list(dict.fromkeys(files)),
+                    settings=options, calls=calls, figures=folder / "figures",
+                )  # fmt: skip
+                written.append("report.html, figures/")
+    say(f"\nwritten to {printable(str(output))}: {', '.join([*names, *written])}")
+    return 0 if written or not report else 1
+
+
+def _write_tables(folder: Path, result: ValveReport) -> None:
+    write_csv(folder / "metrics.csv", result.metric_table(), index=True)
+    write_csv(folder / "sizes.csv", result.table(), index=False)
+    write_csv(folder / "steps.csv", result.step_table(), index=False)
+
+
+def _limits(given: Sequence[str]) -> dict[str, Any]:
+    """Limits as ``t86=0.5``, ``dead_band=0.1:1`` or, for one step size, ``t86@2=0.4``."""
+    found: dict[str, Any] = {}
+    for text in given:
+        name, equals, value = text.partition("=")
+        key, at, size = name.strip().partition("@")
+        try:
+            if not equals:
+                raise ValueError
+            ends = [float(end) if end.strip() else None for end in value.split(":")]
+            limit = ends[0] if len(ends) == 1 else tuple(ends)
+            if at:
+                found.setdefault(key, {})[float(size)] = limit
+            else:
+                found[key] = limit
+        except (ValueError, TypeError):
+            raise OptionError(
+                f"--limit {text!r}; expected metric=largest, metric=smallest:largest, or "
+                "metric@size=largest, such as t86=0.5, gain=0.9:1.1 or t86@2=0.4"
+            ) from None
+    return found
+
+
+def _in_python(files: list[Path], how: Reading, options: Mapping[str, Any]) -> str:
+    keywords = python_keywords(how.keywords)
+    names = ", ".join(repr(str(file)) for file in files)
+    reader = "cr.read_record"
+    lines = ["import ctrl_realize as cr", f"files = [{names}]"]
+    if how.tests:
+        by = how.tests.get("by")
+        keywords = ("" if by is None else f", by={by!r}") + keywords
+        lines.append(
+            f"records = [one for file in files for one in cr.io.read_records(file{keywords})]"
+        )
+    else:
+        lines.append(f"records = [{reader}(file{keywords}) for file in files]")
+    lines.append(f"report = cr.valves.valve_report(records{python_keywords(options)})")
+    return "\n".join(lines)

@@ -1,0 +1,334 @@
+"""Plots of valve tests."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import control as ct
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.lines import Line2D
+
+from ...errors import OptionError
+from ...valves.definitions import DEFINITIONS
+from ...valves.plan import ValveTestPlan
+from ...valves.result import ValveReport
+from ...valves.steps import STEP_METRICS
+from .. import style
+from ..shared_docs import documented
+
+_MOST_STEPS = 60
+_MOST_POINTS = 4000
+_SIZE = (8.0, 4.8)
+_WAYS = {"opening": (style.MEASURED, "o", "-"), "closing": (style.MODEL, "s", "--")}
+
+
+@documented("Axes, sequence of Axes")
+def valve_plot(
+    report: ValveReport, *, ax: style.AxesLike = None, title: str | None = None, **kwargs: Any
+) -> ct.ControlPlot:
+    """Draw a valve test: responses, T86 against step size, loops, signature.
+
+    The four are `valve_steps_plot`, `valve_sizes_plot`, `valve_loop_plot` and
+    `valve_signature_plot`.
+
+    Parameters
+    ----------
+    report : ValveReport
+    **kwargs
+        Line properties of the measured curves.
+
+    Examples
+    --------
+    >>> import ctrl_realize as cr
+    >>> records = cr.bench.valve().step_campaign(1, amplitudes=(16.0, 4.0), repeats=3)
+    >>> report = cr.valves.valve_report(records, command_range=(4, 20), fit=False)
+    >>> cplt = cr.plots.valve_plot(report)
+    >>> cplt.axes.shape
+    (2, 2)
+    """
+    with style.canvas(
+        ax, 2, columns=2, sharex=False, size=(11.0, 8.0), title=title, default_title="valve test"
+    ) as axes:
+        lines = [
+            _draw_steps(axes[0], report, kwargs),
+            _draw_sizes(axes[1], report, "t86", kwargs),
+            _draw_loop(axes[2], report, kwargs),
+            _draw_signature(axes[3], report, kwargs),
+        ]
+        return style.finished(axes, lines, columns=2, legends=(0, 1, 2, 3), loc="best")
+
+
+@documented()
+def valve_steps_plot(
+    report: ValveReport, *, ax: style.AxesLike = None, title: str | None = None, **kwargs: Any
+) -> ct.ControlPlot:
+    """Draw the responses to all steps on one another, each scaled to 0 before and 1 after.
+
+    One colour for each step size; closing steps are dashed. Steps that did not move the valve have
+    no curve.
+
+    Parameters
+    ----------
+    report : ValveReport
+    **kwargs
+        Line properties.
+
+    Examples
+    --------
+    >>> import ctrl_realize as cr
+    >>> records = cr.bench.valve().step_campaign(1, amplitudes=(16.0, 4.0), repeats=3)
+    >>> report = cr.valves.valve_report(records, command_range=(4, 20), fit=False)
+    >>> cplt = cr.plots.valve_steps_plot(report)
+    >>> [text.get_text() for text in cplt.figure.axes[0].get_legend().get_texts()]
+    ['25 %', '100 %']
+    """
+    with style.canvas(ax, title=title, default_title="responses to steps", size=_SIZE) as axes:
+        return style.finished(axes, [_draw_steps(axes[0], report, kwargs)], loc="lower right")
+
+
+@documented()
+def valve_sizes_plot(
+    report: ValveReport,
+    *,
+    metric: str = "t86",
+    ax: style.AxesLike = None,
+    title: str | None = None,
+    **kwargs: Any,
+) -> ct.ControlPlot:
+    """Draw a metric against step size and direction, with its 95 % interval.
+
+    Parameters
+    ----------
+    report : ValveReport
+    metric : str, default "t86"
+        One of ``"dead_time"``, ``"t63"``, ``"t86"``, ``"t98"``, ``"settling_time"``,
+        ``"overshoot"``, ``"gain"``, ``"slew_rate"``.
+    **kwargs
+        Line properties of the points.
+
+    Raises
+    ------
+    OptionError
+        A metric that single steps do not have.
+
+    Examples
+    --------
+    >>> import ctrl_realize as cr
+    >>> records = cr.bench.valve().step_campaign(1, amplitudes=(16.0, 4.0), repeats=3)
+    >>> report = cr.valves.valve_report(records, command_range=(4, 20), fit=False)
+    >>> cplt = cr.plots.valve_sizes_plot(report, metric="gain")
+    >>> cplt.figure.axes[0].get_ylabel()
+    'travel gain [%/%]'
+    """
+    if metric not in STEP_METRICS:
+        raise OptionError(f"metric={metric!r}; choose one of {', '.join(STEP_METRICS)}")
+    with style.canvas(ax, title=title, default_title="step size", size=_SIZE) as axes:
+        return style.finished(axes, [_draw_sizes(axes[0], report, metric, kwargs)], loc="best")
+
+
+@documented()
+def valve_loop_plot(
+    report: ValveReport, *, ax: style.AxesLike = None, title: str | None = None, **kwargs: Any
+) -> ct.ControlPlot:
+    """Draw the position over the command, for all records.
+
+    Parameters
+    ----------
+    report : ValveReport
+    **kwargs
+        Line properties.
+
+    Examples
+    --------
+    >>> import ctrl_realize as cr
+    >>> records = cr.bench.valve().step_campaign(1, amplitudes=(16.0, 4.0), repeats=3)
+    >>> report = cr.valves.valve_report(records, command_range=(4, 20), fit=False)
+    >>> cr.plots.valve_loop_plot(report).figure.axes[0].get_xlabel()
+    'command [% of span]'
+    """
+    with style.canvas(ax, title=title, default_title="position over command", size=_SIZE) as axes:
+        return style.finished(axes, [_draw_loop(axes[0], report, kwargs)], loc="best")
+
+
+@documented()
+def valve_signature_plot(
+    report: ValveReport, *, ax: style.AxesLike = None, title: str | None = None, **kwargs: Any
+) -> ct.ControlPlot:
+    """Draw the signature: position minus command at rest, opening and closing.
+
+    The distance of the two curves is the hysteresis with the dead band, their bend the linearity.
+
+    Parameters
+    ----------
+    report : ValveReport
+    **kwargs
+        Line properties.
+
+    Examples
+    --------
+    >>> import ctrl_realize as cr
+    >>> records = cr.bench.valve().step_campaign(1, amplitudes=(16.0, 4.0), repeats=3)
+    >>> report = cr.valves.valve_report(records, command_range=(4, 20), fit=False)
+    >>> cr.plots.valve_signature_plot(report).figure.axes[0].get_ylabel()
+    'position - command [%]'
+    """
+    with style.canvas(ax, title=title, default_title="signature", size=_SIZE) as axes:
+        return style.finished(axes, [_draw_signature(axes[0], report, kwargs)], loc="best")
+
+
+@documented()
+def valve_plan_plot(
+    plan: ValveTestPlan, *, ax: style.AxesLike = None, title: str | None = None, **kwargs: Any
+) -> ct.ControlPlot:
+    """Draw the command of a test plan, and name its parts.
+
+    Parameters
+    ----------
+    plan : ValveTestPlan
+    **kwargs
+        Line properties.
+
+    Examples
+    --------
+    >>> import ctrl_realize as cr
+    >>> plan = cr.valves.valve_test_plan(dead_time=0.3, time_constant=0.5)
+    >>> cr.plots.valve_plan_plot(plan).figure.axes[0].get_ylabel()
+    'command'
+    """
+    with style.canvas(ax, title=title, default_title=repr(plan)[1:-1], size=(11.0, 4.2)) as axes:
+        unit, name = style.axis_time_unit(plan.duration, axes[0])
+        looks = {"color": style.INPUT, "linewidth": 1.2, **kwargs}
+        lines = list(axes[0].plot(plan.time * unit, plan.command, **looks))
+        bottom, top = axes[0].get_ylim()
+        axes[0].set_ylim(bottom, top + 0.5 * (top - bottom))
+        for k, (word, start, stop) in enumerate(plan.sections):
+            if k % 2:
+                axes[0].axvspan(
+                    start * unit, stop * unit, color=style.NOISE, alpha=0.15, linewidth=0
+                )
+            narrow = stop - start < 0.09 * plan.duration
+            axes[0].text(
+                0.5 * (start + stop) * unit, top + (0.26 if narrow else 0.4) * (top - bottom), word,
+                ha="center", va="center" if narrow else "top", fontsize=9,
+                rotation=90 if narrow else 0,
+            )  # fmt: skip
+        axes[0].set(xlabel=f"time [{name}]", ylabel="command")
+        axes[0].set_xlim(0, plan.duration * unit)
+        return style.finished(axes, [lines])
+
+
+def _draw_steps(axes: Axes, report: ValveReport, looks: dict[str, Any]) -> list[Line2D]:
+    sizes = sorted({round(one.size, 2) for one in report.groups})
+    steps = [one for one in report.steps if one.moved and one.settled and one.response.size]
+    times = [one.values["settling_time"] for one in steps]
+    times += [1.3 * one.values["t86"] for one in steps]
+    known = [one for one in times if np.isfinite(one)]
+    lengths = (one.response.size * one.dt for one in steps)
+    longest = 1.2 * max(known) if known else max(lengths, default=1.0)
+    unit, name = style.axis_time_unit(longest, axes)
+    colours = _colours(len(sizes))
+    lines: list[Line2D] = []
+    named: set[float] = set()
+    few = steps[:: max(len(steps) // _MOST_STEPS, 1)]
+    for step in sorted(few, key=lambda one: abs(one.size)):
+        nearest = min(range(len(sizes)), key=lambda k: abs(sizes[k] - abs(step.size)))
+        count = min(step.response.size, int(longest / step.dt) + 2)
+        every = max(count // 800, 1)
+        label = "" if sizes[nearest] in named else f"{sizes[nearest]:.3g} %"
+        named.add(sizes[nearest])
+        own = {
+            "color": colours[nearest], "linestyle": "-" if step.size > 0 else "--",
+            "linewidth": 1.0, "alpha": 0.8, **({"label": label} if label else {}), **looks,
+        }  # fmt: skip
+        lines += axes.plot(
+            np.arange(0, count, every) * step.dt * unit, step.response[:count:every], **own
+        )
+    for level in (0.632, 0.865):
+        axes.axhline(level, color=style.NOISE, linewidth=0.8, linestyle=":")
+    axes.set(xlabel=f"time after the step [{name}]", ylabel="response / change")
+    axes.set_xlim(0, longest * unit)
+    axes.set_ylim(-0.3, 1.5)
+    if not lines:
+        _say_nothing(axes, "no step with a complete response")
+    return lines
+
+
+def _draw_sizes(
+    axes: Axes, report: ValveReport, metric: str, looks: dict[str, Any]
+) -> list[Line2D]:
+    known = [one for one in report.groups if one.estimates[metric].is_known]
+    definition = DEFINITIONS.get(metric, DEFINITIONS["slew_rate_opening"])
+    unit, factor = definition.unit, 1.0
+    if unit == "s" and known:
+        factor, unit = style.axis_time_unit(max(one.estimates[metric].high for one in known), axes)
+    lines: list[Line2D] = []
+    for way, (colour, marker, line) in _WAYS.items():
+        own = [one for one in known if one.direction == way]
+        if not own:
+            continue
+        size = [one.size for one in own]
+        found = [one.estimates[metric] for one in own]
+        for x, each in zip(size, found, strict=True):
+            axes.plot([x, x], [each.low * factor, each.high * factor], color=colour, alpha=0.5)
+        styled = {"color": colour, "marker": marker, "linestyle": line, "linewidth": 1.2, **looks}
+        lines += axes.plot(size, [one.value * factor for one in found], label=way, **styled)
+    if known:
+        axes.set_xscale("log")
+        ticks = sorted({float(f"{one.size:.2g}") for one in known})
+        axes.set_xticks(ticks, [f"{tick:g}" for tick in ticks])
+        axes.minorticks_off()
+        axes.set_ylim(bottom=min(0.0, axes.get_ylim()[0]))
+    else:
+        _say_nothing(axes, "unknown for all sizes")
+    name = "slew rate" if metric == "slew_rate" else definition.name
+    axes.set(xlabel="step size [% of span]", ylabel=f"{name} [{unit}]")
+    return lines
+
+
+def _draw_loop(axes: Axes, report: ValveReport, looks: dict[str, Any]) -> list[Line2D]:
+    lines: list[Line2D] = []
+    ranges = report.ranges
+    few = report.records[:: max(len(report.records) // 20, 1)]
+    for k, record in enumerate(few):
+        u, y = np.ravel(record.input), np.ravel(record.output)
+        # corners of the loop are between neighbouring samples: samples are only left out evenly
+        every = max(u.size // _MOST_POINTS, 1)
+        own = {"color": _colours(max(len(few), 2))[k] if len(few) > 1 else style.MEASURED,
+               "linewidth": 0.8, **looks}  # fmt: skip
+        if 1 < len(few) <= 6 and record.name:
+            own.setdefault("label", record.name)
+        lines += axes.plot(
+            100 * (u[::every] - ranges.command[0]) / ranges.command_span,
+            100 * (y[::every] - ranges.travel[0]) / ranges.travel_span,
+            **own,
+        )
+    axes.set(xlabel="command [% of span]", ylabel="position [% of travel]")
+    return lines
+
+
+def _draw_signature(axes: Axes, report: ValveReport, looks: dict[str, Any]) -> list[Line2D]:
+    lines: list[Line2D] = []
+    curve = report.curve
+    for way, (colour, marker, line) in _WAYS.items():
+        values = None if curve is None else getattr(curve, way)
+        if curve is None or values is None or not np.isfinite(values).any():
+            continue
+        own = {"color": colour, "linestyle": line, "marker": marker, "markersize": 3.5,
+               "linewidth": 1.2, "label": way, **looks}  # fmt: skip
+        lines += axes.plot(curve.command, values - curve.command, **own)
+    if not lines:
+        _say_nothing(axes, "no slow ramp, and no levels")
+    axes.set(xlabel="command [% of span]", ylabel="position - command [%]")
+    return lines
+
+
+def _colours(count: int) -> Sequence[Any]:
+    """Colours of ordered sizes: Okabe and Ito's first, then again."""
+    base = (style.OTHERS[3], style.MEASURED, style.TRUTH, style.BAND, style.MODEL, style.OTHERS[0])
+    return [base[k % len(base)] for k in range(max(count, 1))]
+
+
+def _say_nothing(axes: Axes, why: str) -> None:
+    axes.text(0.5, 0.5, why, ha="center", va="center", transform=axes.transAxes)

@@ -1,0 +1,235 @@
+"""Report of a valve test as a page."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from .. import plots
+from ..errors import DataError
+from ..valves.definitions import DEFINITIONS
+from ..valves.metrics import words_of
+from ..valves.result import ValveReport, in_words, limit_in_words
+from .build import write_report
+from .page import Column, Row, Table, pairs
+from .sketches import Sketch
+from .tables import Paths, data_table, settings_tables
+from .verdict import Level, Verdict
+
+_JUDGEMENTS: dict[Level, str] = {
+    "good": "All limits are met.",
+    "caution": "Measured, but not judged in full: see below.",
+    "poor": "Limits are not met: see below.",
+}
+_FACTS = ("dead_time", "t63", "t86", "overshoot", "dead_band", "resolution",
+          "stroke_time_opening", "stroke_time_closing")  # fmt: skip
+
+
+def write_valve_report(
+    path: str | os.PathLike[str],
+    result: ValveReport,
+    *,
+    files: Paths = (),
+    settings: Mapping[str, Any] | None = None,
+    calls: Sequence[tuple[str, str]] = (),
+    title: str = "Valve test",
+    simulated: bool = False,
+    figures: str | os.PathLike[str] | None = None,
+) -> Path:
+    """Write the report of a valve test as a self-contained HTML file.
+
+    Parameters
+    ----------
+    path : path-like
+        File to write, atomically.
+    result : ValveReport
+        From `valve_report`.
+    files, settings, calls, simulated, figures
+        As for `write_identification`.
+    title : str, optional
+
+    Returns
+    -------
+    pathlib.Path
+
+    Raises
+    ------
+    DataError
+        `result` is not the report of a valve test.
+    OSError
+        The folder is missing or cannot be written.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> from pathlib import Path
+    >>> import ctrl_realize as cr
+    >>> from ctrl_realize import report
+    >>> records = cr.bench.valve().step_campaign(1, amplitudes=(16.0, 4.0), repeats=2)
+    >>> result = cr.valves.valve_report(records, command_range=(4, 20), fit=False)
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     path = report.write_valve_report(Path(folder) / "valve.html", result, simulated=True)
+    ...     print(path.read_text(encoding="utf-8").count("<svg "), "figures")
+    6 figures
+    """
+    if not isinstance(result, ValveReport):
+        raise DataError(f"result is a {type(result).__name__}; expected that of valve_report")
+    many = len(result.records)
+    return write_report(
+        path,
+        title=title,
+        subtitle=f"{many} record{'s' if many > 1 else ''}, {len(result.steps)} steps",
+        verdict=_verdict(result),
+        sketches=_sketches(result),
+        tables=[
+            _metric_table(result),
+            _size_table(result),
+            *_missing_tables(result),
+            _step_table(result),
+            _definition_table(),
+            data_table(result.records, files),
+            *settings_tables(settings),
+        ],
+        calls=calls,
+        simulated=simulated,
+        figures=figures,
+    )
+
+
+def _verdict(result: ValveReport) -> Verdict:
+    facts = []
+    for key in _FACTS:
+        one = result.metric(key)
+        if one.interval.is_known:
+            value, interval = in_words(one.interval, one.definition.unit)
+            facts.append((one.definition.name, f"{value} {interval}"))
+    reasons = (*map(str, result.flags), *result.choices)
+    return Verdict(result.level, result.verdict, tuple(facts), reasons, _JUDGEMENTS[result.level])
+
+
+def _sketches(result: ValveReport) -> list[Sketch]:
+    return [
+        Sketch(
+            "steps",
+            "Responses to steps",
+            "Each scaled to its own change, on one another; closing steps are dashed. Dotted: "
+            "63.2 and 86.5 %.",
+            lambda figure: plots.valve_steps_plot(result, ax=figure),
+        ),
+        Sketch(
+            "t86",
+            "T86 against step size",
+            "With 95 % intervals. Small steps late: friction or dead band; large steps late: the "
+            "rate is limited.",
+            lambda figure: plots.valve_sizes_plot(result, ax=figure),
+        ),
+        Sketch(
+            "dead_time",
+            "Dead time against step size",
+            "First motion, with 95 % intervals.",
+            lambda figure: plots.valve_sizes_plot(result, metric="dead_time", ax=figure),
+        ),
+        Sketch(
+            "gain",
+            "Travel gain against step size",
+            "Change of the position over that of the command, with 95 % intervals.",
+            lambda figure: plots.valve_sizes_plot(result, metric="gain", ax=figure),
+        ),
+        Sketch(
+            "loop",
+            "Position over command",
+            "All records.",
+            lambda figure: plots.valve_loop_plot(result, ax=figure),
+        ),
+        Sketch(
+            "signature",
+            "Signature",
+            "Position minus command at rest: from the slow ramp, or from the levels of the steps.",
+            lambda figure: plots.valve_signature_plot(result, ax=figure),
+        ),
+    ]
+
+
+def _metric_table(result: ValveReport) -> Table:
+    columns = (
+        Column("metric"), Column("value", "number"), Column("95 % interval", "number"),
+        Column("steps"), Column("limit", "number"), Column("judgement"),
+    )  # fmt: skip
+    rows = []
+    for one in result.metrics:
+        value, interval = in_words(one.interval, one.definition.unit)
+        limit = limit_in_words(one) if one.limit != (None, None) else ""
+        cells = (one.definition.name, value, interval.strip("()"), one.where, limit, one.judgement)
+        kind = {"met": "best", "not met": "failed"}.get(one.judgement, "")
+        rows.append(Row(cells, kind))
+    return Table(
+        "Metrics", tuple(rows), columns,
+        note="Of metrics that depend on the step, the worst size and direction.",
+    )  # fmt: skip
+
+
+def _size_table(result: ValveReport) -> Table:
+    names = ("dead_time", "t63", "t86", "t98", "overshoot", "gain")
+    columns = (
+        Column("steps"), Column("number", "number"), Column("moved, settled", "number"),
+        *(Column(DEFINITIONS[name].name, "number") for name in names),
+        Column("dead time (fit)", "number"),
+    )  # fmt: skip
+    rows = tuple(
+        Row(
+            (
+                words_of(group), str(group.count), f"{group.moved}, {group.settled}",
+                *(_cell(group.estimates[name], DEFINITIONS[name].unit) for name in names),
+                _cell(group.fitted_dead_time, "s"),
+            )
+        )
+        for group in result.groups
+    )  # fmt: skip
+    return Table("Step size and direction", rows, columns, note="95 % intervals in brackets.")
+
+
+def _cell(found: Any, unit: str) -> str:
+    return " ".join(in_words(found, unit)).strip() if found.is_known else ""
+
+
+def _missing_tables(result: ValveReport) -> list[Table]:
+    if not result.missing_tests:
+        return []
+    rows = [(test, ", ".join(names)) for test, names in result.missing_tests.items()]
+    return [pairs("Missing tests, and what they would tell", rows)]
+
+
+def _step_table(result: ValveReport) -> Table:
+    names = ("dead_time", "t63", "t86", "t98", "overshoot", "gain")
+    columns = (
+        Column("record", "name"), Column("time [s]", "number"), Column("command", "number"),
+        Column("moved"), Column("settled"),
+        *(Column(f"{DEFINITIONS[name].name} [{DEFINITIONS[name].unit}]", "number")
+          for name in names),
+    )  # fmt: skip
+    rows = tuple(
+        Row(
+            (
+                result.records[one.record].name or str(one.record + 1), f"{one.time:.5g}",
+                f"{one.before:.4g} to {one.after:.4g}", "yes" if one.moved else "no",
+                "yes" if one.settled else "no",
+                *(f"{one.values[name]:.4g}" if np.isfinite(one.values[name]) else ""
+                  for name in names),
+            )
+        )
+        for one in result.steps
+    )  # fmt: skip
+    return Table("Every step", rows, columns, folded=True)
+
+
+def _definition_table() -> Table:
+    columns = (Column("metric"), Column("definition"), Column("source, as far as it was read"),
+               Column("test that it needs"))  # fmt: skip
+    rows = tuple(
+        Row((one.name, one.sentence, one.source, one.needs)) for one in DEFINITIONS.values()
+    )
+    return Table("Definitions", rows, columns, folded=True)
