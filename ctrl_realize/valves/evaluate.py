@@ -24,6 +24,7 @@ from .statics import (
     dead_band_and_resolution,
     hysteresis_and_linearity,
     joined,
+    slope_of,
     static_curve,
 )
 from .steps import Ranges, StepMetrics, measured_steps, noise_of
@@ -126,7 +127,7 @@ def valve_report(
     metrics = collected(groups, statics)
     flags = _flags(steps, groups, parts)
     if fit and any(flag.code == "no_valve_test" for flag in flags):
-        model = _fit_of_operation(given, ranges)
+        model = _fit_of_operation(given)
         flags += [model[1]] if model else []
         metrics = tuple(
             one if not model or one.key != "fitted_dead_time"
@@ -182,10 +183,12 @@ def _travel_range(
     else:
         u = np.concatenate([np.ravel(record.input) for record in records])
         y = np.concatenate([np.ravel(record.output) for record in records])
-        slope = float(np.polyfit(u, y, 1)[0]) if np.ptp(u) > 0 else 0.0
+        slope = slope_of(u, y)
         points = [(float(np.mean(u)), float(np.mean(y)))]
-    if not np.isfinite(slope) or slope == 0:
-        slope = 100 / span
+    largest = max(float(np.max(np.abs(record.output))) for record in records)
+    if not np.isfinite(slope) or abs(slope * span) <= 1e-9 * largest:
+        # the position does not follow the command: no range is a sensible one
+        slope = max(100.0, largest) / span
     low = float(np.median([y - slope * (u - command[0]) for u, y in points]))
     choices.append(
         f"travel range {low:.4g} to {low + slope * span:.4g}: with it the gain of the larger steps "
@@ -282,7 +285,7 @@ def _flags(
     return flags
 
 
-def _fit_of_operation(records: tuple[Record, ...], ranges: Ranges) -> tuple[Interval, Flag] | None:
+def _fit_of_operation(records: tuple[Record, ...]) -> tuple[Interval, Flag] | None:
     """Dead time of a linear model of records that contain no test."""
     found = []
     for record in records:
@@ -297,12 +300,12 @@ def _fit_of_operation(records: tuple[Record, ...], ranges: Ranges) -> tuple[Inte
     if not found:
         return None
     fit, interval = found[0]
-    gain = np.nan if fit.gain is None else fit.gain * ranges.command_span / ranges.travel_span
+    gain = np.nan if fit.gain is None else fit.gain
     more = "".join(f"; {flag}" for flag in fit.flags[:2])
     return interval, Flag(
         "operation_fit",
         f"a linear model of the record has a dead time of {interval.value:.3g} s and a gain of "
-        f"{gain:.3g} %/%{more}",
+        f"{gain:.3g} in the units of the record{more}",
     )
 
 

@@ -15,6 +15,7 @@ from ..data.given import as_record
 from ..errors import DataError
 from ..numerics.arrays import FloatArray
 from ..numerics.signals.edges import Edge, despike, difference_noise
+from ..numerics.signals.noise import mad_sigma
 
 PartKind = Literal["baseline", "step", "staircase", "stroke", "ramp"]
 
@@ -24,8 +25,12 @@ _STROKE_SHARE = 0.8
 """A step over this fraction of the command's range is a full stroke."""
 _STEP_SAMPLES = 8
 """A change of the command that takes longer is a ramp."""
-_FLAT = 0.15
+_FLAT = 0.05
 """Largest scatter of the command about a level, as a fraction of the step."""
+_BENT = 0.05
+"""Largest distance of a ramp from a straight line, as a fraction of its height."""
+_COVERED = 0.3
+"""Least fraction of a test that its parts cover."""
 _ALIKE = 0.2
 """Relative difference up to which steps have the same height."""
 _LEAST_STAIRS = 3
@@ -78,8 +83,10 @@ def split_test(record: Record, *, command_range: Sequence[float] | None = None) 
 
     A change of the command within eight samples between two levels is a step; over at least 80 % of
     the command's range it is a full stroke. Steps of the same height (within 20 %) in succession,
-    of which at least three go the same way, are a staircase. A slower change is a ramp. A command
-    that holds no level, as in operation under control, gives none of them.
+    of which at least three go the same way, are a staircase. A slower change along a straight line
+    is a ramp. A record of which these parts, with the levels that the command holds, cover less
+    than 30 % is one of operation, not of a test, and gives none of them; cut out a test that it
+    contains.
 
     Parameters
     ----------
@@ -123,6 +130,11 @@ def split_test(record: Record, *, command_range: Sequence[float] | None = None) 
     if np.ptp(command) == 0:
         return [TestPart("baseline", 0, command.size, command[0], command[0], record.time[0])]
     found = _with_stairs(_changes(record, span))
+    covered = np.zeros(command.size, dtype=bool)
+    for part in found:
+        covered[part.start : part.stop] = True
+    if np.mean(covered) < _COVERED:
+        return []
     if found:
         first = found[0]
         stop = first.edges[0].index if first.edges else first.start
@@ -143,7 +155,7 @@ def range_of(ends: Sequence[float]) -> tuple[float, float, float]:
 def _changes(record: Record, span: float) -> list[TestPart]:
     """Steps, strokes and ramps between the levels that the command holds."""
     command = np.ravel(record.input)
-    noise = difference_noise(command)
+    noise = _noise_of(command)
     clean = despike(command, int(np.clip(command.size // 1000, 1, 6))) if noise else command
     half = 4 if noise else 1
     width = 2 * half + 1
@@ -164,10 +176,11 @@ def _changes(record: Record, span: float) -> list[TestPart]:
         levels = float(np.median(before)), float(np.median(after))
         height = levels[1] - levels[0]
         held = min(before.size, after.size) >= _LEAST_HOLD
-        flat = all(
-            np.subtract(*np.percentile(side, [95, 5])) <= max(_FLAT * abs(height), 5 * noise)
+        limit = max(_FLAT * abs(height), 5 * noise)
+        flat = [
+            bool(side.size and np.subtract(*np.percentile(side, [95, 5])) <= limit)
             for side in (before, after)
-        )
+        ]
         change = clean[low - 1 : high + 1]
         away = np.flatnonzero(np.abs(change - levels[0]) > max(0.02 * abs(height), 5 * noise))
         if not away.size or abs(height) <= threshold:
@@ -176,16 +189,28 @@ def _changes(record: Record, span: float) -> list[TestPart]:
         there = np.flatnonzero(np.abs(clean[index:] - levels[1]) <= 0.02 * abs(height) + 5 * noise)
         samples = (int(there[0]) if there.size else command.size - index) + 1
         time = float(record.time[index])
-        if samples <= _STEP_SAMPLES and held and flat:
+        if samples <= _STEP_SAMPLES and held and all(flat):
             edge = Edge(index, height, levels[0], samples, start, end)
             kind: PartKind = "stroke" if abs(height) >= _STROKE_SHARE * span else "step"
             found.append(TestPart(kind, start, end, *levels, time, (edge,)))
         elif samples > _STEP_SAMPLES and abs(height) > _LEAST_RAMP * span:
             way = np.sign(height) * np.diff(change[:: max(change.size // 50, 1)])
-            if np.mean(way >= -3 * noise) > 0.95:
+            line = np.linspace(change[0], change[-1], change.size)
+            bent = float(np.max(np.abs(change - line)))
+            straight = bent <= max(_BENT * abs(height), 5 * noise)
+            # it leads from one level to another, or back from where another ramp has led
+            ends = any(flat) or bool(found and found[-1].kind == "ramp")
+            if straight and ends and way.size and np.mean(way >= -3 * noise) > 0.95:
                 time = float(record.time[low])
                 found.append(TestPart("ramp", low, min(high + 1, command.size), *levels, time))
     return found
+
+
+def _noise_of(command: FloatArray) -> float:
+    """White noise of a command; third differences do not take a smooth motion for noise."""
+    third = np.diff(command, 3)
+    smooth = mad_sigma(third) / np.sqrt(20) if third.size else 0.0
+    return min(difference_noise(command), smooth)
 
 
 def _jumps(values: FloatArray, width: int) -> FloatArray:

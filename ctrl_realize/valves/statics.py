@@ -177,6 +177,14 @@ def static_curve(
     return _of_levels(steps, ranges)
 
 
+def slope_of(x: FloatArray, y: FloatArray) -> float:
+    """Slope of the line of least squares; 0 if `x` does not vary."""
+    away = x - np.mean(x)
+    power = float(away @ away)
+    varies = np.ptp(x) > 1e-9 * float(np.max(np.abs(x)))
+    return float(away @ (y - np.mean(y))) / power if varies and power > 0 else 0.0
+
+
 def _binned(
     points: list[tuple[FloatArray, FloatArray, float]], noise: Noise, scale: float
 ) -> StaticCurve | None:
@@ -194,7 +202,7 @@ def _binned(
             count = np.bincount(place, minlength=_BINS)
             # the position at the middle of the bin, whatever the samples in it
             middle = 0.5 * (ends[1:] + ends[:-1])
-            slope = np.polyfit(command, output, 1)[0]
+            slope = slope_of(command, output)
             output = output - slope * (command - middle[place])
             total = np.bincount(place, weights=output, minlength=_BINS)
             full = count >= max(3, 0.5 * np.median(count))
@@ -251,7 +259,7 @@ def hysteresis_and_linearity(
     covered = float(np.ptp(curve.command[known])) if known.any() else 0.0
     if enough:
         apart = curve.closing[both] - curve.opening[both]
-        gain = float(np.polyfit(curve.command[known], middle[known], 1)[0])
+        gain = slope_of(curve.command[known], middle[known])
         count = int(both.sum())
         if gain > 0.05:
             mean = float(np.median(apart)) / gain
