@@ -175,7 +175,7 @@ def _fitted_dead_time(steps: list[StepMetrics], records: Sequence[Record]) -> In
     settled = [one for one in steps if one.settled][:_MOST_FITTED]
     if not settled:
         return Interval()
-    cut = [_cut(records[one.record], one) for one in settled]
+    cut = [cut_out(records[one.record], one) for one in settled]
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
@@ -194,7 +194,7 @@ def _fitted_dead_time(steps: list[StepMetrics], records: Sequence[Record]) -> In
     return Interval(fit.dead_time, *fit.interval, len(cut))
 
 
-def _cut(record: Record, step: StepMetrics) -> Record:
+def cut_out(record: Record, step: StepMetrics) -> Record:
     """The samples of one step with the hold before it."""
     edge = step.command_edge
     long = edge.stop - edge.index
@@ -203,4 +203,12 @@ def _cut(record: Record, step: StepMetrics) -> Record:
     # every block-th sample, counted from the step, so that it stays at its sample
     own = np.arange(start, edge.stop)[(edge.index - start) % block :: block]
     command = np.where(own < edge.index, step.before, step.after)
-    return Record(record.time[own] - record.time[edge.index], command, np.ravel(record.output)[own])
+    return Record(
+        record.time[own] - record.time[edge.index],
+        command,
+        np.ravel(record.output)[own],
+        name=f"{step.size:+.3g} % at {step.time:.4g} s",
+        input_labels=record.input_labels,
+        output_labels=record.output_labels,
+        units=dict(record.units),
+    )

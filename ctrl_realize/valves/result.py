@@ -7,12 +7,13 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
+from .._checks import one_of
 from .._wording import in_time, interval_in_time, number_within, numbers_alike, time_within
 from ..data import Record
 from ..errors import OptionError
 from ..results import Flag, Result
 from .definitions import DEFINITIONS
-from .groups import Interval, SizeAndDirection
+from .groups import Interval, SizeAndDirection, cut_out
 from .metrics import Metric, words_of
 from .parts import TestPart
 from .statics import StaticCurve
@@ -138,6 +139,43 @@ class ValveReport(Result):
         if not self.steps and all(part.kind != "ramp" for one in self.parts for part in one):
             return "Cannot tell: the records contain no valve test."
         return f"Measured: {known} of {len(DEFINITIONS)} metrics; no limits were given."
+
+    def step_records(
+        self, *, smallest: float = 0.0, largest: float = np.inf, direction: str | None = None
+    ) -> tuple[Record, ...]:
+        """Cut out the steps that moved and settled, each as a record that begins before its step.
+
+        They are the input of a joint fit, ``identify(report.step_records(), gains="own")``: one
+        linear part for all sizes, with a gain for each.
+
+        Parameters
+        ----------
+        smallest, largest : float, optional
+            Sizes to cut out, in % of the command's span.
+        direction : {"opening", "closing"}, optional
+            Default: both.
+
+        Returns
+        -------
+        tuple of Record
+            Time counts from the step; the command is exactly that of the two levels. Long steps
+            are thinned out to 1500 samples.
+
+        Raises
+        ------
+        OptionError
+            Another direction.
+        """
+        if direction is not None:
+            one_of(direction, "direction", ("opening", "closing"))
+        return tuple(
+            cut_out(self.records[one.record], one)
+            for one in self.steps
+            if one.moved
+            and one.settled
+            and smallest <= abs(one.size) <= largest
+            and direction in (None, one.direction)
+        )
 
     def table(self) -> pd.DataFrame:
         """List the metrics against step size and direction.

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.special import ndtri
 
 from ..data import Record
 from ..numerics.arrays import FloatArray
@@ -107,14 +108,22 @@ def _of_staircase(steps: list[StepMetrics], ranges: Ranges) -> tuple[Interval, I
     change = np.diff(command)
     followed = np.abs(np.diff(travel)) > np.maximum(4 * np.sqrt(2) * error,
                                                     _FOLLOWED * gain * np.abs(change))  # fmt: skip
+    step = float(np.median(np.abs(change)))
+    hidden = 4 * np.sqrt(2) * error > 0.5 * gain * step
     bands, resolutions = _waits(command, change, followed)
     resolution = _bracket(resolutions)
     if not np.isfinite(resolution.value) and followed.any():
-        step = float(np.min(np.abs(change)))
         resolution = Interval(step, 0.0, step, int(followed.sum()))
+    if hidden:
+        # movements that noise hides are not waits
+        resolution = replace(resolution, low=0.0 if resolution.is_known else np.nan)
     if fit is not None and fit.excess <= _GOOD_FIT and fit.high < np.ptp(command):
         reversals = int(np.sum(change[1:] * change[:-1] < 0))
-        return Interval(fit.width, fit.low, fit.high, reversals), resolution
+        # In noise that hides single small steps, a stem that sticks looks like one with play; its
+        # mean lag behind the command differs by up to half a step.
+        more = 0.5 * step if hidden else 0.0
+        band = Interval(fit.width, max(fit.low - more, 0.0), fit.high + more, reversals)
+        return band, resolution
     return _bracket(bands), resolution
 
 
@@ -242,6 +251,14 @@ def _of_levels(steps: Sequence[StepMetrics], ranges: Ranges) -> StaticCurve | No
     return StaticCurve(levels, curves[0], curves[1], error, "levels")
 
 
+def _largest_noise(sigma: float, count: int) -> tuple[float, float]:
+    """How much noise may have added to the largest of `count` values, and taken from it.
+
+    The former is the 97.5 % point of the largest of so many values without a signal.
+    """
+    return sigma * float(ndtri(0.975 ** (1 / count))), Z_95 * sigma
+
+
 def hysteresis_and_linearity(
     curve: StaticCurve | None, band: Interval
 ) -> tuple[Interval, Interval, Interval]:
@@ -249,7 +266,6 @@ def hysteresis_and_linearity(
     unknown = Interval()
     if curve is None:
         return unknown, unknown, unknown
-    half = Z_95 * curve.std
     both = np.isfinite(curve.opening) & np.isfinite(curve.closing)
     enough = int(both.sum()) >= 5 and np.ptp(curve.command[both]) >= 1.0
     hysteresis = width = unknown
@@ -271,12 +287,14 @@ def hysteresis_and_linearity(
             own = band if band.is_known else width
             if own.is_known and covered >= _LEAST_COVERED:
                 most = float(np.max(np.abs(apart)))
-                spread = float(np.hypot(np.sqrt(2) * half, 0.5 * (own.high - own.low) * gain))
+                noise = _largest_noise(np.sqrt(2) * curve.std, count)
+                low, high = (0.5 * (own.high - own.low) * gain + one for one in noise)
                 value = max(most - own.value * gain, 0.0)
-                hysteresis = Interval(value, max(value - spread, 0.0), value + spread, count)
+                hysteresis = Interval(value, max(value - low, 0.0), value + high, count)
     linearity = unknown
     if known.sum() >= 5 and covered >= _LEAST_COVERED:
         line = np.polyval(np.polyfit(curve.command[known], middle[known], 1), curve.command[known])
         most = float(np.max(np.abs(middle[known] - line)))
-        linearity = Interval(most, max(most - half, 0.0), most + half, int(known.sum()))
+        low, high = _largest_noise(curve.std, 2 * int(known.sum()))
+        linearity = Interval(most, max(most - low, 0.0), most + high, int(known.sum()))
     return hysteresis, linearity, width

@@ -20,6 +20,8 @@ SETTLED_BAND = 0.02
 
 _RATE = (0.4, 0.8)
 """Part of a change over which the rate is taken: lags still act at its beginning."""
+_RATE_ERROR = 5e-4
+"""Relative error of a limited rate by a lag of a twelfth of the stroke time, as simulated."""
 _LEVEL_SHARE = 0.3
 """Last part of a hold from which a level is taken."""
 _MOVED = 4.0
@@ -218,7 +220,7 @@ def _times(response: UnitResponse, dt: float, change: float, settled: bool) -> d
     rise_error = float(np.hypot(high.std, low.std)) * dt
     if rise > 0:
         rate = (_RATE[1] - _RATE[0]) * change / rise
-        found["slew_rate"] = Estimate(rate, rate * rise_error / rise)
+        found["slew_rate"] = Estimate(rate, rate * float(np.hypot(rise_error / rise, _RATE_ERROR)))
     over = response.overshoot()
     return found | {
         "t63": seconds(response.crossing(LEVEL_63)),

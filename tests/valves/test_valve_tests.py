@@ -160,6 +160,11 @@ def test_small_steps_of_a_sticking_valve_are_late_in_table_and_flag_and_the_fit_
     assert {flag.code for flag in linear.flags} == set()
     for group in linear.groups:
         assert held(group.fitted_dead_time, DEAD_TIME)
+    cut = linear.step_records(smallest=5, direction="opening")
+    assert [one.name for one in cut] == ["+10 % at 18 s"]
+    assert cr.identify(cut[0], structures=[(1, 1)]).fit.dead_time == pytest.approx(
+        DEAD_TIME, abs=0.01
+    )
 
 
 def test_an_anti_surge_valve_gives_strokes_dead_time_and_overshoot_in_one_call():
