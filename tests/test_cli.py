@@ -312,7 +312,7 @@ def test_records_of_different_plants_are_kept_apart_on_request(folder, tmp_path,
     assert {"step_0/model.json", "slow/model.json"} <= files_in(tmp_path / "out")
 
 
-@pytest.mark.parametrize("command", [[], ["identify"], ["compare"], ["demo"]])
+@pytest.mark.parametrize("command", [[], ["identify"], ["compare"], ["valve"], ["demo"]])
 def test_help_has_examples_and_exit_codes(command, capsys):
     assert main([*command, "--help"]) == 0
     said = " ".join(capsys.readouterr().out.split())

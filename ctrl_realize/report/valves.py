@@ -13,7 +13,8 @@ from .. import plots
 from ..errors import DataError
 from ..valves.definitions import DEFINITIONS
 from ..valves.metrics import words_of
-from ..valves.result import ValveReport, in_words, limit_in_words
+from ..valves.result import ValveReport
+from ..valves.words import in_words, limit_in_words
 from .build import write_report
 from .page import Column, Row, Table, pairs
 from .sketches import Sketch

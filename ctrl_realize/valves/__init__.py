@@ -6,8 +6,10 @@ from .definitions import DEFINITIONS, Definition
 from .evaluate import valve_report
 from .groups import Interval, SizeAndDirection
 from .metrics import Metric
-from .parts import TestPart, split_test
-from .plan import ValveTestPlan, valve_test_plan
+from .part import TestPart
+from .parts import split_test
+from .plan import ValveTestPlan
+from .planning import valve_test_plan
 from .result import ValveReport
 from .statics import StaticCurve
 from .steps import Ranges, StepMetrics

@@ -12,30 +12,27 @@ from ..data import Record
 from ..data.given import as_record
 from ..errors import CtrlRealizeError, DataError
 from ..identification.methods import identify
-from ..numerics.constants import Z_95
-from ..numerics.validation.own_response import homogeneity
+from ..numerics.valve_test.play import slope_of
 from ..results import Flag, ModelFit
-from .groups import STRUCTURES, Interval, SizeAndDirection, grouped
+from .flags import flags_of
+from .groups import STRUCTURES, Interval, grouped
 from .metrics import check_limits, collected, judged
-from .parts import TestPart, range_of, split_test
+from .part import TestPart
+from .parts import range_of, split_test
 from .result import ValveReport
 from .statics import (
     StaticCurve,
     dead_band_and_resolution,
     hysteresis_and_linearity,
     joined,
-    slope_of,
     static_curve,
 )
 from .steps import Ranges, StepMetrics, measured_steps, noise_of
 
 _KNOWN_RANGES = {"%": (0.0, 100.0), "mA": (4.0, 20.0)}
 """Range of a command by its unit."""
-_BY_CHANCE = 1e-3
 _MOST_SAMPLES = 2000
 """Samples of a record of operation that are fitted."""
-_LATER = 1.25
-"""Dead times that differ by less do not matter, whatever their errors."""
 
 
 def valve_report(
@@ -125,7 +122,7 @@ def valve_report(
     groups = grouped(steps, given, fit=fit)
     curve, statics = _statics(given, parts, steps, ranges)
     metrics = collected(groups, statics)
-    flags = _flags(steps, groups, parts)
+    flags = flags_of(steps, groups, parts)
     if fit and any(flag.code == "no_valve_test" for flag in flags):
         model = _fit_of_operation(given)
         flags += [model[1]] if model else []
@@ -229,60 +226,6 @@ def _statics(
         "hysteresis": hysteresis,
         "linearity": linearity,
     }
-
-
-def _flags(
-    steps: tuple[StepMetrics, ...], groups: tuple[SizeAndDirection, ...],
-    parts: tuple[tuple[TestPart, ...], ...],
-) -> list[Flag]:  # fmt: skip
-    flags = []
-    if not steps and all(part.kind != "ramp" for own in parts for part in own):
-        flags.append(
-            Flag(
-                "no_valve_test",
-                "the command holds no level between its changes, and is no slow ramp: these are "
-                "records of operation; valve_test_plan writes a test, and valves.loops judges "
-                "whether the valve makes a loop oscillate",
-            )
-        )
-    still = [one for one in steps if not one.moved]
-    if still:
-        sizes = sorted({round(abs(one.size), 2) for one in still})
-        flags.append(
-            Flag(
-                "did_not_move",
-                f"the position did not follow {len(still)} of {len(steps)} steps (sizes "
-                f"{', '.join(f'{one:g}' for one in sizes[:6])} %): resolution or dead band is of "
-                "this size, or the noise hides it",
-            )
-        )
-    unsettled = [one for one in steps if one.moved and not one.settled]
-    if unsettled:
-        flags.append(
-            Flag(
-                "not_settled",
-                f"{len(unsettled)} of {len(steps)} responses had not settled when the next step "
-                "came: only their dead time is used; hold longer",
-            )
-        )
-    known = [one for one in groups if one.estimates["dead_time"].is_known and not one.stroke]
-    if len(known) > 1:
-        times = np.array([one.estimates["dead_time"].value for one in known])
-        errors = np.array(
-            [(one.estimates["dead_time"].high - one.estimates["dead_time"].low) for one in known]
-        ) / (2 * Z_95)
-        chance = homogeneity(times, errors)[1]
-        late, early = known[int(np.argmax(times))], known[int(np.argmin(times))]
-        if chance < _BY_CHANCE and times.max() > _LATER * times.min():
-            flags.append(
-                Flag(
-                    "dead_time_varies",
-                    f"the dead time depends on the step: {times.max():.3g} s for {late.size:.3g} % "
-                    f"{late.direction}, {times.min():.3g} s for {early.size:.3g} % "
-                    f"{early.direction} (p = {chance:.1g}): friction, play, or a rate limit",
-                )
-            )
-    return flags
 
 
 def _fit_of_operation(records: tuple[Record, ...]) -> tuple[Interval, Flag] | None:

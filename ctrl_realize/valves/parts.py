@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import groupby
-from typing import Literal
 
 import numpy as np
 
@@ -13,69 +12,16 @@ from .._checks import positive
 from ..data import Record
 from ..data.given import as_record
 from ..errors import DataError
-from ..numerics.arrays import FloatArray
-from ..numerics.signals.edges import Edge, despike, difference_noise
-from ..numerics.signals.noise import mad_sigma
+from .changes import LEAST_HOLD, changes_of
+from .part import TestPart
 
-PartKind = Literal["baseline", "step", "staircase", "stroke", "ramp"]
-
-_LEAST_RAMP = 0.05
-"""Smallest ramp, as a fraction of the command's range."""
-_STROKE_SHARE = 0.8
-"""A step over this fraction of the command's range is a full stroke."""
-_STEP_SAMPLES = 8
-"""A change of the command that takes longer is a ramp."""
-_FLAT = 0.05
-"""Largest scatter of the command about a level, as a fraction of the step."""
-_BENT = 0.05
-"""Largest distance of a ramp from a straight line, as a fraction of its height."""
 _COVERED = 0.3
 """Least fraction of a test that its parts cover."""
 _ALIKE = 0.2
 """Relative difference up to which steps have the same height."""
 _LEAST_STAIRS = 3
-_LEAST_HOLD = 5  # samples
-
-
-@dataclass(frozen=True)
-class TestPart:
-    """One part of a valve test.
-
-    The part consists of the samples ``start`` to ``stop - 1`` of its record. ``edges`` are the
-    steps of the command in it; a ramp and a baseline have none.
-
-    Attributes
-    ----------
-    kind : {"baseline", "step", "staircase", "stroke", "ramp"}
-    start, stop : int
-        Samples of the record.
-    before, after : float
-        Level of the command at the beginning and at the end, in its unit.
-    edges : tuple of Edge
-        Steps of the command.
-    time : float
-        Time of the first change of the command in s; of a baseline, its start.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> import ctrl_realize as cr
-    >>> t = 0.1 * np.arange(900)
-    >>> u = 50 + 2.0 * np.digitize(t, [30, 60])
-    >>> parts = cr.valves.split_test(cr.Record(t, u, u), command_range=(0, 100))
-    >>> [(part.kind, part.before, part.after) for part in parts]
-    [('baseline', 50.0, 50.0), ('step', 50.0, 52.0), ('step', 52.0, 54.0)]
-    """
-
-    __test__ = False  # not a test of pytest
-
-    kind: PartKind
-    start: int
-    stop: int
-    before: float
-    after: float
-    time: float
-    edges: tuple[Edge, ...] = ()
+_MOST_STAIRS = 32
+"""Steps in one direction from which a staircase is a ramp."""
 
 
 def split_test(record: Record, *, command_range: Sequence[float] | None = None) -> list[TestPart]:
@@ -129,7 +75,7 @@ def split_test(record: Record, *, command_range: Sequence[float] | None = None) 
     span = float(np.ptp(command)) if command_range is None else range_of(command_range)[2]
     if np.ptp(command) == 0:
         return [TestPart("baseline", 0, command.size, command[0], command[0], record.time[0])]
-    found = _with_stairs(_changes(record, span))
+    found = _with_stairs(changes_of(record, span))
     covered = np.zeros(command.size, dtype=bool)
     for part in found:
         covered[part.start : part.stop] = True
@@ -138,7 +84,7 @@ def split_test(record: Record, *, command_range: Sequence[float] | None = None) 
     if found:
         first = found[0]
         stop = first.edges[0].index if first.edges else first.start
-        if stop >= _LEAST_HOLD:
+        if stop >= LEAST_HOLD:
             level = first.before
             found.insert(0, TestPart("baseline", 0, stop, level, level, float(record.time[0])))
     return found
@@ -152,72 +98,20 @@ def range_of(ends: Sequence[float]) -> tuple[float, float, float]:
     return low, high, positive(abs(high - low), "range", "difference of the two ends")
 
 
-def _changes(record: Record, span: float) -> list[TestPart]:
-    """Steps, strokes and ramps between the levels that the command holds."""
-    command = np.ravel(record.input)
-    noise = _noise_of(command)
-    clean = despike(command, int(np.clip(command.size // 1000, 1, 6))) if noise else command
-    half = 4 if noise else 1
-    width = 2 * half + 1
-    jump = _jumps(clean, width)
-    # A median of w samples has 1.25 / sqrt(w) of the deviation of one; two of them differ here.
-    threshold = max(5 * 1.25 * noise * np.sqrt(2 / width), 1e-6 * float(np.ptp(command)))
-    moving = np.concatenate([[False], np.abs(jump) > threshold, [False]])
-    bounds = np.flatnonzero(np.diff(moving)).reshape(-1, 2)
-    found = []
-    for k, (first, stop) in enumerate(bounds):
-        start = int(bounds[k - 1][1]) - 1 - half if k else 0
-        end = int(bounds[k + 1][0]) + half if k + 1 < len(bounds) else command.size
-        # a median moves half a window before the sample that does
-        low, high = int(first) + half, int(stop) - 1 - half
-        before, after = clean[start:low], clean[high:end]
-        if min(before.size, after.size) < 1:
-            continue
-        levels = float(np.median(before)), float(np.median(after))
-        height = levels[1] - levels[0]
-        held = min(before.size, after.size) >= _LEAST_HOLD
-        limit = max(_FLAT * abs(height), 5 * noise)
-        flat = [
-            bool(side.size and np.subtract(*np.percentile(side, [95, 5])) <= limit)
-            for side in (before, after)
-        ]
-        change = clean[low - 1 : high + 1]
-        away = np.flatnonzero(np.abs(change - levels[0]) > max(0.02 * abs(height), 5 * noise))
-        if not away.size or abs(height) <= threshold:
-            continue
-        index = low - 1 + int(away[0])
-        there = np.flatnonzero(np.abs(clean[index:] - levels[1]) <= 0.02 * abs(height) + 5 * noise)
-        samples = (int(there[0]) if there.size else command.size - index) + 1
-        time = float(record.time[index])
-        if samples <= _STEP_SAMPLES and held and all(flat):
-            edge = Edge(index, height, levels[0], samples, start, end)
-            kind: PartKind = "stroke" if abs(height) >= _STROKE_SHARE * span else "step"
-            found.append(TestPart(kind, start, end, *levels, time, (edge,)))
-        elif samples > _STEP_SAMPLES and abs(height) > _LEAST_RAMP * span:
-            way = np.sign(height) * np.diff(change[:: max(change.size // 50, 1)])
-            line = np.linspace(change[0], change[-1], change.size)
-            bent = float(np.max(np.abs(change - line)))
-            straight = bent <= max(_BENT * abs(height), 5 * noise)
-            # it leads from one level to another, or back from where another ramp has led
-            ends = any(flat) or bool(found and found[-1].kind == "ramp")
-            if straight and ends and way.size and np.mean(way >= -3 * noise) > 0.95:
-                time = float(record.time[low])
-                found.append(TestPart("ramp", low, min(high + 1, command.size), *levels, time))
-    return found
-
-
-def _noise_of(command: FloatArray) -> float:
-    """White noise of a command; third differences do not take a smooth motion for noise."""
-    third = np.diff(command, 3)
-    smooth = mad_sigma(third) / np.sqrt(20) if third.size else 0.0
-    return min(difference_noise(command), smooth)
-
-
-def _jumps(values: FloatArray, width: int) -> FloatArray:
-    """Median of the `width` samples from each sample on, minus that of those before it."""
-    padded = np.pad(values, width, mode="edge")
-    medians = np.median(np.lib.stride_tricks.sliding_window_view(padded, width), axis=1)
-    return np.asarray(medians[width : width + values.size] - medians[: values.size])
+def _stairs_that_are_ramps(run: list[TestPart]) -> list[TestPart]:
+    """Long flights of steps one way, as the ramp of a control system with its rounding."""
+    parts: list[TestPart] = []
+    for _, own in groupby(run, key=lambda one: one.after > one.before):
+        flight = list(own)
+        if len(flight) > _MOST_STAIRS:
+            first, last = flight[0], flight[-1]
+            parts.append(
+                TestPart("ramp", first.edges[0].index, last.edges[0].index + 1, first.before,
+                         last.after, first.time)
+            )  # fmt: skip
+        else:
+            parts += flight
+    return parts
 
 
 def _with_stairs(parts: list[TestPart]) -> list[TestPart]:
@@ -229,7 +123,9 @@ def _with_stairs(parts: list[TestPart]) -> list[TestPart]:
         edges = tuple(edge for one in run for edge in one.edges)
         ways = [bool(edge.amplitude > 0) for edge in edges]
         longest = max((len(list(own)) for _, own in groupby(ways)), default=0)
-        if longest >= _LEAST_STAIRS:
+        if longest > _MOST_STAIRS:
+            joined.extend(_stairs_that_are_ramps(run))
+        elif longest >= _LEAST_STAIRS:
             joined.append(
                 replace(run[0], kind="staircase", stop=run[-1].stop, after=run[-1].after,
                         edges=edges)

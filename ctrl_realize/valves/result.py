@@ -8,16 +8,16 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from .._checks import one_of
-from .._wording import in_time, interval_in_time, number_within, numbers_alike, time_within
 from ..data import Record
 from ..errors import OptionError
 from ..results import Flag, Result
 from .definitions import DEFINITIONS
-from .groups import Interval, SizeAndDirection, cut_out
+from .groups import SizeAndDirection, cut_out
 from .metrics import Metric, words_of
-from .parts import TestPart
+from .part import TestPart
 from .statics import StaticCurve
 from .steps import STEP_METRICS, Ranges, StepMetrics
+from .words import in_words, named_metric, where_in_words
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -127,7 +127,7 @@ class ValveReport(Result):
     def verdict(self) -> str:
         """What the limits and the records say, in one sentence."""
         by = {
-            word: [_named(one) for one in self.metrics if one.judgement == word]
+            word: [named_metric(one) for one in self.metrics if one.judgement == word]
             for word in ("not met", "cannot tell", "met")
         }
         if by["not met"]:
@@ -282,54 +282,3 @@ class ValveReport(Result):
             for test, names in self.missing_tests.items()
         ]
         return [*super()._notes(), *lacking]
-
-
-def _named(one: Metric) -> str:
-    return f"{one.definition.name} ({one.where})" if one.where else one.definition.name
-
-
-def in_words(one: Interval, unit: str) -> tuple[str, str]:
-    """Write a value and its interval.
-
-    Examples
-    --------
-    >>> from ctrl_realize.valves.groups import Interval
-    >>> from ctrl_realize.valves.result import in_words
-    >>> in_words(Interval(0.2468, 0.241, 0.2531, 3), "s")
-    ('247 ms', '(241 to 253 ms)')
-    """
-    if not one.is_known:
-        return "unknown", ""
-    if not np.isfinite([one.low, one.high]).all():
-        return (in_time(one.value) if unit == "s" else f"{one.value:.4g} {unit}"), ""
-    if unit == "s":
-        return (
-            time_within(one.value, one.low, one.high),
-            f"({interval_in_time(one.low, one.high)})",
-        )
-    ends = " to ".join(numbers_alike((one.low, one.high), one.low, one.high))
-    return f"{number_within(one.value, one.low, one.high)} {unit}", f"({ends} {unit})"
-
-
-def where_in_words(one: Metric) -> str:
-    """Steps behind a metric, and what its limit says."""
-    told = [one.where, one.judgement and f"limit {limit_in_words(one)}: {one.judgement}"]
-    return "; ".join(filter(None, told))
-
-
-def limit_in_words(one: Metric) -> str:
-    """Write a limit.
-
-    Examples
-    --------
-    >>> from ctrl_realize.valves import DEFINITIONS, Metric
-    >>> from ctrl_realize.valves.groups import Interval
-    >>> from ctrl_realize.valves.result import limit_in_words
-    >>> limit_in_words(Metric("gain", DEFINITIONS["gain"], Interval(), limit=(0.5, 2.0)))
-    '0.5 to 2 %/%'
-    """
-    low, high = one.limit
-    unit = one.definition.unit
-    if low is None:
-        return f"at most {high:g} {unit}"
-    return f"at least {low:g} {unit}" if high is None else f"{low:g} to {high:g} {unit}"

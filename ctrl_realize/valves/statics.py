@@ -11,10 +11,10 @@ from scipy.special import ndtri
 from ..data import Record
 from ..numerics.arrays import FloatArray
 from ..numerics.constants import Z_95
-from ..numerics.valve_test.play import fit_play
+from ..numerics.valve_test.play import fit_play, slope_of
 from ..numerics.valve_test.response import Noise
 from .groups import Interval
-from .parts import TestPart
+from .part import TestPart
 from .steps import Ranges, StepMetrics
 
 _LARGEST_STAIR = 6.0
@@ -184,14 +184,6 @@ def static_curve(
         ]  # fmt: skip
         return _binned(points, noise, scale)
     return _of_levels(steps, ranges)
-
-
-def slope_of(x: FloatArray, y: FloatArray) -> float:
-    """Slope of the line of least squares; 0 if `x` does not vary."""
-    away = x - np.mean(x)
-    power = float(away @ away)
-    varies = np.ptp(x) > 1e-9 * float(np.max(np.abs(x)))
-    return float(away @ (y - np.mean(y))) / power if varies and power > 0 else 0.0
 
 
 def _binned(

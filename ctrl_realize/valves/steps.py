@@ -12,7 +12,7 @@ from ..numerics.arrays import FloatArray
 from ..numerics.signals.edges import Edge
 from ..numerics.signals.noise import quantisation_step
 from ..numerics.valve_test.response import UNKNOWN, Estimate, Noise, UnitResponse, steady_noise
-from .parts import TestPart
+from .part import TestPart
 
 LEVEL_63, LEVEL_86, LEVEL_98 = 1 - float(np.exp(-1)), 1 - float(np.exp(-2)), 0.98
 SETTLED_BAND = 0.02

@@ -225,6 +225,17 @@ def test_a_plan_is_written_and_its_measured_record_tells_every_metric(tmp_path):
     assert "strokes, slow ramp" in str(flag)
 
 
+@pytest.mark.parametrize(("noise", "rounding"), [(0.01, 0.0), (0.05, 0.0), (0.0, 0.025)])
+def test_parts_are_found_in_a_command_with_noise_or_rounding(noise, rounding):
+    plan = valves.valve_test_plan(dead_time=0.2, time_constant=0.3, stroke_time=3, ramp_time=150)
+    command = np.round(plan.command / rounding) * rounding if rounding else plan.command
+    command = command + noise * np.random.default_rng(1).standard_normal(command.size)
+    measured = cr.Record(plan.time, command, command)
+    assert [part.kind for part in valves.split_test(measured) if part.kind != "step"] == [
+        "baseline", "staircase", "stroke", "stroke", "ramp", "ramp",
+    ]  # fmt: skip
+
+
 def test_records_of_operation_end_in_a_verdict_that_names_the_missing_tests():
     measured = cr.datasets.load("sugar_actuator").record[0:400]
     record = cr.Record(measured.time, measured.input, measured.output[0])

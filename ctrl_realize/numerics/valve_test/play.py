@@ -124,3 +124,11 @@ def _misfits(
         np.take_along_axis(sums, which, axis=1)[:, 0],
         np.take_along_axis(gains, which, axis=1)[:, 0],
     )
+
+
+def slope_of(x: FloatArray, y: FloatArray) -> float:
+    """Slope of the line of least squares; 0 if `x` does not vary."""
+    away = x - np.mean(x)
+    power = float(away @ away)
+    varies = np.ptp(x) > 1e-9 * float(np.max(np.abs(x)))
+    return float(away @ (y - np.mean(y))) / power if varies and power > 0 else 0.0
