@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from types import MappingProxyType
 
 STEPS = "steps of several sizes in both directions, each held until the stem stands still"
 STAIRCASE = "a staircase of small steps (0.1 to 1 %) up, down and up again"
@@ -53,7 +55,7 @@ class Definition:
     needs: str
 
 
-DEFINITIONS: dict[str, Definition] = {
+_ALL = {
     "dead_time": Definition(
         "dead time Td (first motion)",
         "s",
@@ -192,4 +194,6 @@ DEFINITIONS: dict[str, Definition] = {
         STROKES,
     ),
 }
+
+DEFINITIONS: Mapping[str, Definition] = MappingProxyType(_ALL)
 """Metrics by name, in the order of the report."""

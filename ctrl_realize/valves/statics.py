@@ -9,7 +9,7 @@ import numpy as np
 from scipy.special import ndtri
 
 from ..data import Record
-from ..numerics.arrays import FloatArray
+from ..numerics.arrays import FloatArray, read_only
 from ..numerics.constants import Z_95
 from ..numerics.valve_test.play import fit_play, slope_of
 from ..numerics.valve_test.response import Noise
@@ -63,6 +63,10 @@ class StaticCurve:
     closing: FloatArray
     std: float
     origin: str
+
+    def __post_init__(self) -> None:
+        for name in ("command", "opening", "closing"):
+            object.__setattr__(self, name, read_only(getattr(self, name)))
 
 
 def dead_band_and_resolution(

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ..data import Record
-from ..numerics.arrays import FloatArray
+from ..numerics.arrays import FloatArray, read_only
 from ..numerics.signals.edges import Edge
 from ..numerics.signals.noise import quantisation_step
 from ..numerics.valve_test.response import UNKNOWN, Estimate, Noise, UnitResponse, steady_noise
@@ -133,6 +133,9 @@ class StepMetrics:
     mean_delay: float
     command_edge: Edge = field(repr=False)
     response: FloatArray = field(repr=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "response", read_only(self.response))
 
     @property
     def direction(self) -> str:

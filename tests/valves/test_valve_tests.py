@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pickle
 from pathlib import Path
 
 import numpy as np
@@ -195,6 +196,9 @@ def test_an_anti_surge_valve_gives_strokes_dead_time_and_overshoot_in_one_call()
     assert "dead time" in report.verdict
     assert report.metric("stroke_time_opening").judgement == "met"
     assert any("staircase" in test for test in report.missing_tests)
+    again = pickle.loads(pickle.dumps(report))
+    assert again.report() == report.report()
+    assert not report.steps[0].response.flags.writeable
 
 
 def test_a_plan_is_written_and_its_measured_record_tells_every_metric(tmp_path):
