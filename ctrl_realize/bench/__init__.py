@@ -3,11 +3,25 @@
 from __future__ import annotations
 
 from .control_valve import Valve
+from .plant import Plant
+from .plants import flow_loop, heater, tank
 from .set_up import valve
-from .truth import ValveTruth
+from .truth import PlantTruth, ValveTruth
 from .valve_loop import LoopRecord, ValveLoop, valve_loop
 
-__all__ = ["LoopRecord", "Valve", "ValveLoop", "ValveTruth", "valve", "valve_loop"]
+__all__ = [
+    "LoopRecord",
+    "Plant",
+    "PlantTruth",
+    "Valve",
+    "ValveLoop",
+    "ValveTruth",
+    "flow_loop",
+    "heater",
+    "tank",
+    "valve",
+    "valve_loop",
+]
 
 
 def __dir__() -> list[str]:

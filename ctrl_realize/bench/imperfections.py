@@ -5,7 +5,7 @@ from __future__ import annotations
 from functools import cache
 
 import numpy as np
-from scipy.signal import firwin, oaconvolve
+from scipy.signal import firwin, lfilter, oaconvolve
 
 from ..numerics.arrays import FloatArray
 
@@ -32,6 +32,18 @@ def _anti_aliasing_taps() -> FloatArray:
     """Return a linear-phase low-pass that preserves the variance of white noise."""
     taps = firwin(101, 2 / 2.56, window=("kaiser", 6.0))
     return np.asarray(taps / np.sqrt(np.sum(taps**2)))
+
+
+def slow_disturbance(
+    n_samples: int, std: float, time_constant: float, dt: float, rng: np.random.Generator
+) -> FloatArray:
+    """Draw a stationary Gauss-Markov process: white noise behind a lag, sampled exactly."""
+    if std == 0.0:
+        return np.zeros(n_samples)
+    pole = np.exp(-dt / time_constant)
+    driving = std * rng.standard_normal(n_samples)
+    driving[1:] *= np.sqrt(1 - pole**2)
+    return np.asarray(lfilter([1.0], [1.0, -pole], driving))
 
 
 def drive_spikes(

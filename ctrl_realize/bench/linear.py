@@ -36,6 +36,11 @@ def butterworth(order: int, cutoff_hz: float) -> list[Core]:
     return sections + [lag(cutoff_hz)] * (order % 2)
 
 
+def integrator(rate: float) -> Core:
+    """Return an integrator of `rate` per second."""
+    return np.zeros((1, 1)), np.ones((1, 1)), np.array([[rate]]), np.zeros((1, 1))
+
+
 def chain(parts: list[Core], gain: float = 1.0) -> Core:
     """Connect strictly proper systems in series, the first one at the input."""
     A, B, C, D = parts[0]
@@ -69,11 +74,20 @@ def response_to_held_input(core: Core, held: FloatArray, dt: float, dead_time: f
     ndarray, shape (N,)
         Output at the samples, before the input of the same sample acts.
     """
+    before = dc_gain(core) * float(held[0])
+    return np.asarray(response_to_changes(core, held, dt, dead_time) + before)
+
+
+def response_to_changes(core: Core, held: FloatArray, dt: float, dead_time: float) -> FloatArray:
+    """Simulate the deviation from the output before the record, in which the input was `held[0]`.
+
+    As `response_to_held_input`, and for integrating plants, too.
+    """
     Ad, Bd, Cd, Dd, delay = sample_with_dead_time(*core, dt, dead_time)
     moved = np.zeros((1, held.size))
     shift = min(delay, held.size)
     moved[0, shift:] = held[: held.size - shift] - held[0]
-    return np.asarray(simulate(Ad, Bd, Cd, Dd, moved)[0] + dc_gain(core) * held[0])
+    return np.asarray(simulate(Ad, Bd, Cd, Dd, moved)[0])
 
 
 def response_to_started_sine(

@@ -10,7 +10,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
-from ..bench.truth import ValveTruth
+from ..bench.truth import PlantTruth
 from ..data import MeasuredFRF
 from ..delayed import DelayedStateSpace
 from ..errors import OptionError
@@ -189,12 +189,12 @@ def joint_fit_plot(
 
 
 @documented("sequence of two Axes")
-def truth_plot(truth: ValveTruth, *, ax: style.AxesLike = None, **kwargs: Any) -> ct.ControlPlot:
-    """Draw the frequency response of a simulated valve, without noise.
+def truth_plot(truth: PlantTruth, *, ax: style.AxesLike = None, **kwargs: Any) -> ct.ControlPlot:
+    """Draw the frequency response of a simulated plant, without noise.
 
     Parameters
     ----------
-    truth : ValveTruth
+    truth : PlantTruth
     **kwargs
         Passed on to `frf_plot`.
 
@@ -205,7 +205,9 @@ def truth_plot(truth: ValveTruth, *, ax: style.AxesLike = None, **kwargs: Any) -
     >>> [axes.get_ylabel() for axes in cplt.figure.axes]
     ['gain [dB]', 'phase [deg]']
     """
-    frf = truth.frf(np.geomspace(0.1, 50.0, 500))
+    # a decade below the total delay, and far enough above it to show the dead time
+    corner_hz = 1 / (2 * np.pi * truth.total_delay)
+    frf = truth.frf(corner_hz * np.geomspace(0.1, 40.0, 500))
     return frf_plot(frf, ax=ax, dead_time=truth.dead_time, **kwargs)
 
 

@@ -1,0 +1,179 @@
+"""Simulated plant with a measured output: lags, dead time, disturbance, noise, rounding."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from .._checks import real
+from ..data import Record
+from ..errors import DataError, OptionError
+from .control_valve import Seed
+from .imperfections import band_limited_noise, slow_disturbance
+from .linear import response_to_changes
+from .truth import PlantTruth
+
+
+@dataclass(frozen=True, eq=False)
+class Plant:
+    """A simulated plant in a steady state, made by `heater`, `tank` or `flow_loop`.
+
+    Every record is a simulation, as its labels state. The linear part is simulated without
+    integration error, for any dead time. The input of a record is held over each sample and
+    recorded exactly, as the output of a controller is. The output is disturbed, noisy and rounded.
+
+    Attributes
+    ----------
+    truth : PlantTruth
+        The linear part: frequency response, dead time, core, gain or integrating rate.
+    dt : float
+        Sample time in s.
+    pre_step_time, hold : float
+        Time in s before and after a step.
+    steady_state : tuple of float
+        Input and output in the steady state before a record.
+    amplitude : float
+        Step of `step_record` if none is given.
+    input_range : tuple of float
+        Lowest and highest input.
+    noise : float
+        Standard deviation of the sensor's white noise, in units of the output.
+    disturbance, disturbance_time : float
+        Standard deviation and time constant in s of a disturbance of the output, white noise behind
+        a lag.
+    resolution : float or None
+        Step of the sensor's converter, in units of the output; None does not round.
+
+    Examples
+    --------
+    >>> import ctrl_realize as cr
+    >>> heater = cr.bench.heater()
+    >>> heater
+    <Plant (simulated heater): dead time 20 s = 20 samples>
+    >>> heater.step_record(rng=1)
+    <Record 'heater': 1020 samples of 1 s, 1 input, 1 output>
+    """
+
+    truth: PlantTruth = field(repr=False)
+    dt: float
+    pre_step_time: float
+    hold: float
+    steady_state: tuple[float, float]
+    amplitude: float
+    input_range: tuple[float, float]
+    noise: float
+    disturbance: float
+    disturbance_time: float
+    resolution: float | None
+    labels: tuple[str, str]
+
+    def __repr__(self) -> str:
+        dead_time = f"{self.truth.dead_time:g} s = {self.truth.delay:g} samples"
+        return f"<Plant (simulated {self.truth.plant}): dead time {dead_time}>"
+
+    def step_record(
+        self, amplitude: float | None = None, rng: Seed = None, *, name: str = ""
+    ) -> Record:
+        """Record one step of the input from the steady state.
+
+        Parameters
+        ----------
+        amplitude : float, optional
+            Step in units of the input, upwards or downwards; default: `self.amplitude`.
+        rng : numpy.random.Generator or int, optional
+            Generator or seed; without it, each call differs.
+        name : str, optional
+            Default: the name of the plant.
+
+        Returns
+        -------
+        Record
+
+        Raises
+        ------
+        OptionError
+            A step of zero, or one that leaves the range of the input.
+
+        Examples
+        --------
+        >>> import ctrl_realize as cr
+        >>> cr.bench.flow_loop().step_record(-10, rng=5, name="down")
+        <Record 'down': 400 samples of 0.05 s, 1 input, 1 output>
+        """
+        step = self.amplitude if amplitude is None else real(amplitude, "amplitude", "step")
+        low, high = self.input_range
+        if step == 0 or not low <= self.steady_state[0] + step <= high:
+            raise OptionError(
+                f"amplitude={amplitude!r}; expected a step other than 0 that leads from "
+                f"{self.steady_state[0]:g} to a value within {low:g}-{high:g} {self.truth.units[0]}"
+            )
+        n_rest = round(self.pre_step_time / self.dt)
+        held = np.full(n_rest + round(self.hold / self.dt), self.steady_state[0])
+        held[n_rest:] += step
+        return self.record(held, rng, name=name)
+
+    def record(self, input: ArrayLike, rng: Seed = None, *, name: str = "") -> Record:
+        """Record the response to any input.
+
+        Parameters
+        ----------
+        input : array_like, shape (N,)
+            Input, held over each sample. The plant was in a steady state at its first value; for
+            an integrating plant, that is the input at which its output stands still.
+        rng : numpy.random.Generator or int, optional
+            Generator or seed.
+        name : str, optional
+            Default: the name of the plant.
+
+        Returns
+        -------
+        Record
+
+        Raises
+        ------
+        DataError
+            Not a vector of finite numbers within the range of the input.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> import ctrl_realize as cr
+        >>> bits = np.random.default_rng(0).integers(0, 2, 60)
+        >>> cr.bench.tank().record(48 + 4 * np.repeat(bits, 30), rng=1, name="prbs")
+        <Record 'prbs': 1800 samples of 1 s, 1 input, 1 output>
+        """
+        held = np.asarray(input)
+        if held.ndim != 1 or held.size < 3 or held.dtype.kind not in "biuf":
+            raise DataError(
+                f"input has shape {held.shape} and type {held.dtype}; expected N >= 3 real numbers"
+            )
+        held = held.astype(np.float64)
+        low, high = self.input_range
+        bad = np.flatnonzero(~((held >= low) & (held <= high)))
+        if bad.size:
+            raise DataError(
+                f"input is {held[bad[0]]:g} at sample {bad[0]}; expected {low:g}-{high:g} "
+                f"{self.truth.units[0]} everywhere"
+            )
+        generator = np.random.default_rng(rng)
+        truth = self.truth
+        start = self.steady_state[1]
+        if truth.integrating_rate is None:
+            start += truth.gain * (held[0] - self.steady_state[0])
+        output = start + response_to_changes(truth.matrices, held, self.dt, truth.dead_time)
+        output = output + slow_disturbance(
+            held.size, self.disturbance, self.disturbance_time, self.dt, generator
+        )
+        output = output + band_limited_noise(held.size, self.noise, generator, limited=False)
+        if self.resolution is not None:
+            output = self.resolution * np.round(output / self.resolution)
+        return Record(
+            self.dt * np.arange(held.size, dtype=np.float64),
+            held,
+            output,
+            name=name or truth.plant,
+            input_labels=[f"{self.labels[0]} (simulated) [{truth.units[0]}]"],
+            output_labels=[f"{self.labels[1]} (simulated) [{truth.units[1]}]"],
+        )
