@@ -391,7 +391,7 @@ class FractionalDelayFit(ModelFit):
     Examples
     --------
     >>> import ctrl_realize as cr
-    >>> fit = cr.identify(cr.bench.valve().step_record(16, rng=5)).fit
+    >>> fit = cr.identify(cr.bench.valve().step_record(16, rng=5), order=3).fit
     >>> isinstance(fit, cr.results.FractionalDelayFit), fit.delay == fit.dead_time / fit.dt
     (True, True)
     """

@@ -136,7 +136,7 @@ def bootstrap_plot(
     >>> y = np.where(t < 0.625, 0.0, 6 * -np.expm1(-(t - 0.625) / 0.4))
     >>> record = cr.Record(t, u, y + 0.01 * np.random.default_rng(1).standard_normal(t.size))
     >>> one_lag = partial(cr.fit_output_error, structures=[(1, 1)])
-    >>> again = cr.validation.bootstrap(record, one_lag, repeats=30)
+    >>> again = cr.validation.bootstrap(record, one_lag, repeats=8)
     >>> cplt = cr.plots.bootstrap_plot(again)
     >>> [axes.get_xlabel() for axes in cplt.figure.axes]
     ['time [s]', 'dead time [ms]']

@@ -117,7 +117,7 @@ def fit_joint(
     >>> s = 2j * np.pi * f
     >>> noise = 0.01 * rng.standard_normal((20, 2)) @ [1, 1j]
     >>> frf = cr.MeasuredFRF(3 * np.exp(-0.125 * s) / (0.4 * s + 1) + noise, f)
-    >>> fit = cr.identification.fit_joint(record, frf).fit
+    >>> fit = cr.identification.fit_joint(record, frf, structures=[(1, 1), (2, 2)]).fit
     >>> fit.structure, round(fit.dead_time, 3), fit.agreement.contradicts
     ((1, 1), 0.125, False)
     """

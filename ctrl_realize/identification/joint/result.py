@@ -42,7 +42,7 @@ class JointFit(OutputErrorFit):
     >>> bench = cr.bench.valve()
     >>> record = bench.step_record(16, rng=5)
     >>> frf = bench.truth.frf(np.geomspace(0.1, 10.0, 20))
-    >>> fit = cr.identify(record, frf=frf).fit
+    >>> fit = cr.identify(record, frf=frf, order=3).fit
     >>> fit.agreement.contradicts
     False
     """

@@ -97,9 +97,9 @@ def fit_state_space(
     ... )
     >>> plant = cr.DelayedStateSpace(core, (2, 5))
     >>> rng = np.random.default_rng(1)
-    >>> u = rng.choice([-1.0, 1.0], (2, 600))
-    >>> y = plant.simulate(u) + 0.1 * rng.standard_normal((2, 600))
-    >>> sys = cr.fit_state_space(cr.Record(0.1 * np.arange(600), u, y))
+    >>> u = rng.choice([-1.0, 1.0], (2, 300))
+    >>> y = plant.simulate(u) + 0.1 * rng.standard_normal((2, 300))
+    >>> sys = cr.fit_state_space(cr.Record(0.1 * np.arange(300), u, y), [1, 2, 3])
     >>> sys.fit.order, sys.fit.input_delays, sys.fit.output_delays
     (2, (2, 5), (0, 0))
     """
