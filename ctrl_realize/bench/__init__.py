@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from .control_loop import LoopRecord, ValveLoop
 from .control_valve import Valve
 from .plant import Plant
 from .plants import flow_loop, heater, tank
-from .set_up import valve
+from .set_up import paper_valve, valve
 from .truth import PlantTruth, ValveTruth
-from .valve_loop import LoopRecord, ValveLoop, valve_loop
+from .valve_loop import valve_loop
 
 __all__ = [
     "LoopRecord",
@@ -18,6 +19,7 @@ __all__ = [
     "ValveTruth",
     "flow_loop",
     "heater",
+    "paper_valve",
     "tank",
     "valve",
     "valve_loop",

@@ -11,13 +11,12 @@ from numpy.typing import ArrayLike
 
 from .. import paper
 from .._checks import positive, whole
+from ..actuators import Actuator
 from ..data import Record
 from ..errors import DataError, OptionError
-from ..numerics.actuators.friction import backlash
-from ..numerics.actuators.limits import slew_limited
 from ..numerics.arrays import FloatArray
-from .instruments import STROKE_MM, recorded
-from .linear import Core, response_to_held_input, response_to_started_sine
+from .instruments import recorded
+from .motion import Motion
 from .truth import ValveTruth
 
 Seed: TypeAlias = np.random.Generator | int | None
@@ -26,8 +25,8 @@ _REST_MM = 0.27
 """Displacement at rest, at 4 mA."""
 _MOST_MA = 25.0
 """Largest current of the drive."""
-_OVERSAMPLING = 8
-"""Steps within a sample for the simulation of friction."""
+_STATIC_DECIMATION = 16
+"""Sample time of the static test over that of the steps."""
 _SINE_SAMPLES = 640
 _SINE_MEAN_MA = 12.0
 
@@ -69,9 +68,12 @@ class Valve:
     hum: float
     slew_limit: float | None
     hysteresis: float
+    actuator: tuple[Actuator, ...]
+    actuator_at: Literal["stem", "input"]
     dead_time_scatter: float
-    _before_stem: Core = field(repr=False)
-    _after_stem: Core = field(repr=False)
+    scatter_shape: Literal["normal", "exponential"]
+    sine_amplitude: float
+    _motion: Motion = field(repr=False)
 
     def __repr__(self) -> str:
         return (
@@ -204,15 +206,64 @@ class Valve:
             )
         time = self.dt * np.arange(held.size, dtype=np.float64)
         generator = np.random.default_rng(rng)
-        dead_time = self.truth.dead_time
-        if self.dead_time_scatter:
-            dead_time = max(0.0, dead_time + self.dead_time_scatter * generator.standard_normal())
-        if self.slew_limit is None and self.hysteresis == 0:
-            moved = response_to_held_input(self.truth.matrices, held, self.dt, dead_time)
-        else:
-            moved = self._with_friction(held, dead_time)
-        rest = _REST_MM - self.truth.gain * paper.SETUP.current_range[0]
-        return recorded(self, time, held, moved + rest, generator, name)
+        moved = self._motion.of_held(held, self.dt, self._dead_time(generator))
+        return recorded(self, time, held, moved + self._rest, generator, name)
+
+    def static_test(
+        self,
+        rng: Seed = None,
+        *,
+        levels: int = 11,
+        hold: float = 2.0,
+        cycles: int = 3,
+        name: str = "valve_static",
+    ) -> Record:
+        """Record the test of linearity and hysteresis: levels up and down over the whole range.
+
+        Section 2.2 of the paper reports that the static relation is linear and hysteresis
+        negligible. Here the current rests at each level until the valve has settled, first from the
+        lowest to the highest level, then back, and again.
+
+        Parameters
+        ----------
+        rng : numpy.random.Generator or int, optional
+            Generator or seed.
+        levels : int, default 11
+            Number of levels from 4 to 20 mA.
+        hold : float, default 2
+            Time in s at each level.
+        cycles : int, default 3
+            Number of times up and down.
+        name : str, default "valve_static"
+            Of the record.
+
+        Returns
+        -------
+        Record
+            Current in mA, displacement in mm, at a 16th of the sample rate.
+
+        Raises
+        ------
+        OptionError
+            Less than three levels, no cycle, or a hold that is not a positive time.
+
+        Examples
+        --------
+        >>> import ctrl_realize as cr
+        >>> cr.bench.valve(hysteresis=0.01).static_test(rng=1)
+        <Record 'valve_static': 9760 samples of 0.0125 s, 1 input, 1 output>
+        """
+        whole(levels, "levels", 3)
+        whole(cycles, "cycles", 1)
+        dt = _STATIC_DECIMATION * self.dt
+        each = round(positive(hold, "hold", "time in s") / dt)
+        up = np.linspace(*paper.SETUP.current_range, levels)
+        once = np.concatenate([up[1:], up[-2::-1]])
+        held = np.repeat(np.concatenate([up[:1], np.tile(once, cycles)]), each)
+        generator = np.random.default_rng(rng)
+        moved = self._motion.of_held(held, dt, self._dead_time(generator))
+        time = dt * np.arange(held.size, dtype=np.float64)
+        return recorded(self, time, held, moved + self._rest, generator, name, spikes=False)
 
     def stepped_sine(
         self,
@@ -221,7 +272,7 @@ class Valve:
         points: int = paper.STEPPED_SINE.points,
         repeats: int = paper.STEPPED_SINE.repeats,
         band_hz: tuple[float, float] = paper.STEPPED_SINE.band_hz,
-        amplitude: float = 2.0,
+        amplitude: float | None = None,
         periods: float = 4.0,
         settle: float = 1.0,
         frequency_error_hz: float = paper.STEPPED_SINE.frequency_accuracy_hz,
@@ -236,8 +287,8 @@ class Valve:
             Frequencies, spaced logarithmically, and records of each.
         band_hz : tuple of float
             Lowest and highest frequency.
-        amplitude : float, default 2
-            Amplitude of the current in mA, about 12 mA.
+        amplitude : float, optional
+            Amplitude of the current in mA, about 12 mA. Default: `sine_amplitude` of the valve.
         periods : float, default 4
             Smallest number of periods to record.
         settle : float, default 1
@@ -255,8 +306,7 @@ class Valve:
         Raises
         ------
         OptionError
-            Invalid frequencies, counts or amplitude, or a valve with friction (`slew_limit`,
-            `hysteresis`), for which `record` simulates any input.
+            Invalid frequencies, counts or amplitude.
 
         Examples
         --------
@@ -265,18 +315,14 @@ class Valve:
         >>> sweep[0][4]
         <Record 'valve_sine_001_5': 640 samples of 0.0640625 s, 1 input, 1 output>
         """
-        if self.slew_limit is not None or self.hysteresis:
-            raise OptionError(
-                "stepped_sine simulates the linear valve; with slew_limit or hysteresis pass "
-                "sines to record(...)"
-            )
         whole(points, "points", 1)
         whole(repeats, "repeats", 1)
+        if amplitude is None:
+            amplitude = self.sine_amplitude
         positive(amplitude, "amplitude", "amplitude in mA")
         positive(periods, "periods", "number of periods")
         low, high = (positive(edge, "band_hz", "frequency in Hz") for edge in band_hz)
         generator = np.random.default_rng(rng)
-        core, dead_time = self.truth.matrices, self.truth.dead_time
         mean_mm = _REST_MM + self.truth.gain * (_SINE_MEAN_MA - paper.SETUP.current_range[0])
         sweep = []
         for point, nominal in enumerate(np.geomspace(low, high, points), start=1):
@@ -285,12 +331,21 @@ class Valve:
             time = self._sine_time(frequency_hz, settle + periods / nominal)
             omega = 2 * np.pi * frequency_hz
             current = _SINE_MEAN_MA + amplitude * np.sin(omega * time)
-            moved = mean_mm + amplitude * response_to_started_sine(core, omega, time, dead_time)
-            names = [f"valve_sine_{point:03d}_{repeat}" for repeat in range(1, repeats + 1)]
+            differing = repeats if self.dead_time_scatter else 1
+            dead_times = [self._dead_time(generator) for _ in range(differing)]
+            moved = self._motion.of_sine(omega, amplitude, _SINE_MEAN_MA, time, dead_times)
             sweep.append(
                 tuple(
-                    recorded(self, time, current, moved, generator, each, spikes=False)
-                    for each in names
+                    recorded(
+                        self,
+                        time,
+                        current,
+                        mean_mm + moved[k % differing],
+                        generator,
+                        f"valve_sine_{point:03d}_{k + 1}",
+                        spikes=False,
+                    )
+                    for k in range(repeats)
                 )
             )
         return tuple(sweep)
@@ -305,17 +360,17 @@ class Valve:
             )
         return dt * np.arange(_SINE_SAMPLES, dtype=np.float64)
 
-    def _with_friction(self, held: FloatArray, dead_time: float) -> FloatArray:
-        """Simulate with slew limit and backlash between actuator and LVDT, on a finer grid."""
-        fine = self.dt / _OVERSAMPLING
-        current = np.repeat(held, _OVERSAMPLING)
-        stem = response_to_held_input(self._before_stem, current, fine, dead_time)
-        if self.slew_limit is not None:
-            rate = self.slew_limit * STROKE_MM
-            stem = slew_limited(stem, rate, rate, fine)
-        if self.hysteresis:
-            stem = backlash(stem, self.hysteresis * STROKE_MM)
-        # Mean of neighbours: a held input with the same area as linear interpolation.
-        lines = np.append(0.5 * (stem[1:] + stem[:-1]), stem[-1])
-        lines[0] = stem[0]
-        return response_to_held_input(self._after_stem, lines, fine, 0.0)[::_OVERSAMPLING]
+    @property
+    def _rest(self) -> float:
+        """Displacement in mm that a current of zero would give."""
+        return _REST_MM - self.truth.gain * paper.SETUP.current_range[0]
+
+    def _dead_time(self, generator: np.random.Generator) -> float:
+        """Draw the dead time of one record."""
+        if not self.dead_time_scatter:
+            return self.truth.dead_time
+        if self.scatter_shape == "exponential":
+            drawn = 1.0 - generator.standard_exponential()
+        else:
+            drawn = generator.standard_normal()
+        return max(0.0, self.truth.dead_time + self.dead_time_scatter * drawn)

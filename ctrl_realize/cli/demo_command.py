@@ -7,7 +7,7 @@ from pathlib import Path
 from ..delayed import fit_of
 from ..results import ModelFit
 from .demo_files import write_demo_files
-from .demo_run import DemoResult, run_demo
+from .demo_run import SHOWN, DemoResult, run_demo
 from .demo_tables import outcome_table, table_1
 from .inputs import typed_call
 from .manifest import Run
@@ -34,7 +34,7 @@ def _say_result(result: DemoResult) -> None:
     say()
     say(outcome_table(result))
     say()
-    say("Output-error fit of all records together")
+    say(f"Output-error fit of {result.records[SHOWN].name}")
     say(fit_of(result.fitted, ModelFit).report())
     say()
     say(result.comparisons["fitted"].report())

@@ -17,7 +17,7 @@ from ..report import Column, Row, Sketch, Table, pairs, verdict_of
 from ..report.build import write_report
 from ..report.provenance import record_sha256
 from ..report.tables import comparison_tables, fit_tables
-from .demo_run import DemoResult, shown
+from .demo_run import SHOWN, DemoResult
 from .demo_tables import OUTCOME, outcome_rows, simulated_table, table_1_columns, table_1_rows
 from .inputs import typed_call
 
@@ -55,15 +55,15 @@ def _write_tables(folder: Path, result: DemoResult) -> None:
         "std": frf.std,
     }
     write_csv(folder / "frf_simulated.csv", pd.DataFrame(columns), index=False)
-    record = result.records[shown(result)]
+    record = result.records[SHOWN]
     signals = {"time_s": record.time, "input": record.input, "output": record.output}
     write_csv(folder / "record_simulated.csv", pd.DataFrame(signals), index=False)
 
 
 def demo_sketches(result: DemoResult) -> list[Sketch]:
     """List the paper's Figs. 2-8 for simulated data, and further ones."""
-    record = result.records[shown(result)]
-    row = result.campaign.rows[shown(result)].system
+    record = result.records[SHOWN]
+    row = result.campaign.rows[SHOWN].system
     assert row is not None
     scan = fit_of(row, DelayScan)
     truth = result.valve.truth.frf(result.frf.frequency_hz)
@@ -71,9 +71,8 @@ def demo_sketches(result: DemoResult) -> list[Sketch]:
     return [
         Sketch(
             "fit",
-            "All forty records, one model",
-            "Mean of the records and the output-error fit. Below: the dead times that the "
-            "data allow.",
+            f"One record, {record.name}, and its model",
+            "The output-error fit of the raw record. Below: the dead times that the data allow.",
             lambda figure: plots.fit_plot(result.fitted, ax=figure),
             (6.2, 3.6 + evidence_height(fit_of(result.fitted, OutputErrorFit))),
         ),
@@ -95,8 +94,9 @@ def demo_sketches(result: DemoResult) -> list[Sketch]:
         Sketch(
             "table1_delays",
             "Table 1 as a picture",
-            "The paper's method on every record. Its bias is the same for all records: "
-            "averaging does not remove it.",
+            "The paper's method on every record. The scatter is that of the dead time from record "
+            "to record; the distance from the truth is the lag of the causal filter and of the "
+            "sensor, the same for all records, and no averaging removes it.",
             lambda figure: plots.campaign_plot(
                 result.campaign, truth=result.valve.truth.delay, trim=3, ax=figure
             ),
@@ -105,7 +105,8 @@ def demo_sketches(result: DemoResult) -> list[Sketch]:
         Sketch(
             "fig2_frf",
             "Fig. 2: frequency response of the valve",
-            "Stepped sine, 500 points, mean of 5; dotted: truth.",
+            "Stepped sine, 500 points to 50 Hz, mean of 5; dotted: truth. Beyond the trusted band "
+            "the sine is below noise and backlash.",
             lambda figure: plots.frf_plot(
                 [result.frf, truth], dead_time=result.valve.truth.dead_time, ax=figure
             ),
@@ -151,9 +152,10 @@ def _write_report(folder: Path, result: DemoResult) -> None:
         folder / "report.html",
         title=_TITLE,
         subtitle=(
-            "Forty simulated steps and a simulated stepped sine: the method of van Helvoirt et "
-            "al. (IFAC 2005) and an output-error fit. The true dead time is "
-            f"{1e3 * result.valve.truth.dead_time:.4g} ms = {result.valve.truth.delay:.4g} samples."
+            "Forty simulated steps and a simulated stepped sine of a valve on which the method of "
+            "van Helvoirt et al. (IFAC 2005) gives their Table 1, and an output-error fit. The "
+            f"true dead time is {1e3 * result.valve.truth.dead_time:.4g} ms = "
+            f"{result.valve.truth.delay:.4g} samples in the mean."
         ),
         verdict=verdict_of(result.fitted, result.comparisons["fitted"].flags),
         sketches=demo_sketches(result),
@@ -163,7 +165,7 @@ def _write_report(folder: Path, result: DemoResult) -> None:
             *fit_tables(result.fitted.fit, "How the final model was found"),
             *comparison_tables(result.comparisons["fitted"], "Final model and stepped sine"),
             pairs("The paper's settings", _settings()),
-            pairs("The simulated valve", [*result.valve.truth._rows(), ("seed", str(result.seed))]),
+            pairs("The simulated valve", _valve(result)),
             _data(result),
         ],
         calls=[
@@ -183,7 +185,9 @@ def _outcome(result: DemoResult) -> Table:
         columns,
         note=(
             "Paper: measured on the real valve, whose dynamics are not fully known. "
-            "Everything else is simulated."
+            "Everything else is simulated, on one of the valves that would give such records. The "
+            "fit of a record finds the dead time of that record, which differs from the mean by "
+            "the scatter."
         ),
     )
 
@@ -216,6 +220,17 @@ def _settings() -> list[tuple[str, str]]:
     ]
 
 
+def _valve(result: DemoResult) -> list[tuple[str, str]]:
+    valve = result.valve
+    return [
+        *valve.truth._rows(),
+        ("scatter of the dead time", f"{valve.dead_time_scatter / valve.dt:.2g} samples"),
+        ("noise", f"{100 * valve.noise:.2g} % of the stroke"),
+        ("actuator", ", ".join(f"{part} (in % of the stroke)" for part in valve.actuator)),
+        ("seed", str(result.seed)),
+    ]
+
+
 def _data(result: DemoResult) -> Table:
     columns = (Column("data (simulated)"), Column("SHA-256", "mono"))
     rows = tuple(Row((record.name, record_sha256(record))) for record in result.records)
@@ -232,10 +247,10 @@ def _python(result: DemoResult) -> str:
         "import numpy as np\n"
         "import ctrl_realize as cr\n"
         f"rng = np.random.default_rng({result.seed})\n"
-        "valve = cr.bench.valve()\n"
+        "valve = cr.bench.paper_valve()\n"
         "records = valve.step_campaign(rng)\n"
         "frf = cr.stepped_sine_frf(valve.stepped_sine(rng))\n"
         'campaign = cr.identify_campaign(records, method="paper")\n'
-        "sys = cr.fit_output_error(records)\n"
+        f"sys = cr.fit_output_error(records[{SHOWN}])\n"
         "print(cr.compare_frf(sys, frf).report())"
     )

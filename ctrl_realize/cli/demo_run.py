@@ -20,6 +20,13 @@ from ..identification.output_error.fit import fit_output_error
 from ..identification.realization.result import Realization
 from .terminal import progress
 
+SHOWN = (
+    paper.SETUP.step_sizes_ma.index(paper.SHOWN_RECORD[0]) * paper.SETUP.records_per_size
+    + paper.SHOWN_RECORD[1]
+    - 1
+)
+"""Position of the record in the paper's Figs. 3 to 7."""
+
 
 @dataclass(frozen=True, eq=False)
 class DemoResult:
@@ -40,7 +47,8 @@ class DemoResult:
     unfiltered : FrequencyResponseData
         The same model, with the filter divided out of its frequency response.
     fitted : DelayedStateSpace
-        Output-error fit of all records together.
+        Output-error fit of the record of Figs. 3 to 7. The dead time of this valve differs from
+        record to record, so that their mean is the response of none of them.
     comparisons : dict of str to FRFComparison
         Of ``"printed"``, ``"unfiltered"`` and ``"fitted"`` with the stepped sine.
     seconds : float
@@ -70,7 +78,7 @@ def _stages(seed: int, jobs: int) -> Iterator[DemoResult | None]:
     """Yield after each stage, for the progress bar; the last one yields the result."""
     start = time.perf_counter()
     rng = np.random.default_rng(seed)
-    valve = bench.valve()
+    valve = bench.paper_valve()
     records = valve.step_campaign(rng)
     yield None
     frf = stepped_sine_frf(valve.stepped_sine(rng), name="stepped sine (simulated)")
@@ -80,7 +88,7 @@ def _stages(seed: int, jobs: int) -> Iterator[DemoResult | None]:
         raise DataError(f"{campaign.failed[0].name}: {campaign.failed[0].error}")
     printed = campaign.system.replace(name="as the paper makes it")
     yield None
-    fitted = fit_output_error(records).replace(name="output-error fit")
+    fitted = fit_output_error(records[SHOWN]).replace(name="output-error fit")
     yield None
     unfiltered = _without_filter(printed, frf)
     comparisons = {
@@ -101,10 +109,3 @@ def _without_filter(system: DelayedStateSpace, frf: MeasuredFRF) -> ct.Frequency
     left = fit_of(system, Realization).impulse.filter
     values = response if left is None else response / left.response(omega)
     return ct.frd(values, omega, smooth=True, name="filter divided out")
-
-
-def shown(result: DemoResult) -> int:
-    """Return the position of the record in the paper's Figs. 5-7."""
-    amplitude, number = paper.SHOWN_RECORD
-    sizes = list(paper.SETUP.step_sizes_ma)
-    return sizes.index(amplitude) * paper.SETUP.records_per_size + number - 1

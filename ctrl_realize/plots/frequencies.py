@@ -19,7 +19,14 @@ from ..identification.joint.result import JointFit
 from ..numerics.arrays import FloatArray
 from . import style
 from .fits import data_and_model
-from .frf_comparison import FITTED, TRUSTED_COHERENCE, Curve, curves_of
+from .frf_comparison import (
+    FITTED,
+    TRUSTED_COHERENCE,
+    Curve,
+    curves_of,
+    mark_band,
+    trusted_band,
+)
 from .names import plain
 from .shared_docs import documented
 from .style import decibel, frequency_axis, phase_ticks
@@ -41,9 +48,11 @@ def frf_plot(
 ) -> ct.ControlPlot:
     """Draw measured frequency responses and models (figures 2 and 8).
 
-    Gain in dB and phase in degrees; if a measurement has a coherence, it is drawn as well, and
-    points with a coherence below 0.95 are pale. Phases are unwrapped after removing the dead time
-    of the model, so they are correct at any delay.
+    Gain in dB and phase in degrees, at all frequencies that were measured. If a measurement has a
+    coherence, it is drawn as well: points with a coherence below 0.95 are pale, and the trusted
+    band, as of `compare_frf`, is shaded. Phases are unwrapped after removing the dead time of the
+    model, so they are correct at any delay; those of pale points are shown in the turn nearest to
+    the others.
 
     Parameters
     ----------
@@ -89,8 +98,7 @@ def frf_plot(
                 lines[2] += axes[2].plot(
                     curve.frequency_hz, curve.coherence, color=looks["color"], linewidth=1.2
                 )
-        _focus(axes[0], [(c, decibel(c.response)) for c in curves])
-        _focus(axes[1], [(c, c.phase_deg) for c in curves])
+        band = trusted_band(items)
         axes[0].set_ylabel("gain [dB]")
         axes[1].set_ylabel("phase [deg]")
         phase_ticks(axes[1])
@@ -99,6 +107,8 @@ def frf_plot(
             axes[2].set_ylabel("coherence")
             axes[2].set_ylim(-0.02, 1.05)
         for one in axes:
+            if band is not None:
+                mark_band(one, band)
             frequency_axis(one, label=one is axes[-1])
         return style.finished(axes, lines, loc="lower left")
 
@@ -235,14 +245,3 @@ def _draw(axes: Axes, curve: Curve, values: FloatArray, looks: dict[str, Any]) -
     dots: dict[str, Any] = {"marker": "o", "markersize": 4} if few else {}
     label = plain(curve.label, 50)
     return list(axes.plot(curve.frequency_hz, values, label=label, **looks, **dots))
-
-
-def _focus(axes: Axes, drawn: Sequence[tuple[Curve, FloatArray]]) -> None:
-    """Choose the range of the y axis from the trusted points; noise may exceed it."""
-    if all(curve.coherence is None for curve, _ in drawn):
-        return
-    shown = np.concatenate([values[curve.good] for curve, values in drawn if curve.measured])
-    shown = shown[np.isfinite(shown)]
-    low, high = float(shown.min()), float(shown.max())
-    room = max(0.35 * (high - low), 1.0)
-    axes.set_ylim(low - room, high + 0.3 * room)

@@ -9,12 +9,14 @@ from typing import Any
 
 import control as ct
 import numpy as np
+from matplotlib.axes import Axes
 
 from .._checks import numbers
 from ..delayed import DelayedStateSpace
 from ..errors import DataError, UnsuitableSystemError
 from ..frequency.comparison import FRFComparison
 from ..frequency.points import check_single_channel, measured_points
+from ..frequency.trusted_band import trusted_points
 from ..numerics.arrays import BoolArray, ComplexArray, FloatArray
 from ..numerics.rational.spectra import unwrapped_phase
 from . import style
@@ -43,10 +45,8 @@ class Curve:
     @property
     def good(self) -> BoolArray:
         """Coherent points; all of them if none is, or if the coherence is not known."""
-        if self.coherence is None:
-            return np.ones(self.frequency_hz.size, dtype=np.bool_)
-        good = self.coherence >= TRUSTED_COHERENCE
-        return good if good.any() else np.ones_like(good)
+        good = _coherent(self.coherence)
+        return np.ones(self.frequency_hz.size, dtype=np.bool_) if good is None else good
 
 
 def curves_of(
@@ -99,10 +99,51 @@ def _curve(item: Any, grid: FloatArray, delay: float) -> Curve:
         frequency = grid if step == 0 else grid[grid <= 0.5 / step]
         response = np.asarray(item(_points(frequency, step))).reshape(-1)
         coherence = None
-    phase = np.degrees(unwrapped_phase(response, 2 * np.pi * frequency, delay))
+    phase = np.degrees(_phase(response, 2 * np.pi * frequency, delay, _coherent(coherence)))
     # A fitted curve is a model, even if only its response is known.
     measured = isinstance(item, ct.FrequencyResponseData) and not item.name.startswith(FITTED)
     return Curve(item.name or "measured", frequency, response, phase, coherence, measured)
+
+
+def _coherent(coherence: FloatArray | None) -> BoolArray | None:
+    """Mark coherent points; None if all are to be taken, because none is, or it is not known."""
+    if coherence is None:
+        return None
+    good = coherence >= TRUSTED_COHERENCE
+    return good if good.any() else None
+
+
+def _phase(
+    response: ComplexArray, omega: FloatArray, delay: float, good: BoolArray | None
+) -> FloatArray:
+    """Unwrap the phase of coherent points; others get the turn that is nearest to these.
+
+    Noise has no phase that could be unwrapped, and must not turn that of points beyond it.
+    """
+    if good is None or good.all():
+        return unwrapped_phase(response, omega, delay)
+    known = unwrapped_phase(response[good], omega[good], delay)
+    near = np.interp(omega, omega[good], known + omega[good] * delay) - omega * delay
+    angle = np.angle(response)
+    phase = angle + 2 * np.pi * np.round((near - angle) / (2 * np.pi))
+    phase[good] = known
+    return np.asarray(phase)
+
+
+def trusted_band(items: Sequence[Any]) -> tuple[float, float] | None:
+    """Ends of the trusted band of the first measurement with a coherence, as of `compare_frf`."""
+    for item in items:
+        if isinstance(item, ct.FrequencyResponseData):
+            points = measured_points(item)
+            good = _coherent(points.coherence)
+            if good is not None and not good.all():
+                try:
+                    trusted, _ = trusted_points(points, TRUSTED_COHERENCE, None)
+                except DataError:  # single points only
+                    return None
+                inside = points.frequency_hz[trusted]
+                return float(inside[0]), float(inside[-1])
+    return None
 
 
 def _points(frequency_hz: FloatArray, step: float) -> ComplexArray:
@@ -121,6 +162,11 @@ def _aligned(curves: list[Curve]) -> list[Curve]:
         turns = round((float(curve.phase_deg[first]) - there) / 360)
         moved.append(replace(curve, phase_deg=curve.phase_deg - 360 * turns))
     return moved
+
+
+def mark_band(axes: Axes, band_hz: tuple[float, float]) -> None:
+    """Shade the trusted band."""
+    axes.axvspan(*band_hz, color=style.TRUTH, alpha=0.10, linewidth=0, label="trusted band")
 
 
 @documented("sequence of two Axes")
@@ -163,8 +209,7 @@ def comparison_plot(
     with style.canvas(ax, 2, title=title, default_title=comparison.name, size=(8.0, 5.2)) as axes:
         lines = []
         for one, error, std in zip(axes, errors, spread, strict=True):
-            one.axvspan(*comparison.band_hz, color=style.TRUTH, alpha=0.10, linewidth=0,
-                        label="trusted band")  # fmt: skip
+            mark_band(one, comparison.band_hz)
             if std is not None:
                 one.fill_between(
                     comparison.frequency_hz, -2 * std, 2 * std, color=style.NOISE, alpha=0.35,

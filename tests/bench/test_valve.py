@@ -11,6 +11,7 @@ from scipy.linalg import expm
 
 import ctrl_realize as cr
 from ctrl_realize import bench, paper
+from ctrl_realize.actuators import Backlash, SlewRateLimit, Stiction
 
 CLEAN = {"noise": 0, "input_noise": 0, "spikes": 0, "bits": None}
 DT = 1 / 1280
@@ -118,6 +119,60 @@ def test_sine_records_start_from_rest_and_settle_to_the_truth():
     assert_allclose(record.output, expected, atol=2e-6)
 
 
-def test_stepped_sine_of_a_valve_with_friction_is_refused():
-    with pytest.raises(ValueError, match="linear valve"):
-        bench.valve(hysteresis=0.1).stepped_sine(0)
+@pytest.mark.parametrize("place", ["stem", "input"])
+def test_a_sine_through_an_actuator_is_that_of_the_simulated_current(place):
+    # Slow enough for the analyser to sample the current finely; both start at rest at 12 mA.
+    valve = bench.valve(actuator=Stiction(2, 0.5), actuator_at=place, sine_amplitude=4.0, **CLEAN)
+    (sine,) = valve.stepped_sine(0, points=1, repeats=1, band_hz=(10.0, 10.0), settle=0.1)[0]
+    frequency = cr.stepped_sine_frf([sine]).frequency_hz[0]
+    t = (np.arange(640) + 0.5) * sine.dt
+    held = valve.record(np.append(12.0, 12 + 4 * np.sin(2 * np.pi * frequency * t)))
+    # A current that is held changes where the stem breaks away, by part of a sample.
+    assert_allclose(sine.output, held.output[1:], atol=0.004)
+    assert np.ptp(sine.output) > 0.05
+
+
+def test_backlash_is_an_actuator_and_a_short_argument():
+    short = bench.valve(hysteresis=0.02, slew_limit=5.0, **CLEAN).step_record(8)
+    spelt = bench.valve(actuator=[SlewRateLimit(500.0), Backlash(2.0)], **CLEAN).step_record(8)
+    assert_allclose(short.output, spelt.output, atol=1e-12)
+
+
+def test_the_static_test_shows_the_dead_band_and_the_linear_relation():
+    valve = bench.valve(hysteresis=0.01)
+    record = valve.static_test(rng=1, levels=6, cycles=2)
+    each = round(2.0 / record.dt)
+    at, shown = (x.reshape(-1, each)[:, each // 2 :].mean(axis=1) for x in
+                 (record.input, record.output))  # fmt: skip
+    rising, falling = np.diff(at) > 0, np.diff(at) < 0
+    # The play is 1 % of 2 mm, half of it on each side; the mean of a level has noise of 0.0002.
+    away = shown[1:] - (0.27 + GAIN * (at[1:] - 4))
+    assert_allclose(away[rising], -0.01, atol=0.001)
+    assert_allclose(away[falling], 0.01, atol=0.001)
+
+
+def test_the_exponential_scatter_has_an_upper_edge_and_the_given_deviation():
+    valve = bench.valve(dead_time_scatter=2 * DT, scatter_shape="exponential", **CLEAN)
+    records = valve.step_campaign(3, amplitudes=[8], repeats=60)
+    crossings = [np.interp(0.77, r.output[3840:4600], r.time[3840:4600]) for r in records]
+    exact = bench.valve(**CLEAN).step_record(8)
+    late = (crossings - np.interp(0.77, exact.output[3840:4600], exact.time[3840:4600])) / DT
+    assert late.max() < 2.001
+    assert late.min() < -3
+    assert np.std(late) == pytest.approx(2, rel=0.4)  # 60 values of an exponential distribution
+
+
+def test_the_papers_method_on_the_papers_valve_gives_table_1():
+    valve = bench.paper_valve()
+    records = valve.step_campaign(0, repeats=2)
+    campaign = cr.identify_campaign(records, method="paper", progress=False)
+    delays = np.array([row.delay for row in campaign.rows])
+    # Eight values of a deviation of 1.8: twice that of their mean.
+    assert delays.mean() == pytest.approx(36.48, abs=1.3)
+    assert delays.max() <= 39
+    assert 10 < delays.mean() - valve.truth.delay < 25
+    sweep = valve.stepped_sine(0, points=40, repeats=3, band_hz=(1.0, 50.0))
+    frf = cr.stepped_sine_frf(sweep)
+    assert cr.compare_frf(valve.truth.sampled, frf).band_hz[1] == pytest.approx(13, rel=0.25)
+    gain = np.abs(valve.truth.response(2 * np.pi * np.array([1e-3, 2.0])))
+    assert 20 * np.log10(gain[1] / gain[0]) == pytest.approx(-3, abs=0.6)  # "around 2 Hz"

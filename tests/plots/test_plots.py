@@ -134,6 +134,28 @@ def test_the_phase_is_right_at_a_long_delay_on_a_coarse_grid():
         assert_allclose(phase, exact, atol=8.0)
 
 
+def test_all_that_was_measured_is_shown_and_the_trusted_band_is_marked(valve):
+    frequency = np.geomspace(0.1, 50.0, 300)
+    truth = valve.truth.frf(frequency)
+    noise = 2e-4 * np.array([1, 1j]) @ np.random.default_rng(2).standard_normal((2, 300))
+    power = np.abs(truth.complex) ** 2
+    frf = cr.MeasuredFRF(truth.complex + noise, frequency, coherence=power / (power + 8e-8))
+    drawn = plots.frf_plot([frf, truth], dead_time=valve.truth.dead_time, ax=Figure())
+    low, high = cr.compare_frf(valve.truth.sampled, frf).band_hz
+    for axes, line in zip(drawn.axes[:2, 0], drawn.lines[:2, 0], strict=True):
+        every = axes.get_lines()[0].get_ydata()  # pale points included
+        assert np.isfinite(every).all()
+        assert axes.get_ylim()[0] < every.min() < every.max() < axes.get_ylim()[1]
+        (band,) = (patch for patch in axes.patches if patch.get_label() == "trusted band")
+        assert_allclose((band.get_x(), band.get_x() + band.get_width()), (low, high))
+        assert np.isnan(line[0].get_ydata()[-1])
+    # Noise turns no phase by more than half a turn beyond that at the end of the trusted band.
+    phase, exact = drawn.axes[1, 0].get_lines()[0].get_ydata(), drawn.lines[1, 0][1].get_ydata()
+    inside = frequency <= high
+    assert_allclose(phase[inside], exact[inside], atol=15)
+    assert np.abs(phase - exact).max() < 360
+
+
 @pytest.fixture(autouse=True)
 def settings_of_the_session():
     with mpl.rc_context():

@@ -1,0 +1,249 @@
+"""Simulation of a control loop around a valve, as operating data show it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Literal, TypeAlias
+
+import numpy as np
+
+from .._checks import positive
+from ..actuators import Actuator, Saturation, Series
+from ..data import Record
+from ..errors import OptionError
+from ..numerics.arrays import FloatArray, locked
+from ..numerics.state_space.sampling import sample_with_dead_time
+from .control_valve import Seed
+
+Process: TypeAlias = Literal["flow", "first-order", "integrating"]
+
+_LOW, _HIGH = 0.0, 100.0
+"""Limits of the controller output in %."""
+_MIDDLE = 50.0
+"""Controller output and process value of the operating point in %."""
+_START = -5.0
+"""Deviation of the process value at the start of a simulation in %, so that the loop moves."""
+_LONGEST_GAIN_MARGIN = 1e3
+
+
+@dataclass(frozen=True, eq=False)
+class LoopRecord:
+    """Operating data of a simulated loop, with what a plant does not show.
+
+    Attributes
+    ----------
+    record : Record
+        Controller output OP in % as the input, process value PV in % as the output.
+    setpoint : ndarray, shape (N,)
+        In %.
+    position : ndarray, shape (N,)
+        Of the valve in %, which is not measured in most plants.
+    truth : ValveLoop
+        The loop that was simulated.
+
+    Examples
+    --------
+    >>> import ctrl_realize as cr
+    >>> sticking = cr.actuators.Stiction(S=5.0, J=2.0)
+    >>> loop = cr.bench.valve_loop(sticking).simulate(600.0, rng=1)
+    >>> loop
+    <LoopRecord (simulated): 600 samples of 1 s, stiction (Choudhury): S = 5, J = 2>
+    >>> print(f"{loop.position.std():.1f} % of motion")
+    1.3 % of motion
+    """
+
+    record: Record
+    setpoint: FloatArray
+    position: FloatArray
+    truth: ValveLoop = field(repr=False)
+
+    def __repr__(self) -> str:
+        return (
+            f"<LoopRecord (simulated): {self.record.n_samples} samples of {self.record.dt:g} s, "
+            f"{self.truth.described}>"
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class ValveLoop:
+    """A PI controller, a valve and a process with dead time; made by `valve_loop`.
+
+    The attributes are the arguments of `valve_loop`; `controller` contains gain and integral time.
+
+    Examples
+    --------
+    >>> import ctrl_realize as cr
+    >>> loop = cr.bench.valve_loop(cr.actuators.Backlash(2.0), process="flow", tightness=2.0)
+    >>> print(f"gain margin {loop.gain_margin:.2f}, stable without the valve: {loop.stable}")
+    gain margin 1.30, stable without the valve: True
+    """
+
+    actuator: tuple[Actuator, ...]
+    process: Process
+    gain: float
+    time_constant: float
+    dead_time: float
+    controller: tuple[float, float]
+    oscillation: tuple[float, float] | None
+    noise: float
+    dt: float
+
+    def __repr__(self) -> str:
+        return f"<ValveLoop (simulated): {self.process} process, {self.described}>"
+
+    @property
+    def described(self) -> str:
+        """The valve in words."""
+        return str(Series(self.actuator)) if self.actuator else "linear valve"
+
+    @property
+    def stable(self) -> bool:
+        """Whether the loop is stable with a linear valve."""
+        return self._radius(1.0) < 1
+
+    @property
+    def gain_margin(self) -> float:
+        """Factor of the controller gain at which the loop with a linear valve becomes unstable.
+
+        Below 1 for an unstable loop; at most 1000.
+        """
+        low, high = 0.0, 1.0
+        while self._radius(high) < 1:
+            low, high = high, 2 * high
+            if high > _LONGEST_GAIN_MARGIN:
+                return _LONGEST_GAIN_MARGIN
+        for _ in range(40):
+            middle = 0.5 * (low + high)
+            low, high = (middle, high) if self._radius(middle) < 1 else (low, middle)
+        return 0.5 * (low + high)
+
+    def simulate(
+        self,
+        duration: float = 2000.0,
+        rng: Seed = None,
+        *,
+        setpoint: Sequence[float] | FloatArray | None = None,
+        settle: float | None = None,
+        name: str = "loop",
+    ) -> LoopRecord:
+        """Simulate operating data.
+
+        The loop starts with a deviation of 5 % and runs for `settle` before the record begins.
+
+        Parameters
+        ----------
+        duration : float, default 2000
+            Of the record in s.
+        rng : numpy.random.Generator or int, optional
+            Generator or seed of the noise.
+        setpoint : array_like, shape (N,), optional
+            In %, for each sample of the record. Default: 50 % throughout.
+        settle : float, optional
+            In s. Default: half of `duration`.
+        name : str, default "loop"
+            Of the record.
+
+        Returns
+        -------
+        LoopRecord
+
+        Raises
+        ------
+        OptionError
+            A duration of less than 10 samples, or a setpoint of another length.
+
+        Examples
+        --------
+        >>> import ctrl_realize as cr
+        >>> loop = cr.bench.valve_loop(cr.actuators.Stiction(5, 2), noise=0.2)
+        >>> loop.simulate(600.0, rng=1).record
+        <Record 'loop': 600 samples of 1 s, 1 input, 1 output>
+        """
+        n = round(positive(duration, "duration", "time in s") / self.dt)
+        if n < 10:
+            raise OptionError(
+                f"duration={duration!r} is {n} samples of {self.dt:g} s; expected at least 10"
+            )
+        before = round(0.5 * n) if settle is None else round(max(settle, 0.0) / self.dt)
+        asked = np.full(n, _MIDDLE) if setpoint is None else np.asarray(setpoint, np.float64)
+        if asked.shape != (n,) or not np.isfinite(asked).all():
+            raise OptionError(
+                f"setpoint has shape {asked.shape}; expected {n} finite numbers, one for each "
+                "sample"
+            )
+        generator = np.random.default_rng(rng)
+        wanted = np.concatenate([np.full(before, asked[0]), asked])
+        time = self.dt * np.arange(before + n, dtype=np.float64)
+        added = self.noise * generator.standard_normal(before + n)
+        if self.oscillation is not None:
+            amplitude, period = self.oscillation
+            phase = generator.uniform(0, 2 * np.pi)
+            added += amplitude * np.sin(2 * np.pi * time / period + phase)
+        commands, positions, values = self._closed(wanted, added)
+        record = Record(
+            time[:n],
+            commands[before:],
+            values[before:],
+            name=name,
+            input_labels=["OP (simulated) [%]"],
+            output_labels=["PV (simulated) [%]"],
+        )
+        return LoopRecord(record, locked(asked), locked(positions[before:]), self)
+
+    def _closed(
+        self, setpoint: FloatArray, added: FloatArray
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Run the loop; return controller output, position and process value."""
+        A, B, C, D, delay = self._sampled()
+        gain, integral_time = self.controller
+        valve = Series(self.actuator) if self.actuator else Saturation(_LOW, _HIGH)
+        state = valve.steady_state(_MIDDLE)
+        at_rest = valve.advance(state, _MIDDLE, self.dt)[1]
+        x, integral = _START / C, 0.0
+        n = setpoint.size
+        commands, positions, values = np.empty(n), np.empty(n), np.empty(n)
+        flow = [0.0] * (n + delay)  # in deviations, when it arrives at the process
+        for k, (wanted, more) in enumerate(zip(setpoint.tolist(), added.tolist(), strict=True)):
+            values[k] = _MIDDLE + C * x + D * flow[k] + more
+            error = wanted - values[k]
+            summed = integral + self.dt / integral_time * error
+            command = _MIDDLE + gain * (error + summed)
+            if _LOW <= command <= _HIGH:  # the integral stops where the output is at its limit
+                integral = summed
+            commands[k] = min(max(command, _LOW), _HIGH)
+            state, positions[k] = valve.advance(state, commands[k], self.dt)
+            flow[k + delay] = positions[k] - at_rest
+            x = A * x + B * flow[k]
+        return commands, positions, values
+
+    def _sampled(self) -> tuple[float, float, float, float, int]:
+        """Sample the process: one state, behind whole samples of delay."""
+        pole = 0.0 if np.isinf(self.time_constant) else -1 / self.time_constant
+        into = self.gain if np.isinf(self.time_constant) else self.gain / self.time_constant
+        one = np.ones((1, 1))
+        A, B, C, D, delay = sample_with_dead_time(
+            pole * one, into * one, one, 0 * one, self.dt, self.dead_time
+        )
+        return A.item(), B.item(), C.item(), D.item(), delay
+
+    def _radius(self, factor: float) -> float:
+        """Largest magnitude of a pole of the linear loop, with the controller gain times a factor.
+
+        States: that of the process, the commands on their way, and the integral.
+        """
+        A, B, C, D, delay = self._sampled()
+        gain, integral_time = self.controller
+        part = self.dt / integral_time
+        n = delay + 2
+        arriving = np.eye(n)[1] if delay else np.zeros(n)
+        error = -(C * np.eye(n)[0] + D * arriving)
+        integral = np.eye(n)[-1] + part * error
+        command = factor * gain * (error + integral)
+        loop = np.zeros((n, n))
+        loop[0] = A * np.eye(n)[0] + B * (arriving if delay else command)
+        loop[1:delay] = np.eye(n)[2 : delay + 1]
+        if delay:
+            loop[delay] = command
+        loop[-1] = integral
+        return float(np.abs(np.linalg.eigvals(loop)).max())

@@ -1,0 +1,101 @@
+"""From the current to the displacement that the sensor shows: drive, actuator, sensor."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+
+from ..actuators import Actuator, Series
+from ..numerics.arrays import FloatArray
+from .linear import Core, response_to_held_input, response_to_started_sine
+
+_OVERSAMPLING = 8
+"""Steps within a sample for the simulation of friction."""
+_SINE_OVERSAMPLING = 4
+"""The same for sines, of which a sample is at most a twentieth of a period."""
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """Dynamics of a valve: linear, or with an actuator at the stem or before everything.
+
+    Attributes
+    ----------
+    whole, before, after : (A, B, C, D)
+        From current to shown displacement, to the stem, and from the stem on.
+    gain : float
+        Static gain in mm per mA.
+    closed : float
+        Displacement at the lower end of the stroke, mm above that at zero current.
+    stroke : float
+        In mm; the unit of the actuator is a percent of it.
+    actuator : tuple of Actuator
+    place : {"stem", "input"}
+        Where it acts.
+    """
+
+    whole: Core
+    before: Core
+    after: Core
+    gain: float
+    closed: float
+    stroke: float
+    actuator: tuple[Actuator, ...]
+    place: Literal["stem", "input"]
+
+    def of_held(self, current: FloatArray, dt: float, dead_time: float) -> FloatArray:
+        """Simulate a current that is held over each sample, in mm above zero current."""
+        if not self.actuator:
+            return response_to_held_input(self.whole, current, dt, dead_time)
+        if self.place == "input":
+            acting = self._through(self.gain * current, dt) / self.gain
+            return response_to_held_input(self.whole, acting, dt, dead_time)
+        fine = dt / _OVERSAMPLING
+        often = np.repeat(current, _OVERSAMPLING)
+        stem = response_to_held_input(self.before, often, fine, dead_time)
+        return _passed(self.after, self._through(stem, fine), fine)[::_OVERSAMPLING]
+
+    def of_sine(
+        self,
+        omega: float,
+        amplitude: float,
+        mean: float,
+        time: FloatArray,
+        dead_times: Sequence[float],
+    ) -> list[FloatArray]:
+        """Simulate a sine about a mean current for several dead times, in mm about the mean."""
+        if not self.actuator:
+            return [
+                amplitude * response_to_started_sine(self.whole, omega, time, dead_time)
+                for dead_time in dead_times
+            ]
+        middle = self.gain * mean
+        fine = float(time[1]) / _SINE_OVERSAMPLING
+        often = fine * np.arange(time.size * _SINE_OVERSAMPLING, dtype=np.float64)
+        if self.place == "input":
+            sine = middle + self.gain * amplitude * np.sin(omega * often)
+            shown = _passed(self.whole, self._through(sine, fine) / self.gain, fine)
+        else:
+            stem = amplitude * response_to_started_sine(self.before, omega, often, 0.0)
+            shown = _passed(self.after, self._through(middle + stem, fine), fine)
+        # Nothing depends on when the motion begins, so that one simulation does for all.
+        curve = CubicSpline(often, shown - middle)
+        return [np.asarray(curve(np.maximum(time - one, 0.0))) for one in dead_times]
+
+    def _through(self, stem: FloatArray, dt: float) -> FloatArray:
+        """Pass a displacement through the actuator."""
+        percent = self.stroke / 100
+        moved = Series(self.actuator).simulate((stem - self.closed) / percent, dt)
+        return self.closed + percent * moved
+
+
+def _passed(core: Core, signal: FloatArray, dt: float) -> FloatArray:
+    """Pass a sampled continuous signal through a linear system."""
+    # Mean of neighbours: a held input with the same area as linear interpolation.
+    lines = np.append(0.5 * (signal[1:] + signal[:-1]), signal[-1])
+    lines[0] = signal[0]
+    return response_to_held_input(core, lines, dt, 0.0)
