@@ -2,8 +2,8 @@
 """Set up the project and run one of its tasks; needs nothing but Python 3.11 or newer.
 
     python3 tools/dev.py demo     the simulated valve, end to end, with report, in demo-output/
-    python3 tools/dev.py test     lint, type check, tests, doctests and notebooks
-    python3 tools/dev.py lint     lint and type check only
+    python3 tools/dev.py test     lint, type check, spelling, tests, doctests and notebooks
+    python3 tools/dev.py lint     lint, type check and spelling only
     python3 tools/dev.py docs     build the documentation into docs/_build/html
     python3 tools/dev.py setup    make .venv and install, nothing else
 
@@ -73,6 +73,7 @@ def lint() -> None:
     run(PYTHON, "-m", "ruff", "check", ".")
     run(PYTHON, "-m", "ruff", "format", "--check", ".")
     run(PYTHON, "-m", "mypy")
+    run(PYTHON, "-m", "codespell_lib")
 
 
 def main(arguments: list[str]) -> None:

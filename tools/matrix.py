@@ -88,7 +88,10 @@ def user(name: str, **more: object) -> Row:
 THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 GERMAN = "de_DE.UTF-8"
 ROWS = [
-    *(Row(f"newest-3.{minor}", minor, extras="[test]", type_check=True) for minor in (11, 12, 13)),
+    *(
+        Row(f"newest-3.{minor}", minor, extras="[test]", type_check=True)
+        for minor in (11, 12, 13, 14)
+    ),
     Row("slycot-3.11", 11, extras="[test,slycot]"),
     # nothing that is optional: the tests of the optional parts have to skip
     Row("plain-3.11", 11, packages=tuple(RUNNERS)),

@@ -180,7 +180,7 @@ class Record(Drawable):
         return self.n_samples
 
     def __getitem__(self, part: slice) -> Record:
-        if not isinstance(part, slice) or part.step is not None:
+        if not isinstance(part, slice) or part.step is not None:  # type: ignore[redundant-expr]
             raise OptionError(
                 f"record[{part!r}]; expected two times in s, such as record[10:60]; the samples "
                 "are in record.time, record.input and record.output"

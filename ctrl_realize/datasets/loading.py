@@ -218,7 +218,7 @@ def table() -> pd.DataFrame:
     return pd.DataFrame(rows).set_index("name")
 
 
-def _info(name: str) -> DatasetInfo:
+def _info(name: object) -> DatasetInfo:
     if not isinstance(name, str) or name not in _BY_NAME:
         raise OptionError(f"there is no data set {name!r}{_nearest(name, names())}")
     return _BY_NAME[name]

@@ -160,7 +160,7 @@ def check_entries(system: Any) -> None:
 def signal_names(given: str | Sequence[str] | None, core: Sequence[str], letter: str) -> list[str]:
     """Name signals: as given, as those of the core, or by a letter if the core has no names."""
     if given is not None:
-        names = [given] if isinstance(given, str) else given
+        names: object = [given] if isinstance(given, str) else given
         if not isinstance(names, Sequence) or not all(isinstance(name, str) for name in names):
             raise OptionError(f"{given!r} is not a list of names")
         if len(names) != len(core):

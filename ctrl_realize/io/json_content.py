@@ -37,7 +37,7 @@ def boolean_free(content: Mapping[str, Any], key: str, kind: Any) -> Any:
 
 def texts(content: Mapping[str, Any], key: str) -> list[str]:
     """Return a list of distinct texts."""
-    values: list[str] = field(content, key, list)
+    values: list[Any] = field(content, key, list)
     if not all(isinstance(value, str) and _is_text(value) for value in values):
         raise FileFormatError(f"{key!r} contains something that is not text")
     if len(set(values)) != len(values):
@@ -47,7 +47,7 @@ def texts(content: Mapping[str, Any], key: str) -> list[str]:
 
 def whole_numbers(content: Mapping[str, Any], key: str, count: int) -> list[int]:
     """Return `count` whole numbers, none negative."""
-    values: list[int] = field(content, key, list)
+    values: list[Any] = field(content, key, list)
     whole = all(isinstance(value, int) and not isinstance(value, bool) for value in values)
     if not whole or len(values) != count or min(values, default=0) < 0:
         raise FileFormatError(f"{key!r} must contain {count} non-negative whole numbers")

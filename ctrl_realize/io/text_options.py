@@ -33,9 +33,8 @@ class TextOptions:
             raise OptionError(f"delimiter={self.delimiter!r} must be one character or 'auto'")
         if self.decimal not in ("auto", ".", ","):
             raise OptionError(f"decimal={self.decimal!r} must be '.', ',' or 'auto'")
-        if self.comment not in ("auto", None) and not (
-            isinstance(self.comment, str) and len(self.comment) == 1
-        ):
+        comment: object = self.comment
+        if comment not in ("auto", None) and not (isinstance(comment, str) and len(comment) == 1):
             raise OptionError(f"comment={self.comment!r} must be one character, None or 'auto'")
         for name, mark in (("delimiter", self.delimiter), ("comment", self.comment)):
             if str(mark) in _IN_NUMBERS[name]:

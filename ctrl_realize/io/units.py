@@ -119,7 +119,7 @@ def to_seconds(values: FloatArray, unit: str) -> FloatArray:
     return values * multiplier / divisor
 
 
-def checked_time_unit(unit: str) -> str:
+def checked_time_unit(unit: object) -> str:
     """Return the plain spelling of a unit of time, or raise an error that lists them."""
     plain = plain_unit(unit) if isinstance(unit, str) else None
     if plain not in TIME_UNITS:

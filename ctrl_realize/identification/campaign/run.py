@@ -72,7 +72,7 @@ def identify_campaign(
     """
     method = one_of(method, "method", METHODS)
     _check_options(options)
-    if isinstance(n_jobs, bool) or not isinstance(n_jobs, int) or not 0 < abs(n_jobs) <= 10_000:
+    if type(n_jobs) is not int or not 0 < abs(n_jobs) <= 10_000:
         raise OptionError(f"n_jobs={n_jobs!r}; expected a number of processes, or -1 for all")
     if not isinstance(records, Iterable):
         raise DataError(f"records is a {type(records).__name__}; expected several records")
