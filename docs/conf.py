@@ -121,12 +121,6 @@ nb_execution_timeout = 300
 nb_execution_raise_on_error = True
 nb_execution_show_tb = True
 nb_merge_streams = True
-# Measured records are no part of the project; where they are absent the stored outputs show.
-MEASURED = sorted(
-    path.name for path in (ROOT / "notebooks").glob("*.ipynb") if "shared/data" in path.read_text()
-)
-if not (ROOT / ".." / "shared" / "data").is_dir():
-    nb_execution_excludepatterns = [f"generated/notebooks/{name}" for name in MEASURED]
 suppress_warnings = ["mystnb.unknown_mime_type"]
 
 myst_enable_extensions = ["dollarmath", "amsmath", "deflist", "colon_fence", "smartquotes"]
