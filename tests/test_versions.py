@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import re
 import tomllib
+from importlib import metadata
 from pathlib import Path
+
+import ctrl_realize as cr
 
 ROOT = Path(__file__).resolve().parents[1]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
@@ -36,3 +39,27 @@ def test_every_python_that_is_promised_has_a_row():
     minors = re.search(r"for minor in \(([\d, ]+)\)", matrix)[1]
     assert [f"3.{minor.strip()}" for minor in minors.split(",")] == named
     assert PROJECT["requires-python"] == f">={named[0]}"
+
+
+def test_the_recipe_for_conda_asks_for_what_the_package_asks_for():
+    recipe = (ROOT / "recipe" / "recipe.yaml").read_text("utf-8")
+    run = re.search(r"^  run:\n((?:    - .*\n)+)", recipe.replace("-base", ""), re.M)[1]
+    asked = dict(re.findall(r"- ([\w-]+) >=([\d.]+)$", run, re.M))
+    assert asked == dict(line.split(">=") for line in PROJECT["dependencies"])
+    assert f'python_min: "{PROJECT["requires-python"][2:]}"' in recipe
+    assert f"license: {PROJECT['license']}\n" in recipe
+
+
+def test_the_package_its_citation_and_its_changelog_name_one_version():
+    changelog = (ROOT / "CHANGELOG.md").read_text("utf-8")
+    assert re.search(r"^## (\S+)", changelog, re.M)[1] == cr.__version__
+    citation = (ROOT / "CITATION.cff").read_text("utf-8")
+    assert re.search(r"^version: \W?([\w.]+)", citation, re.M)[1] == cr.__version__
+    assert metadata.version("ctrl-realize") == cr.__version__
+
+
+def test_the_extra_all_holds_every_extra_that_users_need_and_no_compiler():
+    extras = PROJECT["optional-dependencies"]
+    (everything,) = extras["all"]
+    named = set(re.search(r"\[(.+)\]", everything)[1].split(","))
+    assert named == set(extras) - {"all", "slycot", "test", "docs"}

@@ -87,7 +87,8 @@ def main(arguments: list[str]) -> None:
     if task == "demo":
         run(PYTHON, "-m", "ctrl_realize", "demo", *(rest or ["--output", "demo-output"]))
     elif task == "docs":
-        run(PYTHON, "-m", "sphinx", "-W", "--keep-going", "-b", "html", "docs", "docs/_build/html")
+        site = ["-W", "--keep-going", "-b", "html", "docs", "docs/_build/html"]
+        run(PYTHON, "-m", "sphinx", *(rest or site))
     elif task == "lint":
         lint()
     elif task == "test":
