@@ -139,7 +139,7 @@ class Backlash(_OfTwoSamples):
 class Resolution(_OfTwoSamples):
     """Motion in whole steps: smaller changes of the command do not move the stem.
 
-    Unlike backlash it is the same in both directions, and a reversal loses nothing more.
+    A ramp becomes a staircase, in both directions; at a reversal up to one more step is lost.
 
     Parameters
     ----------

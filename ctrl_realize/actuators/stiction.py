@@ -10,6 +10,7 @@ from ..errors import OptionError
 from ..numerics.actuators.friction import (
     StemState,
     choudhury,
+    choudhury_at_rest,
     choudhury_step,
     he,
     he_step,
@@ -67,7 +68,9 @@ class Stiction(_StickAndJump):
     J : float
         Slip jump; 0 for backlash of width S, S for a stem that catches up at once.
     start : float, default 0
-        How the stem came to rest: 1 by a move up, -1 by a move down, 0 relaxed between the two.
+        How the stem came to rest: 1 by a move up, -1 by a move down, 0 relaxed between the two. The
+        first move needs a change of J after a move up, and of S otherwise, in either direction:
+        the model does not know on which side of the friction a stem at rest is.
 
     Raises
     ------
@@ -98,8 +101,7 @@ class Stiction(_StickAndJump):
         return tuple(float(part) for part in after), position
 
     def _at_rest(self, command: float) -> StemState:
-        # As the array kernel: which side of the friction holds the stem is not part of the model.
-        return super()._at_rest(command)._replace(paused=self.start == 1.0)
+        return choudhury_at_rest(command, self.S, self.J, self.start)
 
     def _simulated(self, command: FloatArray, dt: float) -> FloatArray:
         return choudhury(command, self.S, self.J, self.start)

@@ -15,7 +15,7 @@ from ..actuators import Actuator
 from ..data import Record
 from ..errors import DataError, OptionError
 from ..numerics.arrays import FloatArray
-from .instruments import recorded
+from .instruments import STROKE_MM, recorded
 from .motion import Motion
 from .truth import ValveTruth
 
@@ -80,6 +80,11 @@ class Valve:
             f"<Valve (simulated): dead time {self.truth.delay:g} samples of {self.dt:g} s, "
             f"noise {100 * self.noise:g} % of the stroke>"
         )
+
+    @property
+    def travel_range(self) -> tuple[float, float]:
+        """Displacement in mm at 4 and at 20 mA."""
+        return _REST_MM, _REST_MM + STROKE_MM
 
     def step_record(self, amplitude: float = 16.0, rng: Seed = None, *, name: str = "") -> Record:
         """Record one step of the drive current.
@@ -216,13 +221,16 @@ class Valve:
         levels: int = 11,
         hold: float = 2.0,
         cycles: int = 3,
+        ramp: float | None = 120.0,
         name: str = "valve_static",
     ) -> Record:
-        """Record the test of linearity and hysteresis: levels up and down over the whole range.
+        """Record the test of linearity and hysteresis: levels and a ramp over the whole range.
 
         Section 2.2 of the paper reports that the static relation is linear and hysteresis
         negligible. Here the current rests at each level until the valve has settled, first from the
-        lowest to the highest level, then back, and again.
+        lowest to the highest level, then back, and again; a slow ramp up and down follows.
+        `ctrl_realize.valves.valve_report` evaluates the record: the steps between the levels give
+        the lag along the ramp, and the ramp linearity, hysteresis and dead band.
 
         Parameters
         ----------
@@ -234,6 +242,8 @@ class Valve:
             Time in s at each level.
         cycles : int, default 3
             Number of times up and down.
+        ramp : float or None, default 120
+            Duration in s of the ramp in each direction; None for levels alone.
         name : str, default "valve_static"
             Of the record.
 
@@ -245,13 +255,13 @@ class Valve:
         Raises
         ------
         OptionError
-            Less than three levels, no cycle, or a hold that is not a positive time.
+            Less than three levels, no cycle, or a hold or ramp that is not a positive time.
 
         Examples
         --------
         >>> import ctrl_realize as cr
         >>> cr.bench.valve(hysteresis=0.01).static_test(rng=1)
-        <Record 'valve_static': 9760 samples of 0.0125 s, 1 input, 1 output>
+        <Record 'valve_static': 29440 samples of 0.0125 s, 1 input, 1 output>
         """
         whole(levels, "levels", 3)
         whole(cycles, "cycles", 1)
@@ -260,6 +270,11 @@ class Valve:
         up = np.linspace(*paper.SETUP.current_range, levels)
         once = np.concatenate([up[1:], up[-2::-1]])
         held = np.repeat(np.concatenate([up[:1], np.tile(once, cycles)]), each)
+        if ramp is not None:
+            n_ramp = round(positive(ramp, "ramp", "time in s") / dt)
+            climb = np.linspace(*paper.SETUP.current_range, n_ramp)
+            parts = [np.full(each, up[0]), climb, np.full(each, up[-1]), climb[::-1]]
+            held = np.concatenate([held, *parts, np.full(each, up[0])])
         generator = np.random.default_rng(rng)
         moved = self._motion.of_held(held, dt, self._dead_time(generator))
         time = dt * np.arange(held.size, dtype=np.float64)

@@ -8,7 +8,7 @@ from ..delayed import fit_of
 from ..results import ModelFit
 from .demo_files import write_demo_files
 from .demo_run import SHOWN, DemoResult, run_demo
-from .demo_tables import outcome_table, table_1
+from .demo_tables import outcome_table, static_rows, table_1
 from .inputs import typed_call
 from .manifest import Run
 from .staging import appearing
@@ -33,6 +33,10 @@ def _say_result(result: DemoResult) -> None:
     say(table_1(result))
     say()
     say(outcome_table(result))
+    say()
+    say("Static test of the valve (section 2.2), in % of the span")
+    for name, found in static_rows(result):
+        say(f"  {name:12} {found}")
     say()
     say(f"Output-error fit of {result.records[SHOWN].name}")
     say(fit_of(result.fitted, ModelFit).report())

@@ -18,7 +18,14 @@ from ..report.build import write_report
 from ..report.provenance import record_sha256
 from ..report.tables import comparison_tables, fit_tables
 from .demo_run import SHOWN, DemoResult
-from .demo_tables import OUTCOME, outcome_rows, simulated_table, table_1_columns, table_1_rows
+from .demo_tables import (
+    OUTCOME,
+    outcome_rows,
+    simulated_table,
+    static_rows,
+    table_1_columns,
+    table_1_rows,
+)
 from .inputs import typed_call
 
 _TITLE = "A control valve with dead time, identified"
@@ -165,6 +172,7 @@ def _write_report(folder: Path, result: DemoResult) -> None:
             *fit_tables(result.fitted.fit, "How the final model was found"),
             *comparison_tables(result.comparisons["fitted"], "Final model and stepped sine"),
             pairs("The paper's settings", _settings()),
+            pairs("The static test of section 2.2, in % of the span", static_rows(result)),
             pairs("The simulated valve", _valve(result)),
             _data(result),
         ],
@@ -252,5 +260,9 @@ def _python(result: DemoResult) -> str:
         "frf = cr.stepped_sine_frf(valve.stepped_sine(rng))\n"
         'campaign = cr.identify_campaign(records, method="paper")\n'
         f"sys = cr.fit_output_error(records[{SHOWN}])\n"
-        "print(cr.compare_frf(sys, frf).report())"
+        "print(cr.compare_frf(sys, frf).report())\n"
+        "print(cr.valves.valve_report(\n"
+        "    valve.static_test(rng), command_range=(4, 20),\n"
+        "    travel_range=valve.travel_range, fit=False,\n"
+        ").report())"
     )

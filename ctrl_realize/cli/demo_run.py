@@ -18,6 +18,7 @@ from ..identification.campaign.campaign import Campaign
 from ..identification.campaign.run import identify_campaign
 from ..identification.output_error.fit import fit_output_error
 from ..identification.realization.result import Realization
+from ..valves import ValveReport, valve_report
 from .terminal import progress
 
 SHOWN = (
@@ -51,6 +52,8 @@ class DemoResult:
         record to record, so that their mean is the response of none of them.
     comparisons : dict of str to FRFComparison
         Of ``"printed"``, ``"unfiltered"`` and ``"fitted"`` with the stepped sine.
+    static : ValveReport
+        Linearity and hysteresis, from the static test of section 2.2.
     seconds : float
         Computing time of simulation and identification.
     """
@@ -64,6 +67,7 @@ class DemoResult:
     unfiltered: ct.FrequencyResponseData
     fitted: DelayedStateSpace
     comparisons: dict[str, FRFComparison]
+    static: ValveReport
     seconds: float
 
 
@@ -96,8 +100,12 @@ def _stages(seed: int, jobs: int) -> Iterator[DemoResult | None]:
         "unfiltered": compare_frf(unfiltered, frf, hold=None),
         "fitted": compare_frf(fitted, frf),
     }
+    static = valve_report(
+        valve.static_test(rng), command_range=paper.SETUP.current_range,
+        travel_range=valve.travel_range, fit=False,
+    )  # fmt: skip
     yield DemoResult(
-        valve, seed, records, frf, campaign, printed, unfiltered, fitted, comparisons,
+        valve, seed, records, frf, campaign, printed, unfiltered, fitted, comparisons, static,
         time.perf_counter() - start,
     )  # fmt: skip
 

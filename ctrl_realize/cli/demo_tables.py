@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from .. import paper
+from ..actuators import Backlash
 from ..delayed import fit_of
 from ..identification.output_error.result import OutputErrorFit
 from ..identification.realization.result import Realization
@@ -91,3 +92,23 @@ def outcome_rows(result: DemoResult) -> list[tuple[str, ...]]:
 def outcome_table(result: DemoResult) -> str:
     """Format the results for the terminal."""
     return table(OUTCOME, outcome_rows(result), numbers=range(1, 5))
+
+
+def static_rows(result: DemoResult) -> list[tuple[str, str]]:
+    """List the results of the static test: printed, evaluated with intervals, and the truth."""
+    band = sum(100 * part.width for part in result.valve.actuator if isinstance(part, Backlash))
+    rows = []
+    for key, printed, truth in (
+        ("linearity", "linear", "0"),
+        ("hysteresis", "negligible", "0"),
+        ("dead_band", "", f"{band / 100:g}"),
+    ):
+        metric = result.static.metric(key)
+        found = metric.interval
+        said = [
+            f"{found.value:.4f} % ({found.low:.4f} to {found.high:.4f} %)",
+            f"truth {truth} %",
+            *([f"printed: {printed}"] if printed else []),
+        ]
+        rows.append((metric.definition.name, "; ".join(said)))
+    return rows

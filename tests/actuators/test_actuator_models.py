@@ -59,6 +59,27 @@ def test_a_system_of_python_control_moves_as_the_array_simulation(model):
     assert system.nstates == len(model.state_names)
 
 
+@pytest.mark.parametrize("direction", [-1, 1])
+@pytest.mark.parametrize(
+    ("model", "needed"),
+    [
+        (Stiction(4, 1.5), 4.0),
+        (Stiction(4, 1.5, start=-1), 4.0),
+        (KanoStiction(4, 1.5), 2.75),  # (S + J) / 2 from the middle of the friction
+        (HeStiction(2.75, 1.25), 2.75),
+        (Backlash(4), 2.0),
+    ],
+    ids=str,
+)
+def test_the_first_move_needs_its_change_of_the_command(model, needed, direction):
+    below, above = (
+        model.simulate(50 + direction * np.array([0.0, 0.0, needed + more]))
+        for more in (-0.01, 0.01)
+    )
+    assert below[2] == below[0]
+    assert direction * (above[2] - above[0]) > 0
+
+
 def test_a_fast_damped_stem_with_lugre_friction_is_hes_model():
     # S = 2.5 and J = 0.5 by the ratios of friction and spring.
     u = np.repeat(50 + np.array([0.0, 1, 2, 4, 3, 2, 1, 0, -1]), 15)

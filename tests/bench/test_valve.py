@@ -140,7 +140,17 @@ def test_backlash_is_an_actuator_and_a_short_argument():
 
 def test_the_static_test_shows_the_dead_band_and_the_linear_relation():
     valve = bench.valve(hysteresis=0.01)
-    record = valve.static_test(rng=1, levels=6, cycles=2)
+    report = cr.valves.valve_report(
+        valve.static_test(rng=1, levels=6, cycles=1, ramp=60.0),
+        command_range=(4, 20), travel_range=valve.travel_range, fit=False,
+    )  # fmt: skip
+    band, hysteresis, linearity = (
+        report.metric(key).interval for key in ("dead_band", "hysteresis", "linearity")
+    )
+    assert band.low <= 1.0 <= band.high < 1.05
+    # Hysteresis beyond the dead band, and linearity: there is none in this valve but for noise.
+    assert max(hysteresis.value, linearity.value) < 0.1
+    record = valve.static_test(rng=1, levels=6, cycles=2, ramp=None)
     each = round(2.0 / record.dt)
     at, shown = (x.reshape(-1, each)[:, each // 2 :].mean(axis=1) for x in
                  (record.input, record.output))  # fmt: skip

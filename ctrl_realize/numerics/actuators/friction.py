@@ -141,12 +141,19 @@ def choudhury_step(
     return StemState(command, position, direction, rest, moving, paused, change), position
 
 
+def choudhury_at_rest(command: float, stick: float, jump: float, start: float = 0.0) -> StemState:
+    """State of a stem at rest in Choudhury's model; `start` as for `stem_at_rest`.
+
+    The model does not know on which side of the friction a stem at rest is: its first move, in
+    either direction, needs J from a stop after a move up, and S otherwise.
+    """
+    state = stem_at_rest(command, stick, jump, start)
+    return state._replace(rest=command, paused=start == 1.0)
+
+
 def choudhury(position: FloatArray, stick: float, jump: float, start: float = 0.0) -> FloatArray:
     """Stem positions (N,) for commands `position` by Choudhury's model; `start` as `kano`."""
-    state = stem_at_rest(float(position[0]), stick, jump, start)
-    # The model does not know on which side of the friction a stem at rest is: its first
-    # move needs J from a stop after a move up, and S otherwise.
-    state = state._replace(paused=start == 1.0)
+    state = choudhury_at_rest(float(position[0]), stick, jump, start)
     out = []
     for command in position.tolist():
         state, stem = choudhury_step(state, command, stick, jump)
