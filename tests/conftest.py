@@ -24,6 +24,13 @@ settings.register_profile("long", parent=settings.get_profile("suite"), max_exam
 settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "suite"))
 
 
+@pytest.fixture
+def without_figures(monkeypatch) -> None:
+    """No figures in reports: drawing takes most of the time where something else is looked at."""
+    monkeypatch.setattr("ctrl_realize.report.build.identification_sketches", lambda *_, **__: [])
+    monkeypatch.setattr("ctrl_realize.report.build.campaign_sketches", lambda *_, **__: [])
+
+
 @pytest.fixture(scope="session")
 def valve() -> cr.bench.Valve:
     """The simulated valve, its records short."""

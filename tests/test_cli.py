@@ -52,12 +52,6 @@ def first(folder, tmp_path_factory):
     return out, said.getvalue()
 
 
-@pytest.fixture
-def without_figures(monkeypatch):
-    """Drawing takes most of the time, and many tests look at something else."""
-    monkeypatch.setattr("ctrl_realize.report.build.identification_sketches", lambda *_, **__: [])
-
-
 def files_in(path):
     return {str(one.relative_to(path)) for one in path.rglob("*") if one.is_file()}
 

@@ -39,13 +39,6 @@ def files(tmp_path_factory):
     return [str(path) for path in sorted(folder.iterdir())]
 
 
-@pytest.fixture(autouse=True)
-def without_figures(monkeypatch):
-    """Drawing takes most of the time; how figures are written is tested elsewhere."""
-    for sketches in ("identification_sketches", "campaign_sketches"):
-        monkeypatch.setattr(f"ctrl_realize.report.build.{sketches}", lambda *_, **__: [])
-
-
 def stop_after(monkeypatch, where, count):
     """Let the function named run `count` times, then be interrupted."""
     owner, name = where
@@ -131,9 +124,10 @@ def test_an_interruption_leaves_finished_records_alone(
 QUICK = ["--method", "scan", "--order", "1", "--max-delay", "40"]
 OPTIONS = {"method": "scan", "order": 1, "max_delay": 40}
 
-pytestmark = pytest.mark.skipif(
-    not hasattr(signal, "SIGKILL"), reason="the system has other ways to stop a process"
-)
+pytestmark = [
+    pytest.mark.skipif(not hasattr(signal, "SIGKILL"), reason="processes are stopped otherwise"),
+    pytest.mark.usefixtures("without_figures"),
+]
 
 
 def record(seed: int) -> cr.Record:
@@ -341,11 +335,12 @@ def test_a_record_over_which_the_process_died_twice_is_not_tried_for_ever(tmp_pa
 
 def test_a_reader_that_goes_away_costs_no_result(csv_files, tmp_path):
     out = tmp_path / "out"
-    with started("identify", csv_files[0], "-o", str(out), *QUICK) as process:
+    words = ["identify", csv_files[0], "-o", str(out), "--no-report", *QUICK]
+    with started(*words) as process:
         process.stdout.close()  # "| head" has seen enough
         assert process.stderr.read() == ""
     assert process.returncode == 0
-    assert {"model.json", "report.html", "figures"} <= {path.name for path in out.iterdir()}
+    assert {"model.json", "manifest.json"} <= {path.name for path in out.iterdir()}
 
 
 def test_signals_are_handled_as_before_after_a_command():

@@ -15,7 +15,9 @@ FAULTS = {
     "ctrl_realize.cli.results.report.write_campaign",  # the disk is full
     "ctrl_realize.io.store.write_text",  # the disk is full
     "ctrl_realize.report.build.versions",  # an error within a report
-    "ctrl_realize.report.build.identification_sketches",  # no figures: seconds at every call
+    # no figures: seconds at every call
+    "ctrl_realize.report.build.identification_sketches",
+    "ctrl_realize.report.build.campaign_sketches",
 }
 """Public names that are replaced: faults that cannot be had otherwise."""
 

@@ -81,8 +81,7 @@ def test_a_plant_that_settles_begins_at_the_level_of_its_first_input():
 
 
 @pytest.mark.parametrize(
-    ("make", "structure"),
-    [(bench.heater, "P2D"), (bench.tank, "P1ID"), (bench.flow_loop, "P2D")],
+    ("make", "structure"), [(bench.heater, "P2D"), (bench.tank, "P1ID"), (bench.flow_loop, "P2D")]
 )
 def test_identify_finds_the_truth_within_its_interval(make, structure):
     plant = make()

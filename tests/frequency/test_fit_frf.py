@@ -149,10 +149,7 @@ def test_what_is_no_noise_does_not_buy_orders():
     assert fit.interval[0] <= 0.04 <= fit.interval[1]
 
 
-@pytest.mark.parametrize(
-    ("top", "level", "told"),
-    [(40.0, 0.001, False), (5.0, 0.02, True)],
-)
+@pytest.mark.parametrize(("top", "level", "told"), [(40.0, 0.001, False), (5.0, 0.02, True)])
 def test_structures_disagree_is_said_where_they_do_by_a_tenth_of_the_dead_time(top, level, told):
     # a fast pole more takes 0.7 ms of 40 at 30 Hz, and tens of ms where the band ends early
     def plant(s):

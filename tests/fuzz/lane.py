@@ -77,10 +77,7 @@ def fuzz(short: int) -> Callable[[Target], Target]:
 
 def _short(case: Target, count: int) -> None:
     @settings(
-        max_examples=count,
-        derandomize=True,
-        deadline=None,
-        suppress_health_check=list(HealthCheck),
+        max_examples=count, derandomize=True, deadline=None, suppress_health_check=list(HealthCheck)
     )
     @given(st.randoms(use_true_random=False, note_method_calls=True))
     def run(rng: random.Random) -> None:

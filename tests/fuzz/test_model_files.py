@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import copy
-import hashlib
 import json
 
 import control as ct
@@ -12,29 +11,10 @@ import pytest
 
 import ctrl_realize as cr
 from ctrl_realize.io import load_model, save_model
-from ctrl_realize.results import Flag, ModelFit
 from tests.fuzz.draws import any_float, any_text, some
 from tests.fuzz.lane import fuzz, good_end
 from tests.fuzz.test_binary_files import damaged
-
-
-class Fit(ModelFit):
-    """Something to be summarised."""
-
-    delay = 3
-    dead_time = 0.3
-    interval = (0.25, 0.35)
-    delay_interval = (2.5, 3.5)
-    order = 2
-    records = ()
-    choices = ("a choice",)
-    flags = (Flag("a", "b"),)
-
-    def _title(self):
-        return "fit"
-
-    def _rows(self):
-        return [("delay", "3")]
+from tests.io.test_model_files import Fit, signed
 
 
 @pytest.fixture(scope="module")
@@ -43,12 +23,6 @@ def file(tmp_path_factory):
     path = tmp_path_factory.mktemp("models") / "model.json"
     save_model(path, cr.delayed_ss(core, 3, name="m", fit=Fit()))
     return path
-
-
-def signed(content: dict) -> str:
-    content.pop("sha256", None)
-    canonical = json.dumps(content, sort_keys=True, separators=(",", ":"))
-    return json.dumps({**content, "sha256": hashlib.sha256(canonical.encode()).hexdigest()})
 
 
 ODD_VALUES = (

@@ -70,11 +70,7 @@ def answers(result: Any) -> list[Any]:
     """
     if isinstance(result, ct.StateSpace | ct.TransferFunction):
         z = np.exp(1j * GRID * DT) if result.isdtime(strict=True) else 1j * GRID
-        return [
-            result.dt,
-            (result.ninputs, result.noutputs),
-            result.horner(z),
-        ]
+        return [result.dt, (result.ninputs, result.noutputs), result.horner(z)]
     if isinstance(result, ct.FrequencyResponseData):
         # not the labels: ours go through products, python-control's do not
         return [result.frdata, result.omega, result.dt]

@@ -11,11 +11,7 @@ import pytest
 import ctrl_realize as cr
 from ctrl_realize.design import reduce
 from ctrl_realize.frequency import fit_frf
-from ctrl_realize.identification import (
-    DelayTracker,
-    fit_state_space,
-    realize_mimo,
-)
+from ctrl_realize.identification import DelayTracker, fit_state_space, realize_mimo
 from ctrl_realize.io import FitSummary
 from ctrl_realize.results import INTERVAL_LABELS, ModelFit
 

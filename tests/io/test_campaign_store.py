@@ -43,14 +43,6 @@ def assert_same_results(one: cr.Campaign, other: cr.Campaign) -> None:
             assert_array_equal(getattr(a.system, letter), getattr(b.system, letter))
 
 
-def test_a_store_changes_no_number(records, tmp_path):
-    plain = cr.identify_campaign(records, method="paper")
-    kept = cr.identify_campaign(records, method="paper", store=cr.io.CampaignStore(tmp_path))
-    assert_same_results(plain, kept)
-    assert kept.system.delay == plain.system.delay
-    assert_array_equal(kept.system.A, plain.system.A)
-
-
 def test_a_second_run_reads_what_the_first_has_done(records, tmp_path, monkeypatch):
     store = cr.io.CampaignStore(tmp_path)
     first = cr.identify_campaign(records[:2], method="paper", store=store)
@@ -68,31 +60,6 @@ def test_other_settings_are_other_rows(records, tmp_path):
     cr.identify_campaign(records[:1], method="paper", order=2, store=store)
     cr.identify_campaign(records[:1], method="scan", order=2, store=store)
     assert len(store) == 3
-
-
-@pytest.mark.parametrize("damage", ["truncated", "edited", "empty", "binary", "renamed"])
-def test_a_damaged_row_is_made_anew(records, tmp_path, damage):
-    store = cr.io.CampaignStore(tmp_path)
-    first = cr.identify_campaign(records[:1], method="paper", store=store)
-    (path,) = tmp_path.glob("row-*.json")
-    text = path.read_text()
-    if damage == "truncated":
-        path.write_text(text[: len(text) // 2])
-    elif damage == "edited":
-        content = json.loads(text)
-        content["model"]["model"]["D"][0][0] += 1.0
-        path.write_text(json.dumps(content))
-    elif damage == "empty":
-        path.write_text("")
-    elif damage == "binary":
-        path.write_bytes(bytes(range(256)))
-    else:
-        other = cr.identify_campaign(records[1:2], method="paper", store=store)
-        assert other.delays.size == 1
-        mine, theirs = path, next(p for p in tmp_path.glob("row-*.json") if p != path)
-        theirs.replace(mine)
-    again = cr.identify_campaign(records[:1], method="paper", store=store)
-    assert_same_results(first, again)
 
 
 @pytest.mark.parametrize("package", ["ctrl-realize", "numpy", "scipy"])

@@ -45,10 +45,12 @@ ARRAYS = {
 }
 
 
-WRITTEN = [(kind, name) for kind in ("npz", "mat") for name in ARRAYS] + [
+# arrays are looked up alike whatever they come from; of .mat the types that its reader makes
+WRITTEN = [("npz", name) for name in ARRAYS] + [
     ("packed npz", "columns"),
+    *(("mat", name) for name in ("other arrays beside", "whole numbers", "one matrix, turned")),
     *(("packed mat", name) for name in ("columns", "single precision")),
-    *(("old mat", name) for name in ("columns", "whole numbers", "one matrix, turned")),
+    *(("old mat", name) for name in ("columns", "whole numbers")),
 ]
 
 

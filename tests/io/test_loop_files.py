@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from hashlib import sha256
 
 import control as ct
 import numpy as np
@@ -12,6 +11,7 @@ from numpy.testing import assert_array_equal
 
 import ctrl_realize as cr
 from ctrl_realize.errors import FileFormatError
+from tests.io.test_model_files import signed
 
 PLANT = cr.delayed_ss(ct.tf([1.0], [0.5, 1]), 37, dt=0.01, name="plant")
 CONTROLLER = ct.ss([[1.0]], [[1.0]], [[0.01]], [[0.3]], 0.01)
@@ -72,9 +72,6 @@ def test_a_file_that_is_no_loop_is_refused(tmp_path, key, value, told):
     cr.save_model(path, SYSTEMS["discrete loop"])
     content = json.loads(path.read_text())
     content["model"][key] = value
-    rest = {name: part for name, part in content.items() if name != "sha256"}
-    text = json.dumps(rest, sort_keys=True, separators=(",", ":"))
-    content["sha256"] = sha256(text.encode()).hexdigest()
-    path.write_text(json.dumps(content))
+    path.write_text(signed(content))
     with pytest.raises(FileFormatError, match=told):
         cr.load_model(path)

@@ -123,8 +123,8 @@ def test_the_command_line_takes_units_in_brackets_and_tags_with_dots(tmp_path):
     table = pd.DataFrame({"time [s]": t, "FIC101.OP [%]": u, r"TIC101.PV [°C] \u00b0": y})
     table.to_csv(path, index=False)
     words = ["identify", str(path), "--input", "1", "--response", "2", "-o", str(tmp_path / "out")]
-    assert main([*words, "--method", "scan", "--order", "1", "--max-delay", "40"]) == 0
-    assert (tmp_path / "out" / "report.html").stat().st_size > 10_000
+    options = ["--method", "scan", "--order", "1", "--max-delay", "40", "--no-report"]
+    assert main([*words, *options]) == 0
     model = cr.load_model(tmp_path / "out" / "model.json")
     assert model.input_labels == ["FIC101_OP [%]"]
     assert cr.read_record(path, input=1, output=2).input_labels == ("FIC101.OP [%]",)

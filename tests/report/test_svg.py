@@ -37,11 +37,7 @@ def test_a_drawn_figure_is_well_formed_and_has_its_own_ids():
     assert used <= ids[0]
 
 
-@given(
-    st.lists(st.floats(-1e6, 1e6), min_size=3, max_size=300),
-    st.integers(2, 60),
-    st.booleans(),
-)
+@given(st.lists(st.floats(-1e6, 1e6), min_size=3, max_size=300), st.integers(2, 60), st.booleans())
 def test_the_envelope_keeps_ends_and_extremes_and_invents_nothing(values, points, logarithmic):
     y = np.array(values)
     x = np.arange(1.0, y.size + 1)

@@ -11,11 +11,7 @@ from scipy.signal import lfilter
 
 import ctrl_realize as cr
 from ctrl_realize.errors import DataError
-from ctrl_realize.identification.impulse.regression import (
-    OKID_ORDERS,
-    through_arx,
-    without_prior,
-)
+from ctrl_realize.identification.impulse.regression import OKID_ORDERS, through_arx, without_prior
 from tests import measured
 from tests.rigs import DT, TWO_STATES
 
@@ -77,11 +73,7 @@ def test_missing_samples_take_out_the_equations_that_they_touch():
 
 @pytest.mark.parametrize("options", METHODS)
 @pytest.mark.parametrize(
-    ("name", "u"),
-    [
-        ("constant", np.full(400, 2.0)),
-        ("sine", np.sin(0.2 * np.arange(400))),
-    ],
+    ("name", "u"), [("constant", np.full(400, 2.0)), ("sine", np.sin(0.2 * np.arange(400)))]
 )
 def test_an_input_that_does_not_excite_gets_no_answer(options, name, u):
     rng = np.random.default_rng(0)

@@ -244,11 +244,11 @@ def test_identify_delegates_and_its_result_has_what_all_fits_have():
 @pytest.mark.parametrize(
     ("arguments", "error", "match"),
     [
-        ({"frf": np.ones(5)}, UnsuitableSystemError, "expected a MeasuredFRF"),
+        ({"frf": np.ones(5), "order": 1}, UnsuitableSystemError, "expected a MeasuredFRF"),
         ({"frf": response(), "known": ct.tf([1], [0.1, 1])}, OptionError, "known: not an"),
         ({"frf": response(), "method": "scan"}, OptionError, "frf: not an argument"),
         ({"frf": response(), "order": 1, "structures": ONE_LAG}, OptionError, "got both"),
-        ({"frf": cr.MeasuredFRF([1.0, 0.5], [1.0, 2.0])}, DataError, "at least 3"),
+        ({"frf": cr.MeasuredFRF([1.0, 0.5], [1, 2]), "order": 1}, DataError, "at least 3"),
     ],
 )
 def test_what_cannot_be_fitted_together_is_refused(arguments, error, match):

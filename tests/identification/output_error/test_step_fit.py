@@ -265,11 +265,7 @@ def test_the_result_says_what_the_better_structure_would(forced):
 
 
 @pytest.mark.parametrize(
-    ("record", "asked"),
-    [
-        (two_lags(1), {"order": 2}),
-        (one_lag(3), {"structures": [(2, 2)]}),
-    ],
+    ("record", "asked"), [(two_lags(1), {"order": 2}), (one_lag(3), {"structures": [(2, 2)]})]
 )
 def test_a_structure_that_holds_the_plant_is_not_objected_to(record, asked):
     system = cr.identify(record, **asked)

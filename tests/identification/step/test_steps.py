@@ -24,10 +24,7 @@ def step_input(n: int = 400, at: int = 100, low: float = 4.0, high: float = 20.0
 
 
 @given(
-    at=st.integers(1, 380),
-    low=st.floats(-1e3, 1e3),
-    jump=st.floats(1e-2, 1e3),
-    up=st.booleans(),
+    at=st.integers(1, 380), low=st.floats(-1e3, 1e3), jump=st.floats(1e-2, 1e3), up=st.booleans()
 )
 def test_a_clean_step_is_found_to_the_sample(at, low, jump, up):
     high = low + jump if up else low - jump

@@ -12,11 +12,7 @@ from scipy.stats import invgauss
 from ctrl_realize.numerics.output_error.step_data import step_data, step_scales, window
 from ctrl_realize.numerics.separable.batch_search import fit_batch
 from ctrl_realize.numerics.separable.dispersion import fit_flows, flow_modes, flow_profile
-from ctrl_realize.numerics.separable.lag_chains import (
-    LagChain,
-    fit_chains,
-    fit_diffusion,
-)
+from ctrl_realize.numerics.separable.lag_chains import LagChain, fit_chains, fit_diffusion
 from ctrl_realize.numerics.separable.poles import parameters_from_poles
 from ctrl_realize.numerics.separable.profile_ends import profile_limits
 from ctrl_realize.numerics.separable.responses import StepSequence

@@ -17,15 +17,8 @@ from ctrl_realize.numerics.signals.noise import (
     rest_noise,
     winsorised_sigma,
 )
-from ctrl_realize.numerics.signals.noise_model import (
-    noise_covariance,
-    whitener,
-)
-from ctrl_realize.numerics.validation.held_output import (
-    held_share,
-    longest_hold,
-    samples_at_limit,
-)
+from ctrl_realize.numerics.signals.noise_model import noise_covariance, whitener
+from ctrl_realize.numerics.validation.held_output import held_share, longest_hold, samples_at_limit
 
 
 def white(n, seed=0):
