@@ -1,10 +1,13 @@
-"""Tests of control valves: metrics with intervals, report, test plan."""
+"""Control valves: step tests with metrics and report, and the diagnosis of oscillating loops."""
 
 from __future__ import annotations
 
 from .definitions import DEFINITIONS, Definition
 from .evaluate import valve_report
 from .groups import Interval, SizeAndDirection
+from .loops.diagnose import diagnose_loop
+from .loops.methods import LoopMethod
+from .loops.result import LoopDiagnosis
 from .metrics import Metric
 from .part import TestPart
 from .parts import split_test
@@ -18,6 +21,8 @@ __all__ = [
     "DEFINITIONS",
     "Definition",
     "Interval",
+    "LoopDiagnosis",
+    "LoopMethod",
     "Metric",
     "Ranges",
     "SizeAndDirection",
@@ -26,6 +31,7 @@ __all__ = [
     "TestPart",
     "ValveReport",
     "ValveTestPlan",
+    "diagnose_loop",
     "split_test",
     "valve_report",
     "valve_test_plan",

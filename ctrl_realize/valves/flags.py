@@ -28,7 +28,7 @@ def flags_of(
             Flag(
                 "no_valve_test",
                 "the command holds no level between its changes, and is no slow ramp: these are "
-                "records of operation; valve_test_plan writes a test, and valves.loops judges "
+                "records of operation; valve_test_plan writes a test, and diagnose_loop tells "
                 "whether the valve makes a loop oscillate",
             )
         )

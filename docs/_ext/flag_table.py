@@ -27,6 +27,7 @@ RAISED_BY = {
     "identification/validation/delay_estimates": "validation.compare_delay_estimates",
     "identification/validation/residuals": "validation.analyse_residuals",
     "valves": "valves.valve_report",
+    "valves/loops": "valves.diagnose_loop",
     "valves/plan": "valves.valve_test_plan",
 }
 """File or folder of the source -> public function whose results carry the flag."""

@@ -1,0 +1,1 @@
+"""Oscillation of control loops: detection, shape, phase, higher-order statistics."""

@@ -1,0 +1,1 @@
+"""Whether the valve makes a control loop oscillate, from operating data."""

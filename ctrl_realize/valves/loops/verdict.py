@@ -1,0 +1,154 @@
+"""What the methods say together, and what is to be noted about the record."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Literal, TypeAlias
+
+import numpy as np
+
+from ...numerics.arrays import FloatArray
+from ...numerics.oscillation.cycles import FEWEST_CYCLES, SHORTEST_PERIOD, Cycles
+from ...results import Flag
+from .data import LoopData
+from .methods import VOTERS, LoopMethod
+
+LoopVerdict: TypeAlias = Literal[
+    "stiction", "no stiction: tuning or external oscillation", "no oscillation", "cannot tell"
+]
+
+_SHORTEST_SAMPLED = 4.0
+"""Samples of a period below which noise has one, too."""
+_DECAY, _ALIKE = 0.6, 0.6
+"""Limits of decay ratio and like half cycles from which on an oscillation is taken for sure. Above
+the published 0.5 and 0.4: of random walks, which have cycles of all lengths, 7 % pass instead of
+30 %."""
+_SATURATED = 0.05
+_COARSE = 10.0
+"""Levels from the smallest to the largest value, below which the shape of a cycle is lost."""
+
+
+def oscillates(cycles: Cycles | None) -> bool | None:
+    """Whether there is an oscillation; None if this cannot be told."""
+    if cycles is None or cycles.period < _SHORTEST_SAMPLED:
+        return False
+    regular = cycles.regularity > 1
+    if regular and cycles.decay_ratio > _DECAY and cycles.alike > _ALIKE:
+        return True
+    published = (regular, cycles.decay_ratio > 0.5, cycles.alike > 0.4)
+    return None if sum(published) > 1 else False
+
+
+def flags_of(data: LoopData, cycles: Cycles | None) -> list[Flag]:
+    """List what the record lacks."""
+    flags = []
+    if data.left_out:
+        flags.append(
+            Flag(
+                "missing_samples",
+                f"only the longest part without missing samples is used: {data.op.size} of "
+                f"{data.op.size + data.left_out}",
+            )
+        )
+    for name, signal in (("controller output", data.op), ("process value", data.pv)):
+        if np.ptp(signal) == 0:
+            flags.append(
+                Flag(
+                    "constant_signal",
+                    f"the {name} is constant: the controller is in manual, or the signal is not "
+                    "that of the loop",
+                )
+            )
+        elif np.ptp(signal) < _COARSE * _resolution(signal):
+            flags.append(
+                Flag(
+                    "coarse_quantisation",
+                    f"the {name} has {np.ptp(signal) / _resolution(signal) + 1:.0f} levels: half "
+                    "cycles have no shape; record it with more digits, and without compression",
+                )
+            )
+    limited = _at_limits(data.op)
+    if limited > _SATURATED:
+        flags.append(
+            Flag(
+                "saturated_output",
+                f"the controller output is at its smallest or largest value in {limited:.0%} of "
+                "the samples: this shapes the oscillation, whatever its cause",
+            )
+        )
+    if data.sp is not None and np.std(data.sp) > 0.2 * np.std(data.pv - data.sp):
+        flags.append(
+            Flag(
+                "set_point_moves",
+                "the set point moves: the oscillation may come with it, from an outer loop; judge "
+                "that loop, or a record with a constant set point",
+            )
+        )
+    if cycles is not None and oscillates(cycles) is not False:
+        if cycles.period < 2 * SHORTEST_PERIOD:
+            flags.append(
+                Flag(
+                    "few_samples_per_cycle",
+                    f"{cycles.period:.1f} samples in a cycle: half cycles have no shape; sample "
+                    "faster",
+                )
+            )
+        if cycles.count < 2 * FEWEST_CYCLES:
+            flags.append(
+                Flag(
+                    "few_cycles",
+                    f"{cycles.count:.1f} cycles of the oscillation; record at least "
+                    f"{2 * FEWEST_CYCLES:.0f}",
+                )
+            )
+    return flags
+
+
+SPOILS = {"constant_signal", "saturated_output", "set_point_moves", "coarse_quantisation"}
+"""Flags with which the cause of an oscillation cannot be told."""
+
+
+def judge(
+    state: bool | None, methods: Sequence[LoopMethod], flags: Sequence[Flag]
+) -> tuple[LoopVerdict, str]:
+    """Return the verdict and its reason.
+
+    A verdict on the cause needs two methods that agree, and twice as many as contradict them.
+    """
+    constant = [flag for flag in flags if flag.code == "constant_signal"]
+    if constant:
+        return "cannot tell", constant[0].message
+    if state is False:
+        return "no oscillation", "no regular oscillation in the process value"
+    if state is None:
+        return "cannot tell", "whether the process value oscillates is not clear"
+    spoilt = [flag.message for flag in flags if flag.code in SPOILS]
+    if spoilt:
+        return "cannot tell", spoilt[0]
+    votes = [one for one in methods if one.key in VOTERS]
+    sticks = [one.name for one in votes if one.verdict == "stiction"]
+    not_so = [one.name for one in votes if one.verdict == "no stiction"]
+    told = f"stiction by {_listed(sticks)}; no stiction by {_listed(not_so)}"
+    if len(sticks) > 1 and len(sticks) >= 2 * len(not_so):
+        return "stiction", told
+    if len(not_so) > 1 and len(not_so) >= 2 * len(sticks):
+        return "no stiction: tuning or external oscillation", told
+    return "cannot tell", told
+
+
+def _listed(names: Sequence[str]) -> str:
+    return ", ".join(names) if names else "none"
+
+
+def _resolution(signal: FloatArray) -> float:
+    """Smallest distance of two different values."""
+    gaps = np.diff(np.unique(signal))
+    return float(gaps[gaps > 1e-9 * np.abs(signal).max()].min(initial=np.inf))
+
+
+def _at_limits(signal: FloatArray) -> float:
+    """Part of the samples that rest at the smallest or the largest value."""
+    rest = np.zeros(signal.size, dtype=bool)
+    rest[1:] = signal[1:] == signal[:-1]
+    ends = (signal == signal.min()) | (signal == signal.max())
+    return float(np.mean(rest & ends))

@@ -1,0 +1,184 @@
+"""Oscillating loops: indices in closed form, and verdicts on simulated and measured loops."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import ctrl_realize as cr
+from ctrl_realize.errors import DataError, OptionError
+from ctrl_realize.numerics.oscillation.cross_correlation import cross_correlation
+from ctrl_realize.numerics.oscillation.cycles import crossings, find_cycles, without_drift
+from ctrl_realize.numerics.oscillation.ellipse import fit_ellipse
+from ctrl_realize.numerics.oscillation.half_cycles import half_cycles
+from ctrl_realize.numerics.oscillation.movements import movement_indices
+
+LOOPS = Path(__file__).resolve().parents[3] / "shared" / "data" / "valve_loops"
+STICKS, NOT_SO = "stiction", "no stiction: tuning or external oscillation"
+TIME = np.arange(2000.0)
+TIGHT = 0.97
+
+
+def diagnosed(op, pv, **options):
+    return cr.valves.diagnose_loop(op, pv, dt=1.0, **options)
+
+
+def test_period_and_areas_of_a_sine_are_those_of_the_closed_form():
+    period, amplitude = 37.3, 2.5
+    drift = 1e-3 * TIME
+    found = find_cycles(amplitude * np.sin(2 * np.pi * TIME / period) + drift)
+    assert found.period == pytest.approx(period, rel=1e-3)
+    assert found.regularity > 10
+    assert found.alike == 1
+    # a moving average over a quarter of the period leaves sinc(1/4) of the fundamental
+    assert found.area == pytest.approx(amplitude * period / np.pi * np.sinc(0.25), rel=0.03)
+
+
+def test_the_moving_average_over_a_period_takes_drift_and_leaves_the_cycle():
+    for period in (40, 41):
+        wave = np.where(TIME % period < 7, 1.0, 0.0)
+        clean = without_drift(wave + 0.01 * TIME, period)
+        half = period // 2
+        assert np.allclose(clean, (wave - 7 / period)[half : half + clean.size], atol=1e-9)
+
+
+@pytest.mark.parametrize("kind", ["white", "lag", "walk"])
+def test_noise_is_rarely_taken_for_an_oscillation(kind):
+    said = []
+    for seed in range(40):
+        noise = np.random.default_rng(seed).standard_normal(1500)
+        if kind == "lag":
+            for k in range(1, noise.size):
+                noise[k] += 0.9 * noise[k - 1]
+        value = np.cumsum(noise) if kind == "walk" else noise
+        said.append(diagnosed(np.roll(value, 3), value).oscillates is True)
+    # binomial with 10 %: more than 9 of 40 with a probability below 1 %
+    assert sum(said) <= 9
+
+
+@pytest.mark.parametrize("degrees", [0.0, 20.0, 45.0, 70.0, 90.0])
+def test_cross_correlation_and_ellipse_of_two_sines_are_those_of_the_closed_form(degrees):
+    phase, period, amplitude = np.radians(degrees), 40.0, 3.0
+    op = amplitude * np.sin(2 * np.pi * TIME / period)
+    pv = -5 * np.sin(2 * np.pi * TIME / period - phase)
+    found = cross_correlation(op, pv, period)
+    assert found.shift == pytest.approx(2 * phase / np.pi, abs=0.02)
+    height = (1 - np.cos(phase)) / (1 + np.cos(phase))
+    assert found.height == pytest.approx(height, abs=0.03)
+    ellipse = fit_ellipse(op, pv, period)
+    assert ellipse.width == pytest.approx(2 * amplitude * np.sin(phase), abs=1e-6)
+
+
+def test_half_cycles_are_told_apart_by_the_error_of_their_shape():
+    period = 50.0
+    angle = 2 * np.pi * TIME / period
+    lag = np.exp(-1 / 10)
+    relay, level = np.zeros(TIME.size), 0.0
+    for k, up in enumerate(np.sin(angle) > 0):
+        level = lag * level + (1 - lag) * (1.0 if up else -1.0)
+        relay[k] = level
+    waves = {"sine": np.sin(angle), "triangle": np.arcsin(np.sin(angle)), "relay": relay}
+    for name, wave in waves.items():
+        settled = wave[200:]
+        errors = half_cycles(settled, crossings(settled), period).errors
+        assert errors[name] < 3e-3  # of the power: the grid of vertices and lags is that coarse
+        others = {"sine", "triangle", "relay"} - {name}
+        assert min(errors[other] for other in others) > 3 * errors[name]
+
+
+def test_movements_of_a_valve_that_sticks_half_of_the_time():
+    op = np.abs((TIME % 64) - 32)
+    position = np.clip(np.abs(((TIME - 8) % 64) - 32), 8, 24)  # rests after each reversal
+    found = movement_indices(op, position, 64.0)
+    assert found == pytest.approx((0.5, 0.5), abs=2 / 16)  # at a reversal OP rests, too
+    assert movement_indices(op, op, 64.0) == pytest.approx((0.0, 0.0), abs=0.03)
+
+
+def worlds():
+    sticky = cr.actuators.KanoStiction
+    kinds = {"flow": (1500.0, 15.0), "first-order": (4000.0, 60.0), "integrating": (6000.0, 100.0)}
+    for process, (duration, period) in kinds.items():
+        plain = cr.bench.valve_loop(process=process)
+        for S, J in ((5, 2), (8, 4)):
+            yield STICKS, process, duration, {"actuator": sticky(S, J), "noise": 0.1}
+        yield NOT_SO, process, duration, {"oscillation": (2.0, period), "noise": 0.1}
+        if process != "flow":  # six samples in a cycle
+            tight = {"tightness": TIGHT * plain.gain_margin, "noise": 0.3}
+            yield NOT_SO, process, duration, tight
+        yield "no oscillation", process, duration, {"noise": 0.3}
+
+
+@pytest.mark.parametrize(("truth", "process", "duration", "options"), list(worlds()))
+def test_the_cause_of_a_simulated_oscillation_is_never_told_wrongly(
+    truth, process, duration, options
+):
+    loop = cr.bench.valve_loop(process=process, **options)
+    kind = "self-regulating" if process == "first-order" else process
+    said = []
+    for seed in range(3):
+        record = loop.simulate(duration, rng=seed).record
+        said.append(cr.valves.diagnose_loop(record, process=kind).verdict)
+    assert set(said) <= {truth, "cannot tell"}
+    assert said.count(truth) >= 2 or "tightness" in options
+
+
+def test_units_and_directions_do_not_matter():
+    loop = cr.bench.valve_loop(cr.actuators.KanoStiction(5, 2), process="flow", noise=0.1)
+    record = loop.simulate(1000.0, rng=4).record
+    first = diagnosed(record.input, record.output)
+    other = cr.valves.diagnose_loop(-40 * record.input - 3, 0.01 * record.output, 7.0, dt=0.1)
+    assert other.period == pytest.approx(0.1 * first.period)
+    assert other.apparent_stiction == pytest.approx(40 * first.apparent_stiction)
+    for one, two in zip(first.methods, other.methods, strict=True):
+        assert (one.key, one.verdict) == (two.key, two.verdict)
+        assert one.index == pytest.approx(two.index, rel=1e-6, nan_ok=True)
+    assert first.verdict == other.verdict == STICKS
+
+
+def test_records_that_cannot_tell_say_why():
+    wave = np.sin(2 * np.pi * TIME / 40)
+    lagging = np.sin(2 * np.pi * (TIME - 7) / 40)
+    cases = {
+        "constant_signal": (np.full(2000, 50.0), wave, {}),
+        "saturated_output": (np.clip(wave, -0.7, 0.7), lagging, {}),
+        "coarse_quantisation": (np.round(2 * wave), lagging, {}),
+        "set_point_moves": (wave, lagging, {"sp": 2 * wave}),
+    }
+    for code, (op, pv, options) in cases.items():
+        found = diagnosed(op, pv, **options)
+        assert found.verdict == "cannot tell", code
+        assert code in {flag.code for flag in found.flags}
+    gaps = lagging.copy()
+    gaps[[100, 1500]] = np.nan
+    found = diagnosed(wave, gaps)
+    assert found.signals.op.size == 1399
+    assert found.flags[0].code == "missing_samples"
+    assert diagnosed(wave, np.full(2000, 3.0)).verdict == "cannot tell"
+
+
+def test_wrong_arguments_are_refused():
+    wave = np.sin(TIME)
+    with pytest.raises(DataError, match="expected a Record, or the arrays"):
+        cr.valves.diagnose_loop(wave)
+    with pytest.raises(DataError, match="equal lengths"):
+        diagnosed(wave, wave[1:])
+    with pytest.raises(DataError, match="expected at least 24"):
+        diagnosed(wave[:20], wave[:20])
+    with pytest.raises(DataError, match="one input"):
+        cr.valves.diagnose_loop(cr.Record(TIME, wave, np.stack([wave, wave])))
+    with pytest.raises(OptionError, match="process"):
+        diagnosed(wave, wave, process="level")
+    with pytest.raises(OptionError, match="expected one of"):
+        diagnosed(wave, wave).method("vote")
+
+
+@pytest.mark.skipif(not LOOPS.exists(), reason="measured loops are not at hand")
+@pytest.mark.parametrize(
+    ("name", "truth"),
+    [("chem1", STICKS), ("pap2", STICKS), ("chem13", NOT_SO), ("pap9", NOT_SO)],
+)
+def test_measured_loops_have_the_cause_that_the_literature_gives(name, truth):
+    time, op, pv = np.loadtxt(LOOPS / f"{name}.csv", delimiter=",", skiprows=1).T
+    assert cr.valves.diagnose_loop(op, pv, dt=time[1] - time[0]).verdict == truth
