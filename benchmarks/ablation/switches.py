@@ -158,7 +158,7 @@ def _alike_noise(levels: Any) -> Any:
 VIEWS = ("onset", "one_lag_early", "two_lags_early", "model_of_rise", "model_of_record")
 
 MODES = Switch(
-    "modes beside lags", {"ctrl_realize.identification.methods:with_modes_judged": first}
+    "modes beside lags", {"ctrl_realize.identification.model_class:with_modes_judged": first}
 )
 """Of records whose inputs are no steps the other rules are tried without it."""
 

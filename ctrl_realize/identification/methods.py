@@ -3,32 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 from typing import Any, Literal, TypedDict
 
 import control as ct
 import numpy as np
 
 from .._checks import one_of, whole
-from ..data import Record, StepResponse
+from ..data import Record
 from ..data.given import as_records
 from ..data.shown_units import in_shown_units
 from ..delayed import DelayedStateSpace, fit_of
-from ..errors import DelayRangeError, OptionError
-from ..numerics.arrays import FloatArray
+from ..errors import OptionError
 from ..numerics.blas_threads import single_threaded
-from ..paper import SETTINGS
-from .joint.fit import fit_joint
-from .model_class import with_modes_judged
-from .output_error.fit import fit_output_error
 from .output_error.result import OutputErrorFit
 from .process_structures import MOST_ORDER, Structures
-from .realization.delay_scan import estimate_delay
-from .realization.delay_scan_result import DelayScan
-from .realization.order_scan import scan_orders
-from .state_space_fit.fit import fit_state_space
-from .step.impulse import impulse_from_step
-from .step.steps import unit_step
+
+# Together the methods are 200 modules, a quarter of the time of importing python-control: each is
+# imported by the first call that uses it.
 
 Method = Literal["output_error", "scan", "paper"]
 
@@ -49,10 +40,6 @@ class IdentifyOptions(TypedDict, total=False):
     cutoff_hz: float | Literal["auto"] | None
     samples: int | None
     feedthrough: bool | None
-
-
-SCANNED_ORDERS = range(1, 6)
-"""Orders considered by the scan; above 5 the realization models noise, or the delay."""
 
 
 @single_threaded
@@ -162,6 +149,8 @@ def identify(
                 f"{', '.join(strange)}: not an argument with frf; expected order, structures or "
                 "max_delay; fit the records alone with the others"
             )
+        from .joint.fit import fit_joint
+
         return fit_joint(record, frf, structures=_requested(order, structures), max_delay=max_delay)
     fit_only["frf"] = frf is not None
     strange = [
@@ -182,6 +171,8 @@ def identify(
                 f"{', '.join(strange)}: not an argument for records of several channels; see "
                 "fit_state_space"
             )
+        from .state_space_fit.fit import fit_state_space
+
         return fit_state_space(record, order)
     if method == "output_error":
         system = fit_records(
@@ -199,6 +190,8 @@ def identify(
         missing = any(record.n_missing for record in fit.records)
         if np.isfinite(fit.onset) or known is not None or missing:
             return system
+        from .model_class import with_modes_judged
+
         asked = order is not None or structures is not None
         return with_modes_judged(system, max_delay, asked=asked)
     if not isinstance(record, Record):
@@ -206,10 +199,10 @@ def identify(
             f"method={method!r} takes one record; use method='output_error' for several "
             "records together, or identify_campaign for each on its own"
         )
-    step = unit_step(record)
-    if method == "paper":
-        return _paper(step, order, max_delay, cutoff_hz, samples, feedthrough)
-    return _scan(step, order, max_delay, cutoff_hz, samples, feedthrough)
+    from .scan_methods import by_paper, by_scan
+
+    scan = by_paper if method == "paper" else by_scan
+    return scan(record, order, max_delay, cutoff_hz, samples, feedthrough)
 
 
 def _of_several_channels(records: Record | Sequence[Record]) -> bool:
@@ -224,6 +217,8 @@ def fit_records(
     **options: Any,
 ) -> DelayedStateSpace:
     """Output-error fit with the arguments of `identify`; several records are fitted together."""
+    from .output_error.fit import fit_output_error
+
     return fit_output_error(records, structures=_requested(order, structures), **options)
 
 
@@ -235,115 +230,3 @@ def _requested(order: int | None, structures: Structures | None) -> Structures |
         raise OptionError("expected order or structures, got both")
     order = whole(order, "order", 1, MOST_ORDER)
     return [(order, degree) for degree in range(1, order + 1)]
-
-
-def _scan(
-    step: StepResponse,
-    order: int | None,
-    max_delay: int | None,
-    cutoff_hz: float | Literal["auto"] | None,
-    samples: int | None,
-    feedthrough: bool | None,
-) -> DelayedStateSpace:
-    impulse = impulse_from_step(step, cutoff_hz=cutoff_hz)
-    choices = [
-        "backward difference: step-invariant, the model reproduces the sampled step response "
-        "of plant and zero-order hold"
-    ]
-    if impulse.filter is None:
-        choices.append("no filter: the rise takes few samples, or none was requested")
-    else:
-        choices.append(f"filter: {impulse.filter} (13 times the bandwidth where automatic)")
-    reach = _half_risen(step) if max_delay is None else max_delay
-    if max_delay is None:
-        choices.append(
-            f"delays up to {reach} samples were tried: by then the step response has reached "
-            "half of its final value"
-        )
-    if order is None:
-        # A Hankel matrix of few samples allows few orders.
-        room = (impulse.n_samples - 1 - reach) // 2
-        orders = scan_orders(
-            impulse,
-            [n for n in SCANNED_ORDERS if n <= room] or [1],
-            max_delay=reach,
-            samples=samples,
-            feedthrough=feedthrough,
-        )
-        choices.append(f"order {orders.order}: its last singular value is {_against_noise(orders)}")
-        system = orders.system()
-    else:
-        system = estimate_delay(
-            impulse, order, max_delay=reach, samples=samples, feedthrough=feedthrough
-        )
-    return _named(system, choices, step)
-
-
-def _paper(
-    step: StepResponse,
-    order: int | None,
-    max_delay: int | None,
-    cutoff_hz: float | Literal["auto"] | None,
-    samples: int | None,
-    feedthrough: bool | None,
-) -> DelayedStateSpace:
-    reach = SETTINGS.max_delay if max_delay is None else max_delay
-    behind = SETTINGS.samples if samples is None else samples
-    if reach + behind + 1 > step.n_samples:
-        raise DelayRangeError(
-            f"the settings of the paper need {reach + behind + 1} samples after the step "
-            f"(samples={behind}, max_delay={reach}), the record has {step.n_samples}; give "
-            "samples= and max_delay=, or use method='scan', which adapts them to the record"
-        )
-    impulse = impulse_from_step(
-        step,
-        cutoff_hz=SETTINGS.cutoff_hz if cutoff_hz == "auto" else cutoff_hz,
-        zero_phase=False,
-        difference="central",
-    )
-    system = estimate_delay(
-        impulse,
-        SETTINGS.order if order is None else order,
-        max_delay=reach,
-        samples=behind,
-        feedthrough=True if feedthrough is None else feedthrough,
-    )
-    found = fit_of(system, DelayScan)
-    choices = [
-        "as in the paper: five-point central difference (half a sample early in a step "
-        f"response), {impulse.filter or 'no filter'}, order {found.order}, {behind} "
-        f"samples, delays 0...{reach}"
-    ]
-    return _named(system, choices, step)
-
-
-def _named(
-    system: DelayedStateSpace, choices: Sequence[str], step: StepResponse
-) -> DelayedStateSpace:
-    names: dict[str, Any] = {"fit": replace(fit_of(system, DelayScan), choices=tuple(choices))}
-    record = step.record
-    if record is not None:
-        names |= {"inputs": list(record.input_labels), "outputs": list(record.output_labels)}
-        if record.name:
-            names["name"] = record.name
-    return system.replace(**names)
-
-
-def _half_risen(step: StepResponse) -> int:
-    """Sample at which the step response reaches half of its final value; the delay is shorter."""
-    final = float(np.median(step.output[-max(step.n_samples // 10, 3) :]))
-    risen: FloatArray = step.output / final if final else np.abs(step.output)
-    crossing = np.flatnonzero(risen >= 0.5 * (1.0 if final else float(risen.max()) or 1.0))
-    half = int(crossing[0]) if crossing.size else step.n_samples // 2
-    # Some samples must remain after the largest delay.
-    return max(1, min(half, step.n_samples - max(step.n_samples // 4, 12)))
-
-
-def _against_noise(orders: Any) -> str:
-    value = orders.last_singular_value(orders.order)
-    if orders.noise_floor:
-        return f"{value / orders.noise_floor:.1f} times that of the noise before the step"
-    return (
-        f"{value:.3g}, and no higher order fits better by 10 % (the noise before the step is "
-        "unknown)"
-    )

@@ -1,21 +1,6 @@
 """Files: records, frequency responses, models."""
 
-from .frf import read_frf
-from .models import load_model, save_model
-from .records import read_record, read_records
-from .store import CampaignStore
-from .stored_fit import FitSummary
+# Loaded on demand, as the names of the package itself; the stub beside this file lists them.
+import lazy_loader
 
-__all__ = [
-    "CampaignStore",
-    "FitSummary",
-    "load_model",
-    "read_frf",
-    "read_record",
-    "read_records",
-    "save_model",
-]
-
-
-def __dir__() -> list[str]:
-    return __all__
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
