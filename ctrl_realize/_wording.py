@@ -115,7 +115,7 @@ def rate_in_time(per_second: float, digits: int = 3) -> str:
     return f"{per_second / UNITS[shown]:.{digits}g} per {shown}"
 
 
-def interval_in_time(low: float, high: float) -> str:
+def interval_in_time(low: float, high: float, word: str = "to") -> str:
     """Write an interval of times in one unit, with two significant digits of its width.
 
     Examples
@@ -125,15 +125,15 @@ def interval_in_time(low: float, high: float) -> str:
     ('25.6 to 37.4 ms', '124.53 to 125.41 ms')
     >>> interval_in_time(0.0, 0.00327)
     '0 to 3.27 ms'
-    >>> interval_in_time(0.026, 0.0374)
-    '26.0 to 37.4 ms'
+    >>> interval_in_time(0.026, 0.0374), interval_in_time(0.026, 0.0374, "and")
+    ('26.0 to 37.4 ms', '26.0 and 37.4 ms')
     """
     if not (np.isfinite(low) and np.isfinite(high)):
-        return f"{in_time(low)} to {in_time(high)}"
+        return f"{in_time(low)} {word} {in_time(high)}"
     factor, name = time_unit(max(abs(low), abs(high)))
     low, high = factor * low, factor * high
     ends = numbers_alike((low, high), low, high)
-    return f"{' to '.join(ends)} {name}"
+    return f"{f' {word} '.join(ends)} {name}"
 
 
 def time_within(value: float, low: float, high: float) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, Literal, TypedDict
+from typing import TYPE_CHECKING, Any, Literal, TypedDict
 
 import control as ct
 import numpy as np
@@ -15,8 +15,9 @@ from ..data.shown_units import in_shown_units
 from ..delayed import DelayedStateSpace, fit_of
 from ..errors import OptionError
 from ..numerics.blas_threads import single_threaded
-from .output_error.result import OutputErrorFit
-from .process_structures import MOST_ORDER, Structures
+
+if TYPE_CHECKING:
+    from .process_structures import Structures
 
 # Together the methods are 200 modules, a quarter of the time of importing python-control: each is
 # imported by the first call that uses it.
@@ -186,6 +187,8 @@ def identify(
             include_known=include_known,
             gains=gains,
         )
+        from .output_error.result import OutputErrorFit
+
         fit = fit_of(system, OutputErrorFit)
         missing = any(record.n_missing for record in fit.records)
         if np.isfinite(fit.onset) or known is not None or missing:
@@ -228,5 +231,7 @@ def _requested(order: int | None, structures: Structures | None) -> Structures |
         return structures
     if structures is not None:
         raise OptionError("expected order or structures, got both")
+    from .process_structures import MOST_ORDER
+
     order = whole(order, "order", 1, MOST_ORDER)
     return [(order, degree) for degree in range(1, order + 1)]
