@@ -230,8 +230,8 @@ def _open_start(fit: OutputErrorEstimate, firm: str) -> Flag | None:
         "onset_open",
         "the best model has a zero, which can imitate a smooth onset: how much of the time "
         "before the visible onset is dead time is not identifiable; it is between "
-        f"{interval_in_time(fit.low, fit.high, 'and')}{firm}. Backlash and static friction have the "
-        "same effect at one step amplitude: fit records of several amplitudes together, whose "
+        f"{interval_in_time(fit.low, fit.high, 'and')}{firm}. Backlash and static friction have "
+        "the same effect at one step amplitude: fit records of several amplitudes together, whose "
         "delays then differ",
     )
 
