@@ -8,13 +8,18 @@ from pathlib import Path
 
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parent
-sys.path.insert(0, str(HERE / "_ext"))
-sys.path.insert(0, str(ROOT))
+for _folder in (ROOT, HERE / "_ext"):
+    sys.path.insert(0, str(_folder))
+# Cells see the same modules as this file does.
+os.environ["PYTHONPATH"] = os.pathsep.join([*sys.path[:2], os.environ.get("PYTHONPATH", "")])
 
 import dataset_pages  # noqa: E402
 import docstring_rules  # noqa: E402
 import flag_table  # noqa: E402
+import gallery_pages  # noqa: E402
+import measured_numbers  # noqa: E402
 import public_names  # noqa: E402
+import student_copy  # noqa: E402
 
 import ctrl_realize  # noqa: E402
 
@@ -37,7 +42,14 @@ extensions = [
 ]
 # Tables are parts of pages, but for the one that is a page of its own.
 PARTS = sorted(path.name for path in HERE.glob("*_table.md") if path.name != "defects_table.md")
-exclude_patterns = ["_build", "_ext", "**/.ipynb_checkpoints", *PARTS, "generated/tables"]
+exclude_patterns = [
+    "_build",
+    "_ext",
+    "**/.ipynb_checkpoints",
+    *PARTS,
+    "generated/tables",
+    "generated/course",
+]
 templates_path = ["_templates"]
 root_doc = "index"
 
@@ -46,6 +58,9 @@ root_doc = "index"
 GENERATED = HERE / "generated"
 GENERATED.mkdir(exist_ok=True)
 public_names.write_pages(GENERATED / "api")
+LABORATORY = "13_dead_time_laboratory.ipynb"
+student_copy.write(ROOT / "notebooks" / LABORATORY, GENERATED / "course" / LABORATORY)
+gallery_pages.write(HERE / "gallery", GENERATED / "gallery", ROOT / "ctrl_realize")
 
 
 def _notebooks_into_source() -> None:
@@ -98,7 +113,8 @@ for _name, (_file, _command) in TABLES.items():
     # What stands under headings of its own goes where the page wants it.
     _first, _heading, _rest = _text.partition("\n### ")
     (GENERATED / "tables" / f"{_name}.md").write_text(_first)
-    (GENERATED / "tables" / f"{_name}_more.md").write_text(_heading.lstrip("\n") + _rest)
+    _more = (_heading.lstrip("\n") + _rest).replace("### ", "## ")
+    (GENERATED / "tables" / f"{_name}_more.md").write_text(_more)
 (GENERATED / "tables" / "flags.md").write_text(flag_table.table(ROOT / "ctrl_realize"))
 (GENERATED / "tables" / "datasets.md").write_text(dataset_pages.page())
 
@@ -121,9 +137,20 @@ nb_execution_timeout = 300
 nb_execution_raise_on_error = True
 nb_execution_show_tb = True
 nb_merge_streams = True
+nb_ipywidgets_js = {}  # sliders live in Jupyter; a page asks no network
+nb_code_prompt_show = "Show this code"
+nb_code_prompt_hide = "Hide this code"
 suppress_warnings = ["mystnb.unknown_mime_type"]
 
-myst_enable_extensions = ["dollarmath", "amsmath", "deflist", "colon_fence", "smartquotes"]
+myst_enable_extensions = [
+    "dollarmath",
+    "amsmath",
+    "deflist",
+    "colon_fence",
+    "smartquotes",
+    "substitution",
+]
+myst_substitutions = measured_numbers.numbers(HERE)
 myst_heading_anchors = 3
 html_math_renderer = "mathml"
 
@@ -153,7 +180,7 @@ pygments_dark_style = "github-dark"
 html_title = "ctrl_realize"
 html_static_path = ["_static"]
 html_css_files = ["style.css"]
-html_js_files = ["figures.js"]
+html_js_files = ["figures.js", "front.js"]
 html_copy_source = False
 html_show_sourcelink = False
 html_theme_options = {

@@ -85,6 +85,37 @@ def test_tests_that_a_page_names_exist(page: Path):
             assert f"def {name}(" in (ROOT / file).read_text(), f"{file}::{name}"
 
 
+@pytest.mark.parametrize("page", PAGES, ids=lambda path: str(path.relative_to(DOCS)))
+def test_cells_that_a_reader_sees_check_nothing_and_invent_no_data(page: Path):
+    for options, code in re.findall(
+        r"^```\{code-cell\} python\n((?::.*\n)*)(.*?)^```", page.read_text(), re.S | re.M
+    ):
+        if "remove-cell" not in options and "remove-input" not in options:
+            assert not re.search(r"^\s*assert ", code, re.M), code
+        simulates = "howto" in page.parts and page.name != "valve_test.md"
+        if simulates and not re.search("remove|hide-input", options):
+            assert "default_rng" not in code, code
+
+
+def test_sample_files_are_those_that_the_program_beside_them_writes(tmp_path):
+    spec = importlib.util.spec_from_file_location("samples", DOCS / "_ext" / "sample_files.py")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    written = dict(module.files())
+    assert set(written) == {path.name for path in module.STORED.iterdir()}
+    for name, text in written.items():
+        stored = (module.STORED / name).read_text(encoding="utf-8")
+        number = r"-?\d+[.,]\d+"
+        assert re.split(number, stored) == re.split(number, text)
+        pairs = zip(re.findall(number, stored), re.findall(number, text), strict=True)
+        # rounding may fall the other way on another processor: one unit of the last digit
+        assert all(
+            abs(float(a.replace(",", ".")) - float(b.replace(",", ".")))
+            < 1.5 * 10.0 ** -len(re.split("[.,]", a)[1])
+            for a, b in pairs
+        )
+
+
 def test_glossary_terms_that_pages_use_are_defined():
     glossary = (DOCS / "glossary.md").read_text()
     defined = set(re.findall(r"^([A-Za-z][^\n]*)\n  \S", glossary, re.M))

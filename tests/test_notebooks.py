@@ -70,6 +70,7 @@ def test_notebook_is_stored_as_it_should_be_read(path: Path):
     first, last = notebook.cells[0], notebook.cells[-1]
     assert "**Question.**" in first.source
     assert "assert " in last.source
+    assert last.metadata["tags"] == ["remove-cell"], "checks are not in the reader's way"
     code = [cell for cell in notebook.cells if cell.cell_type == "code"]
     assert all(cell.execution_count for cell in code), "stored without its outputs"
     assert [cell.execution_count for cell in code] == list(range(1, len(code) + 1))

@@ -48,6 +48,8 @@ def cleaned(notebook: nbformat.NotebookNode) -> nbformat.NotebookNode:
                 # What is printed arrives in pieces, as the machine has time.
                 kept[-1].text += output.text
                 continue
+            if "application/vnd.jupyter.widget-view+json" in output.get("data", {}):
+                continue  # a slider is alive in Jupyter alone
             if output.output_type in ("display_data", "execute_result"):
                 output.metadata = {}
                 if "image/png" in output.data:
