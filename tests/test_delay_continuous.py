@@ -15,11 +15,8 @@ from scipy.special import lambertw
 
 import ctrl_realize as cr
 from ctrl_realize.errors import (
-    DataError,
     DelayRangeError,
     ModelWarning,
-    OptionError,
-    UnsuitableSystemError,
 )
 
 LAG = ct.tf([1], [1, 1])
@@ -418,68 +415,3 @@ def test_discrete_and_continuous_delays_are_made_alike():
     assert cr.delay(0.3, 0.1).delay == 3
     assert cr.delay(0).internal_delays == ()
     assert cr.delay(0.5)(1j) == pytest.approx(np.exp(-0.5j))
-
-
-# -- what cannot be -------------------------------------------------------------------------------
-
-T = np.linspace(0, 1, 11)
-BAD = {
-    "negative": (lambda: cr.delay(-0.1), DelayRangeError, ">= 0"),
-    "no number": (lambda: cr.delay("long"), OptionError, "finite number"),
-    "no multiple of dt": (lambda: cr.delay(0.25, 0.1), DelayRangeError, r"2.5 "
-    "samples.*to_discrete"),
-    "mixed time bases": (
-        lambda: P1 * ct.ss([[0.5]], [[1.0]], [[1.0]], [[0]], 0.1),
-        UnsuitableSystemError,
-        "continuous and dt = 0.1|dt = 0.1 s and continuous",
-    ),
-    "algebraic loop": (
-        lambda: ct.feedback(1 + P1, -1),
-        UnsuitableSystemError,
-        "algebraic loop",
-    ),
-    "matrices": (lambda: P1.A, UnsuitableSystemError, "no|not have.*pade"),
-    "step of python-control": (
-        lambda: ct.step_response(P1, T),
-        UnsuitableSystemError,
-        r"step_response of python-control.*sys\.step_response",
-    ),
-    "controller in front of feedback": (
-        lambda: ct.feedback(ct.ss(C), P1),
-        UnsuitableSystemError,
-        r"feedback of python-control.*cr\.interconnect",
-    ),
-    "margin of a plant": (lambda: ct.margin(P1), UnsuitableSystemError, r"ct\.margin\(1 \* P\)"),
-    "gang of four of python-control": (
-        lambda: ct.gangof4_response(P1, C),
-        UnsuitableSystemError,
-        r"gangof4_response.*cr\.design\.gang_of_four",
-    ),
-    "root locus of python-control": (
-        lambda: ct.sisotool(C * P1),
-        UnsuitableSystemError,
-        r"sisotool.*cr\.design\.root_locus",
-    ),
-    "transfer function first": (
-        lambda: C * ct.feedback(P1),
-        UnsuitableSystemError,
-        r"P \* C.*cr\.DelaySystem\(ct\.ss\(C\)\)",
-    ),
-    "improper": (lambda: ct.tf([1, 0], [1]) * cr.delay(1.0), UnsuitableSystemError, "proper"),
-    "inverse": (lambda: P1**-1, UnsuitableSystemError, "not proper"),
-    "times": (lambda: P1.forced_response(T + 1, T), DataError, "increase from 0"),
-    "inputs": (lambda: P1.forced_response(T, np.ones(5)), DataError, r"\(1, 11\)"),
-    "samples": (lambda: P1.step(10), UnsuitableSystemError, r"step_response\(timepts\)"),
-    "too short a delay": (
-        lambda: ct.feedback(LAG * cr.delay(1e-7)).step_response(T),
-        UnsuitableSystemError,
-        "shortest delay",
-    ),
-}  # fmt: skip
-
-
-@pytest.mark.parametrize("case", BAD)
-def test_what_cannot_be_done_is_told(case):
-    make, error, match = BAD[case]
-    with pytest.raises(error, match=match):
-        make()

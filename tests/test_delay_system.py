@@ -15,9 +15,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 import ctrl_realize as cr
 from ctrl_realize.errors import (
     DataError,
-    DelayRangeError,
     ModelWarning,
-    OptionError,
     UnsuitableSystemError,
 )
 
@@ -447,61 +445,3 @@ def test_memory_grows_with_the_delay_and_not_with_its_square():
     _, peak = tracemalloc.get_traced_memory()
     tracemalloc.stop()
     assert peak < 3e7  # the matrix alone has 8e8
-
-
-TWO = np.array([[1.0, 0.2], [0.1, 1.0]])
-BAD = {
-    "algebraic loop": (lambda: ct.feedback(cr.delayed_ss(PI, 0), -2.5), "algebraic loop"),
-    "algebraic loop by names": (
-        lambda: cr.interconnect(
-            [cr.delayed_ss(PI, 0, name="P", inputs="u", outputs="y"),
-             ct.ss([], [], [], 2.5, DT, name="K", inputs="y", outputs="u")],
-            inplist="P.u", outlist="P.y",
-        ),
-        "algebraic loop",
-    ),
-    "other sample time": (
-        lambda: ct.feedback(cr.delayed_ss(PI, 3), ct.ss(PI.A, PI.B, PI.C, PI.D, 0.2)),
-        "different time bases: dt = 0.1 s and dt = 0.2 s",
-    ),
-    "continuous": (lambda: cr.delayed_ss(PI, 3) + LAG, "time bases.*continuous.*to_discrete"),
-    "no inverse": (lambda: 1 / cr.delayed_ss(LAG, 3, dt=DT), "not proper"),
-    "shapes": (lambda: drawn(0, 2, 2) * drawn(0, 3, 2), r"\(2, 2\) and \(3, 2\)"),
-    "improper": (lambda: cr.delayed_ss(PI, 3) + ct.tf([1, 0], [1], DT), "more zeros than poles"),
-    "not finite": (lambda: cr.delayed_ss(PI, 3) + np.nan, "non-finite"),
-    "complex": (lambda: cr.delayed_ss(PI, 3) + np.complex128(1j), "complex"),
-    "no system": (lambda: cr.interconnect([PI, "plant"]), "str"),
-    "zeros": (
-        lambda: ct.feedback(
-            cr.delayed_ss(ct.ss(np.diag([0.5, 0.6]), np.eye(2), TWO, np.zeros((2, 2)), DT), 300),
-            np.eye(2),
-        ).zeros(),
-        "602 states.*400 at most.*longer sample time",
-    ),
-}  # fmt: skip
-
-
-@pytest.mark.parametrize("case", BAD)
-def test_what_cannot_be_connected_is_told(case):
-    make, message = BAD[case]
-    with pytest.raises((UnsuitableSystemError, OptionError, TypeError), match=message):
-        make()
-
-
-@pytest.mark.parametrize(
-    ("core", "delays", "error", "match"),
-    [
-        (PI, [3], None, None),
-        (PI, [-1], DelayRangeError, ">= 0"),
-        (PI, [2.5], DelayRangeError, "2.5 samples.*whole"),
-        (PI, [1, 2], UnsuitableSystemError, "2 delays"),
-        (PI, [1e9], DelayRangeError, "at most"),
-        (ct.tf(PI), [1], UnsuitableSystemError, "ct.ss converts"),
-    ],
-)
-def test_cores_and_delays_are_checked(core, delays, error, match):
-    if error is None:
-        assert cr.DelaySystem(core, delays).internal_delays == (3,)
-        return
-    with pytest.raises(error, match=match):
-        cr.DelaySystem(core, delays)

@@ -15,10 +15,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 import ctrl_realize as cr
 from ctrl_realize.errors import (
-    DataError,
-    DelayRangeError,
     OptionError,
-    UnsuitableSystemError,
 )
 from ctrl_realize.io import FitSummary
 from tests.rigs import R3, TS, exact_step
@@ -247,36 +244,6 @@ def test_products_of_channels_with_different_delays_stay_right():
     assert isinstance(outer, cr.DelayedStateSpace)
     assert outer.input_delays == (2, 5)
     assert_allclose(outer(z)[0], S(z)[0] + 2 * S(z)[2], rtol=1e-12)
-
-
-@pytest.mark.parametrize(
-    ("make", "error", "match"),
-    [
-        (lambda: cr.delayed_ss(R3, 3), UnsuitableSystemError, "give dt"),
-        (lambda: cr.delayed_ss("valve", 3), UnsuitableSystemError, "is a str"),
-        (lambda: cr.delayed_ss(R3, -1, dt=TS), DelayRangeError, "delay=-1"),
-        (lambda: cr.delayed_ss(R3, 2.5, dt=TS), DelayRangeError, "fractional"),
-        (lambda: cr.delayed_ss(R3, dead_time=-0.1, dt=TS), DelayRangeError, ">= 0"),
-        (lambda: cr.delayed_ss(R3, dead_time=np.nan, dt=TS), OptionError, "finite"),
-        (lambda: cr.delayed_ss(R3, 1, dead_time=0.1, dt=TS), OptionError, "one of them"),
-        (lambda: cr.delayed_ss(R3, 1, dt=-1.0), OptionError, "positive sample time"),
-        (
-            lambda: cr.delayed_ss(CONTROLLER, dead_time=1.5 * TS),
-            DelayRangeError,
-            "needs a whole number",
-        ),
-        (lambda: cr.delayed_ss(CONTROLLER, 1, dt=0.1), OptionError, "sample time"),
-        (lambda: cr.delayed_ss(1 + R3, dead_time=1.5 * TS, dt=TS), UnsuitableSystemError, "jumps"),
-        (lambda: cr.DelayedStateSpace(ct.ss(R3), 3), UnsuitableSystemError, "sample time"),
-        (lambda: cr.delayed_ss(CONTROLLER, 10**8), DelayRangeError, "at most 10000000"),
-        (lambda: cr.delayed_ss(CONTROLLER, [1, 2]), DelayRangeError, "1 input"),
-        (lambda: valve().simulate(np.ones((2, 5))), DataError, r"\(1, N\)"),
-        (lambda: valve().markov(0), OptionError, ">= 1"),
-    ],
-)
-def test_unusable_arguments_are_refused(make, error, match):
-    with pytest.raises(error, match=match):
-        make()
 
 
 @pytest.mark.parametrize("delay", [0, 37, 300])

@@ -16,6 +16,7 @@ from ctrl_realize.errors import (
     OrderError,
     UnsuitableSystemError,
 )
+from ctrl_realize.identification import ProcessStructure
 from tests.rigs import TS, TWO_STATES, step_record
 
 T = 0.1 * np.arange(400)
@@ -33,6 +34,13 @@ FRF = cr.MeasuredFRF(np.ravel(LAG(2j * np.pi * F)), F)
 SQUARE = ct.ss(-np.eye(2), np.eye(2), np.eye(2), np.zeros((2, 2)))
 DISCRETE = ct.ss(0.5, 1, 1, 0, 0.1)
 GROWING = ct.ss(1.2, 1, 1, 0, 0.1)
+LATE = LAG * cr.delay(0.3)
+INTEGRAL = ct.tf([1, 0.5], [1, 0])
+PI = ct.ss([[1.0]], [[1.0]], [[0.02]], [[0.4]], 0.1)
+VALVE = cr.delayed_ss(PI, 3)
+LOOP = ct.feedback(VALVE, 0.1)
+WIDE = cr.delayed_ss(ct.ss(0.5 * np.eye(2), np.eye(2), np.eye(2), np.zeros((2, 2)), 0.1), 300)
+BETWEEN = np.linspace(0, 1, 11)
 FOPDT = cr.design.ProcessModel(2.0, 1.0, 0.3)
 IPDT = cr.design.ProcessModel(0.5, 0.0, 1.0, integrating=True)
 
@@ -53,6 +61,10 @@ def fit_frf(frf=FRF, **options):
     return cr.fit_frf(frf, **options)
 
 
+def form(name, **options):
+    return cr.design.PIDController(1.7, 40.0, 6.0, 0.6).as_form(name, **options)
+
+
 def tracker(model=TWO_STATES, **options):
     return cr.DelayTracker(model, **{"max_delay": 40, "forgetting_time": 20.0, **options})
 
@@ -66,6 +78,9 @@ ERRORS = {
         (lambda: scan(600), "order=600"),
         (lambda: scan(2), "rank of the data is 1"),
         (lambda: cr.scan_orders(PULSE, [1, 700], max_delay=50, dt=TS), "order=700"),
+        (lambda: ProcessStructure("P4D"), "0 to 3 lags"),
+        (lambda: ProcessStructure("P1DU"), "at least 2 with U"),
+        (lambda: ProcessStructure("P1DZ"), "fewer zeros than poles"),
     ],
     DelayRangeError: [
         (lambda: scan(max_delay=5000), "max_delay=5000 needs more than 5001 samples"),
@@ -74,6 +89,17 @@ ERRORS = {
         (lambda: cr.identify(STEP, method="paper", max_delay=5000), "need 6001 samples"),
         (lambda: tracker(max_delay=0), "only one candidate"),
         (lambda: tracker(forgetting_time=0.05), "forgetting_time"),
+        (lambda: cr.delay(-0.1), ">= 0"),
+        (lambda: cr.delay(0.25, 0.1), r"2.5 samples.*to_discrete"),
+        (lambda: cr.delayed_ss(LAG, -1, dt=TS), "delay=-1"),
+        (lambda: cr.delayed_ss(LAG, 2.5, dt=TS), "fractional"),
+        (lambda: cr.delayed_ss(LAG, dead_time=-0.1, dt=TS), ">= 0"),
+        (lambda: cr.delayed_ss(PI, dead_time=0.15), "needs a whole number"),
+        (lambda: cr.delayed_ss(PI, 10**8), "at most 10000000"),
+        (lambda: cr.delayed_ss(PI, [1, 2]), "1 input"),
+        (lambda: cr.DelaySystem(PI, [-1]), ">= 0"),
+        (lambda: cr.DelaySystem(PI, [2.5]), "2.5 samples.*whole"),
+        (lambda: cr.DelaySystem(PI, [1e9]), "at most"),
     ],
     NoStepError: [
         (lambda: cr.detect_step(QUIET), "no step"),
@@ -98,6 +124,65 @@ ERRORS = {
         (lambda: cr.delayed_ss(ct.tf([1, 1], [1]), dt=0.1), "needs a proper system"),
         (lambda: cr.design.pid(GROWING), "unstable"),
         (lambda: cr.design.pid(IPDT, "imc"), "not for integrating"),
+        # systems with dead time, and what python-control cannot make of them
+        (lambda: cr.delayed_ss(LAG, 3), "give dt"),
+        (lambda: cr.delayed_ss("valve", 3), "is a str"),
+        (lambda: cr.delayed_ss(1 + LAG, dead_time=0.15, dt=0.1), "jumps"),
+        (lambda: cr.DelayedStateSpace(ct.ss(LAG), 3), "sample time"),
+        (lambda: cr.DelaySystem(PI, [1, 2]), "2 delays"),
+        (lambda: cr.DelaySystem(ct.tf(PI), [1]), "ct.ss converts"),
+        (lambda: ct.feedback(cr.delayed_ss(PI, 0), -2.5), "algebraic loop"),
+        (lambda: ct.feedback(1 + LATE, -1), "algebraic loop"),
+        (
+            lambda: cr.interconnect(
+                [
+                    cr.delayed_ss(PI, 0, name="P", inputs="u", outputs="y"),
+                    ct.ss([], [], [], 2.5, 0.1, name="K", inputs="y", outputs="u"),
+                ],
+                inplist="P.u",
+                outlist="P.y",
+            ),
+            "algebraic loop",
+        ),
+        (
+            lambda: ct.feedback(VALVE, ct.ss(PI.A, PI.B, PI.C, PI.D, 0.2)),
+            "different time bases: dt = 0.1 s and dt = 0.2 s",
+        ),
+        (lambda: VALVE + LAG, "time bases.*continuous.*to_discrete"),
+        (lambda: LATE * DISCRETE, "continuous and dt = 0.1|dt = 0.1 s and continuous"),
+        (lambda: 1 / cr.delayed_ss(LAG, 3, dt=0.1), "not proper"),
+        (lambda: LATE**-1, "not proper"),
+        (lambda: VALVE + ct.tf([1, 0], [1], 0.1), "more zeros than poles"),
+        (lambda: ct.tf([1, 0], [1]) * cr.delay(1.0), "proper"),
+        (lambda: VALVE + np.nan, "non-finite"),
+        (lambda: cr.interconnect([PI, "plant"]), "str"),
+        (lambda: VALVE + np.complex128(1j), "complex"),
+        (lambda: ct.feedback(WIDE, np.eye(2)).zeros(), "602 states.*400 at most.*longer sample"),
+        (lambda: LATE.A, "no|not have.*pade"),
+        (lambda: ct.step_response(LATE, T), r"step_response of python-control.*sys\.step_resp"),
+        (lambda: ct.feedback(ct.ss(INTEGRAL), LATE), r"feedback of python-.*cr\.interconnect"),
+        (lambda: ct.margin(LATE), r"ct\.margin\(1 \* P\)"),
+        (lambda: ct.gangof4_response(LATE, INTEGRAL), r"gangof4_resp.*cr\.design\.gang_of_four"),
+        (lambda: ct.sisotool(INTEGRAL * LATE), r"sisotool.*cr\.design\.root_locus"),
+        (lambda: INTEGRAL * ct.feedback(LATE), r"P \* C.*cr\.DelaySystem\(ct\.ss\(C\)\)"),
+        (lambda: LATE.step(10), r"step_response\(timepts\)"),
+        (
+            lambda: ct.feedback(LAG * cr.delay(1e-7)).step_response(BETWEEN),
+            "shortest delay",
+        ),
+        # design functions
+        (
+            lambda: cr.design.smith_predictor(ct.tf([1], [1, 0]) * cr.delay(1.0), 0.1),
+            "pole at s = 0.*to_discrete",
+        ),
+        (lambda: cr.design.smith_predictor(ct.feedback(LATE), INTEGRAL), "internal delays"),
+        (lambda: cr.design.smith_predictor(LATE, PI), "continuous controller"),
+        (lambda: cr.design.smith_predictor(LATE, -10 * INTEGRAL), "is unstable"),
+        (lambda: cr.design.lqg(LATE, 1.0, 1.0, 1.0, 1.0), r"sys\.to_discrete"),
+        (
+            lambda: cr.design.pid(ct.feedback(LATE)),
+            "internal delays.*dead time at the input or output",
+        ),
     ],
     DataError: [
         (lambda: realize(np.r_[np.ones(9), np.nan]), "index 9"),
@@ -113,6 +198,9 @@ ERRORS = {
         (lambda: cr.validation.predict(TWO_STATES, HOLES, 1), "missing samples in this record: 1"),
         (lambda: cr.validation.analyse_residuals(ct.ss(0.5, 1, 1, 0, 0.2), DRIVEN), "0.2 s"),
         (lambda: cr.design.margins(cr.MeasuredFRF([1.0, 0.5], [1, 2])), "2 points"),
+        (lambda: VALVE.simulate(np.ones((2, 5))), r"\(1, N\)"),
+        (lambda: LATE.forced_response(BETWEEN + 1, BETWEEN), "increase from 0"),
+        (lambda: LATE.forced_response(BETWEEN, np.ones(5)), r"\(1, 11\)"),
     ],
     OptionError: [
         (lambda: cr.identify(STEP, method="magic"), "'output_error', 'scan', 'paper'"),
@@ -144,6 +232,31 @@ ERRORS = {
         (lambda: cr.design.pid(FOPDT, "lambda", "PID"), "has no PID; available: PI"),
         (lambda: cr.design.pid(FOPDT, "simc", closed_loop_time=-1.0), "closed_loop_time=-1"),
         (lambda: cr.design.pid(FOPDT, "optimal", max_sensitivity=1.0), "max_sensitivity=1"),
+        (lambda: WIDE * VALVE.append(VALVE).append(VALVE), r"\(2, 2\) and \(3, 3\)"),
+        (lambda: cr.delay("long"), "finite number"),
+        (lambda: cr.delayed_ss(LAG, dead_time=np.nan, dt=TS), "finite"),
+        (lambda: cr.delayed_ss(LAG, 1, dead_time=0.1, dt=TS), "one of them"),
+        (lambda: cr.delayed_ss(LAG, 1, dt=-1.0), "positive sample time"),
+        (lambda: cr.delayed_ss(PI, 1, dt=0.2), "sample time"),
+        (lambda: VALVE.markov(0), ">= 1"),
+        (lambda: cr.design.smith_predictor(cr.DelaySystem(ct.ss(LAG)), INTEGRAL), "no dead time"),
+        (lambda: cr.design.delay_robustness(LATE, INTEGRAL), "dead_time_interval="),
+        (lambda: cr.design.to_discrete(LATE, 0.1, 0.1), "that already has one"),
+        (lambda: cr.design.margins(LOOP, dead_time=0.1), "discrete loop"),
+        (lambda: form("simatic"), "siemens_pid_compact"),
+        (lambda: form("labview_pid", time_unit="s"), "times in min"),
+        (lambda: form("ideal", time_unit="week"), "time_unit"),
+        (lambda: form("series", measured_range=(3, 1)), "lower end first"),
+        (lambda: ProcessStructure("P2DX"), "'P2DX'; expected a pair"),
+        (lambda: ProcessStructure("P1D", fixed={"Tz": 1}), "parameters of"),
+        (lambda: ProcessStructure("P1", fixed={"Td": 1}), "parameters of P1"),
+        (lambda: ProcessStructure("P1D", fixed={"lag_1": -1}), "0...inf"),
+        (lambda: ProcessStructure("P1D", bounds={"lag_1": (3, 2)}), "expected low < high"),
+        (
+            lambda: ProcessStructure("P1D", fixed={"Kp": 1}, bounds={"gain": (0, 2)}),
+            "fixed and bounded",
+        ),
+        (lambda: fit(structures=["P1D", (2, 2)]), "pairs and names"),
     ],
     cr.CtrlRealizeError: [
         (lambda: fit_frf(3.0), "float"),

@@ -11,7 +11,6 @@ from numpy.testing import assert_allclose
 
 import ctrl_realize as cr
 from ctrl_realize import design
-from ctrl_realize.errors import OptionError, UnsuitableSystemError
 
 OMEGA = np.geomspace(0.05, 60, 25)
 CORE = ct.tf([2], [1, 1])
@@ -245,64 +244,3 @@ def test_identified_models_become_continuous_systems_and_come_back():
     assert back.delay == plant.delay
     assert_allclose(back.step(300), plant.step(300), atol=1e-10)
     assert pickle.loads(pickle.dumps(system)).internal_delays == system.internal_delays
-
-
-BAD = {
-    "integrator": (
-        lambda: design.smith_predictor(ct.tf([1], [1, 0]) * cr.delay(1.0), 0.1),
-        UnsuitableSystemError,
-        "pole at s = 0.*to_discrete",
-    ),
-    "no dead time": (
-        lambda: design.smith_predictor(cr.DelaySystem(ct.ss(CORE)), C),
-        OptionError,
-        "no dead time",
-    ),
-    "delay inside": (
-        lambda: design.smith_predictor(ct.feedback(P), C),
-        UnsuitableSystemError,
-        "internal delays",
-    ),
-    "discrete controller": (
-        lambda: design.smith_predictor(P, PI),
-        UnsuitableSystemError,
-        "continuous controller",
-    ),
-    "unstable loop": (
-        lambda: design.smith_predictor(P, -C),
-        UnsuitableSystemError,
-        "is unstable",
-    ),
-    "discrete designs": (
-        lambda: design.lqg(P, 1.0, 1.0, 1.0, 1.0),
-        UnsuitableSystemError,
-        r"sys\.to_discrete",
-    ),
-    "rules for a loop": (
-        lambda: design.pid(ct.feedback(P)),
-        UnsuitableSystemError,
-        "internal delays.*dead time at the input or output",
-    ),
-    "no dead time to vary": (
-        lambda: design.delay_robustness(P, C),
-        OptionError,
-        "dead_time_interval=",
-    ),
-    "dead time twice": (
-        lambda: design.to_discrete(P, 0.1, 0.1),
-        OptionError,
-        "that already has one",
-    ),
-    "dead time of a discrete loop": (
-        lambda: design.margins(ct.feedback(PLANT), dead_time=0.1),
-        OptionError,
-        "discrete loop",
-    ),
-}  # fmt: skip
-
-
-@pytest.mark.parametrize("case", BAD)
-def test_what_cannot_be_designed_is_told(case):
-    make, error, match = BAD[case]
-    with pytest.raises(error, match=match):
-        make()

@@ -140,20 +140,6 @@ def test_minutes_and_hours_are_chosen_for_forms_without_a_unit():
     assert pid.as_form("parallel", time_unit="h")["ki"] == pytest.approx(1.7 / 40 * 3600)
 
 
-@pytest.mark.parametrize(
-    ("form", "options", "match"),
-    [
-        ("simatic", {}, "siemens_pid_compact"),
-        ("labview_pid", {"time_unit": "s"}, "times in min"),
-        ("ideal", {"time_unit": "week"}, "time_unit"),
-        ("series", {"measured_range": (3, 1)}, "lower end first"),
-    ],
-)
-def test_unusable_choices_are_refused(form, options, match):
-    with pytest.raises(cr.errors.OptionError, match=match):
-        PID(*FULL).as_form(form, **options)
-
-
 def test_complex_zeros_have_no_series_form_and_values_need_their_names():
     with pytest.raises(cr.errors.OptionError, match=r"td of at most 9\.702 s"):
         PID(1.0, 40.0, 12.0, 0.6).as_form("series")

@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 import ctrl_realize as cr
-from benchmarks.worlds import described, driven, loops, sensors, steps
-from benchmarks.worlds.judge import DELAY, GAIN, judged
+from benchmarks.worlds import driven, loops, sensors, steps
+from benchmarks.worlds.judge import judged
 
 FAMILIES = [
     (steps.ends_while_rising, 2, "not_settled"),
@@ -28,12 +28,6 @@ def test_what_the_model_does_not_describe_is_told(world, seed, flag):
     seen = judged(world, seed)
     assert flag in seen.flags
     assert not seen.silent
-
-
-def test_what_the_model_describes_is_not_doubted():
-    seen = judged(described.two_lags, 1)
-    assert not set(seen.flags) & (DELAY | GAIN)
-    assert not seen.missed
 
 
 def rising(seconds, *, damping=None):

@@ -122,13 +122,12 @@ def test_a_long_dead_time_is_found_under_an_input_that_moves_at_every_sample():
     assert fit.delay_interval[0] <= 150 <= fit.delay_interval[1]
 
 
-@pytest.mark.parametrize(("seed", "pole"), [(0, 0.98), (1, 1.0)])
-def test_noise_that_wanders_neither_moves_the_dead_time_nor_becomes_a_pole(pole, seed):
+def test_noise_that_wanders_neither_moves_the_dead_time_nor_becomes_a_pole():
     # as large as the response: the dead time was a sample too late, beside slow or ringing poles
-    rng = np.random.default_rng(seed)
+    rng = np.random.default_rng(1)
     u = np.repeat(rng.choice([-1.0, 1.0], 80), 5) + 0.3 * rng.standard_normal(400)
     plant = cr.delayed_ss(ct.tf([2.0], [6.0, 5.5, 1.0]), dead_time=3.4, dt=1.0)
-    slow = lfilter([0.2 if pole < 1 else 0.1], [1.0, -pole], rng.standard_normal(u.size))
+    slow = 0.1 * np.cumsum(rng.standard_normal(u.size))
     y = plant.simulate(u) + slow + 0.03 * rng.standard_normal(u.size)
     model = cr.fit_output_error(cr.Record(np.arange(u.size) * 1.0, u, y))
     fit = model.fit
@@ -151,9 +150,8 @@ def test_a_sine_beside_the_response_is_named_and_does_not_move_the_dead_time():
     assert "cancelled_pair" in [flag.code for flag in fit.flags]
 
 
-@pytest.mark.parametrize("rest", [4500, 20000])
-def test_an_input_that_rests_for_longer_than_is_fitted_is_fitted_where_it_moves(rest):
-    rng = np.random.default_rng(0)
+def test_an_input_that_rests_for_longer_than_is_fitted_is_fitted_where_it_moves():
+    rng, rest = np.random.default_rng(0), 20_000
     u = np.concatenate([np.zeros(rest), np.repeat(rng.choice([-1.0, 1.0], 250), 10)])
     y = cr.delayed_ss(R1, dead_time=DELAY * DT, dt=DT).simulate(u)
     y += 0.02 * np.ptp(y) * rng.standard_normal(y.size)

@@ -15,10 +15,13 @@ def followed(fit):
     ]
 
 
+TWO = {"structures": [(2, 2)]}
+
+
 @pytest.mark.parametrize("noise", [0.002, 0.02])
 def test_the_fit_of_a_right_model_is_what_noise_leaves(noise):
     record = rigs.step_record(rigs.R2, noise=noise, before=400, after=900)
-    fit = cr.fit_output_error(record).fit
+    fit = cr.fit_output_error(record, **TWO).fit
     left = 16 * noise / np.std(record.output)
     # the noise of one record, known to 1 / sqrt(2 N)
     assert fit.fit_percent == pytest.approx(100 * (1 - left), abs=100 * left * 0.06)
@@ -29,7 +32,9 @@ def test_the_fit_of_a_right_model_is_what_noise_leaves(noise):
 def test_a_drift_is_in_the_fit_and_not_in_the_model_alone():
     record = rigs.step_record(rigs.R2, noise=0.001, before=900, after=900)
     drift = 3e-3 * np.arange(record.n_samples)
-    fit = cr.fit_output_error(cr.Record(record.time, record.input, record.output + drift)).fit
+    fit = cr.fit_output_error(
+        cr.Record(record.time, record.input, record.output + drift), **TWO
+    ).fit
     assert "drift" in {flag.code for flag in fit.flags}
     clean = record.output
     alone = 100 * (1 - np.std(drift) / np.std(clean + drift))

@@ -114,39 +114,3 @@ def test_names_serve_moving_inputs_too():
     for key, value in {"gain": 2.0, "lag_1": 5.0, "lag_2": 2.0}.items():
         assert abs(table.loc[key, "value"] - value) < 4 * table.loc[key, "std_given_structure"]
     assert fit.better is None
-
-
-@pytest.mark.parametrize(
-    ("make", "error", "match"),
-    [
-        (lambda: ProcessStructure("P2DX"), cr.errors.OptionError, "'P2DX'; expected a pair"),
-        (lambda: ProcessStructure("P4D"), cr.errors.OrderError, "0 to 3 lags"),
-        (lambda: ProcessStructure("P1DU"), cr.errors.OrderError, "at least 2 with U"),
-        (lambda: ProcessStructure("P1DZ"), cr.errors.OrderError, "fewer zeros than poles"),
-        (lambda: ProcessStructure("P1D", fixed={"Tz": 1}), cr.errors.OptionError, "parameters of"),
-        (
-            lambda: ProcessStructure("P1", fixed={"Td": 1}),
-            cr.errors.OptionError,
-            "parameters of P1",
-        ),
-        (lambda: ProcessStructure("P1D", fixed={"lag_1": -1}), cr.errors.OptionError, "0...inf"),
-        (
-            lambda: ProcessStructure("P1D", bounds={"lag_1": (3, 2)}),
-            cr.errors.OptionError,
-            "expected low < high",
-        ),
-        (
-            lambda: ProcessStructure("P1D", fixed={"Kp": 1}, bounds={"gain": (0, 2)}),
-            cr.errors.OptionError,
-            "fixed and bounded",
-        ),
-        (
-            lambda: cr.fit_output_error(record(TWO_LAGS), structures=["P1D", (2, 2)]),
-            cr.errors.OptionError,
-            "pairs and names",
-        ),
-    ],
-)
-def test_what_is_no_process_model_is_refused(make, error, match):
-    with pytest.raises(error, match=match):
-        make()
