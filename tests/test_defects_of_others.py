@@ -153,17 +153,3 @@ def test_results_do_not_depend_on_any_random_state(record):
         if isinstance(a, cr.DelayedStateSpace):
             for letter in "ABCD":
                 assert_array_equal(getattr(a, letter), getattr(b, letter))
-
-
-# And from the habits that others' tests taught.
-
-
-def test_exact_data_with_a_free_direct_term_fit_two_delays_and_the_convention_chooses():
-    g = cr.delayed_ss(CORE, 5).markov(200)
-    scan = cr.estimate_delay(g, 2, max_delay=12, feedthrough=True, dt=0.1).fit
-    # G_5 = 0 is a direct term as good as G_6 is one of the next delay
-    assert scan.iae[5] < 1e-9 * np.abs(g).sum()
-    assert scan.iae[6] < 1e-9 * np.abs(g).sum()
-    assert scan.iae[7] > 0.1
-    low, high = scan.delay_interval
-    assert low <= 5 < 6 <= high

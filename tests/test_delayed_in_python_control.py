@@ -161,13 +161,6 @@ def test_the_text_that_can_be_loaded_makes_the_same_again(kind):
         assert again.state_labels == shown.state_labels
 
 
-def test_margins_of_a_loop_with_our_controller_are_those_of_its_two_parts():
-    G, pid = plant(100), cr.design.PIDController(0.5, 0.2, dt=TS)
-    joined, apart = cr.design.margins(G * pid), cr.design.margins(G, pid)
-    assert joined.phase_margin == pytest.approx(apart.phase_margin, rel=1e-9)
-    assert joined.gain_margin == pytest.approx(apart.gain_margin, rel=1e-9)
-
-
 @pytest.mark.filterwarnings("ignore:stability_margins")
 @pytest.mark.filterwarnings("ignore::scipy.signal.BadCoefficients")
 @pytest.mark.parametrize("asked", POLYNOMIALS)
