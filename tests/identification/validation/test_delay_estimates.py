@@ -36,7 +36,7 @@ def frequency_response(plant=R2, dead_time=12.4 * DT, seed=0):
 
 
 def view(method, low, high, kind="dead time"):
-    return DelayEstimate(method, "test", kind, (low + high) / 2, low, high)
+    return DelayEstimate(method, "record", kind, (low + high) / 2, low, high)
 
 
 @pytest.fixture(scope="module")
@@ -68,15 +68,6 @@ def test_frequency_response_of_another_plant_does_not_agree(both):
     check = replace(both, estimates=views, agree=False, common=None, conflicts=conflicts)
     assert "no: " in check.report()
     assert "do not agree" in repr(check)
-
-
-def test_the_verdict_is_the_intersection_of_dead_times_below_all_bounds():
-    views = [view("a", 1.0, 3.0), view("b", 2.0, 5.0), view("c", 0.0, 2.5, "upper bound")]
-    assert common_dead_time(views) == ((2.0, 2.5), ())
-    apart = [*views, view("d", 4.0, 5.0)]
-    common, conflicts = common_dead_time(apart)
-    assert common is None
-    assert set(conflicts) == {("a", "d"), ("d", "c")}
 
 
 def test_a_view_in_doubt_is_shown_and_does_not_count():
@@ -129,15 +120,11 @@ def test_the_circuit_without_delay_is_not_given_one_by_a_scan_that_doubts_itself
     assert check.rely_on in {"output error", "FRF fit"}
 
 
-def seen(method, low, high, kind="dead time", doubt=""):
-    return DelayEstimate(method, "record", kind, (low + high) / 2, low, high, doubt)
-
-
 def bound(method, high):
-    return seen(method, 0.0, high, "upper bound")
+    return view(method, 0.0, high, "upper bound")
 
 
-A, B = seen("a", 1.0, 3.0), seen("b", 2.5, 3.5)
+A, B = view("a", 1.0, 3.0), view("b", 2.5, 3.5)
 
 
 def check(views, common=(2.5, 3.0), conflicts=(), dt=0.5, flags=()):
@@ -145,16 +132,16 @@ def check(views, common=(2.5, 3.0), conflicts=(), dt=0.5, flags=()):
 
 
 def test_only_pairs_that_rule_each_other_out_are_in_conflict():
-    late = seen("late", 4.0, 5.0)
+    late = view("late", 4.0, 5.0)
     common, pairs = common_dead_time([A, B, late, bound("p", 2.0), bound("q", 4.5)])
     assert common is None
     assert pairs == (("a", "late"), ("b", "late"), ("b", "p"), ("late", "p"))
     # those that touch do not
-    touching = [A, seen("b", 3.0, 3.5), seen("c", 3.5, 4.0)]
+    touching = [A, view("b", 3.0, 3.5), view("c", 3.5, 4.0)]
     for order in (touching, touching[::-1]):
         assert [set(pair) for pair in common_dead_time(order)[1]] == [{"a", "c"}]
     # the interval of an upper bound begins where nothing is said: only its end counts
-    assert common_dead_time([A, seen("r", 3.5, 6.0, "upper bound")]) == ((1.0, 3.0), ())
+    assert common_dead_time([A, view("r", 3.5, 6.0, "upper bound")]) == ((1.0, 3.0), ())
 
 
 def test_an_estimate_is_rounded_as_its_interval_is():
