@@ -51,15 +51,6 @@ def test_broken_time_is_named_with_its_first_bad_row(kind, match):
         cr.Record(broken(kind), ONES, ONES)
 
 
-def test_small_jitter_is_resampled_on_request():
-    rng = np.random.default_rng(0)
-    time = T + rng.uniform(-0.002, 0.002, T.size)
-    record = cr.Record.resampled(time, 3 * time, np.stack([time, -time]), name="jitter")
-    assert_allclose(record.input, 3 * record.time, atol=1e-12)
-    assert_allclose(record.output[1], -record.time, atol=1e-12)
-    assert record.output.shape[0] == 2
-
-
 @pytest.mark.parametrize(
     ("arguments", "error", "match"),
     [

@@ -127,16 +127,6 @@ def test_an_output_that_is_stuck_does_not_tell():
     assert not bank.estimate().resolved
 
 
-def test_a_delay_beyond_the_candidates_is_not_claimed():
-    record, _ = worn_valve(seconds=6, last=37.0)
-    bank = tracker(max_delay=20, forgetting_time=1.5)
-    bank.track(record)
-    assert not bank.estimate().resolved
-    fixed = tracker(max_delay=20, forgetting_time=1.5, dynamics=False)
-    fixed.track(record)
-    assert "max_delay=20" in fixed.estimate().reason
-
-
 def test_a_tracker_goes_on_after_pickling_as_if_nothing_had_happened():
     record, _ = worn_valve(seconds=4, last=37.0)
     one = tracker(forgetting_time=1.0)

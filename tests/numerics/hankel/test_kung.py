@@ -59,23 +59,6 @@ def test_model_without_hankel_products_is_the_textbook_model():
     assert_allclose(fast[2][0], turn * C[0], atol=1e-14)
 
 
-@given(
-    order=st.integers(1, 8),
-    seed=st.integers(0, 10_000),
-    odd=st.booleans(),
-    channels=st.sampled_from([(1, 1), (2, 3), (3, 1), (1, 2)]),
-    delay=st.integers(0, 50),
-)
-def test_exact_markov_parameters_come_back_square(order, seed, odd, channels, delay):
-    g = np.concatenate(
-        [np.zeros((*channels, delay)), exact(order, *channels, 240 + odd, seed)], axis=2
-    )
-    model = realize_at(g, delay, 239 + odd, order, padded=False)
-    back = markov(model.A, model.B, model.C, g[:, :, delay], 240 + odd)
-    # poles inside 0.97 and far apart: cond of the modes below 1e3
-    assert_allclose(back, g[:, :, delay:], rtol=0, atol=1e-12 * np.abs(g).max())
-
-
 @pytest.mark.parametrize("size", [150, 700])  # below and above the complete decomposition
 @pytest.mark.parametrize("kind", ["zero-phase", "unfiltered"])
 def test_padded_error_is_below_the_bound_and_poles_are_inside_for_every_order(size, kind):

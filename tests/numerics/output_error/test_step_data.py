@@ -19,7 +19,6 @@ from ctrl_realize.numerics.regression.normal_equations import normal_equations
 from ctrl_realize.numerics.separable.profile_ends import profile_limits
 from ctrl_realize.numerics.separable.responses import SampledInput
 from ctrl_realize.numerics.separable.varpro import KnownFactor
-from ctrl_realize.numerics.signals.noise import hum_frequencies, rest_noise, winsorised_sigma
 
 EDGE, DELAY, LAG, DT = 200, 40, 60.0, 0.5
 
@@ -118,36 +117,6 @@ def test_a_slope_before_the_step_has_three_explanations():
     assert len(step_data(white(1000), 1.0 * (k >= 100), 1.0, [(100, 1)]).explanations()) == 1
 
 
-def test_noise_is_found_beside_outliers_drift_and_quantisation():
-    clean = white(2000)
-    assert winsorised_sigma(clean, 0.0) == pytest.approx(1.0, rel=0.05)
-    spoiled = clean.copy()
-    spoiled[::50] += 30
-    assert winsorised_sigma(spoiled, 0.0) == pytest.approx(1.0, rel=0.12)
-    drifting = clean + 0.01 * np.arange(2000)
-    sigma, drift = rest_noise(drifting, drifting, 0.0)
-    assert sigma == pytest.approx(1.0, rel=0.05)
-    assert drift == pytest.approx(0.01, rel=0.05)
-    # a signal that rests on one level: the rounding itself, q / sqrt(12)
-    assert rest_noise(np.zeros(100), np.zeros(300), 0.5)[0] == pytest.approx(0.5 / np.sqrt(12))
-
-
-def test_without_rest_the_third_differences_tell_the_noise():
-    response = 50 * (1 - np.exp(-np.arange(800) / 60)) + white(800)
-    assert rest_noise(response[:0], response, 0.0)[0] == pytest.approx(1.0, rel=0.1)
-
-
-def test_hum_is_found_to_a_small_part_of_a_period_over_the_record():
-    index = np.arange(3840)
-    frequency = 50 / 1280 * 1.0007
-    found = hum_frequencies(2 * np.sin(2 * np.pi * frequency * index + 1) + white(3840))
-    assert len(found) == 1
-    # Cramer-Rao bound of the frequency: sqrt(24) / (2 pi A n^1.5) for unit noise, A = 2
-    assert abs(found[0] - frequency) < 4 * np.sqrt(24) / (2 * np.pi * 2 * 3840**1.5)
-    for seed in range(20):
-        assert hum_frequencies(white(1000, seed)) == []
-
-
 def test_profile_limits_are_where_a_parabola_crosses():
     dead_time = np.linspace(-4, 8, 13)
     low, high = profile_limits(dead_time, ((dead_time - 2) / 1.5) ** 2)
@@ -223,20 +192,6 @@ def test_outliers_count_for_little_with_hubers_loss():
         size[huber] = found.noise
     assert size[False] > 10 * 0.1
     assert size[True] < 1.2 * 0.1
-
-
-@pytest.mark.parametrize("pole", [0.0, 0.9, 0.97])
-def test_slow_noise_is_no_drift(pole):
-    rng = np.random.default_rng(5)
-    found = []
-    for _ in range(40):
-        slow = lfilter([1.0], [1.0, -pole], rng.standard_normal(1200))[200:]
-        found.append(rest_noise(slow[:500], slow, 0.0)[1])
-    # five standard errors: none of 40, where white ones make 10 and 24 of 40 a drift
-    assert not np.any(found)
-    assert rest_noise(slow[:500] + 0.5 * np.arange(500), slow, 0.0)[1] == pytest.approx(
-        0.5, abs=0.05
-    )
 
 
 def test_directions_that_are_not_excited_have_no_row():

@@ -88,6 +88,7 @@ def test_lines_are_found_strongest_first_and_not_more_than_asked_for():
     # resolution 1 / n, improved to a small part of it
     assert_allclose(found, frequencies[:3], atol=0.02 / 4000)
     assert_allclose(hum_frequencies(signal, most=1), frequencies[:1], atol=0.02 / 4000)
+    assert not any(hum_frequencies(white(1000, seed)) for seed in range(20))
 
 
 RADIUS, ANGLE = 0.95, 2 * np.pi / 20
