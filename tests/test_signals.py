@@ -126,6 +126,11 @@ def test_circles_hold_the_truth_as_often_as_they_say(repeats):
         (([1.0], [-1.0]), ">= 0"),
         (([np.nan], [1.0]), "non-finite"),
         (([1.0], [np.inf]), "non-finite"),
+        ((["a", "b"], [1.0, 2.0]), "response holds"),
+        (([[1.0], [1.0, 2.0]], [1.0, 2.0]), "rows have different lengths"),
+        (([1.0, 2.0], ["1", "2"]), "frequency_hz holds"),
+        (([1.0, 2.0], [1.0, 1.7e308]), "frequency_hz is larger"),
+        (([1.0, 1.7e308 + 1.7e308j], [1.0, 2.0]), "response is larger"),
     ],
 )
 def test_unusable_frfs_are_refused(arguments, match):

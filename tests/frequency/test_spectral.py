@@ -213,16 +213,6 @@ def test_inputs_that_move_together_are_refused():
         cr.spectral_frf(two_by_two(5000), period=500)
 
 
-def test_player_arm_has_two_inputs_and_two_coherent_outputs(shared_data):
-    table = np.genfromtxt(
-        shared_data / "cd_player_mimo" / "record.csv", delimiter=",", skip_header=1
-    )
-    record = cr.Record(table[:, 0], table[:, 1:3].T, table[:, 3:].T)
-    frf = cr.spectral_frf(record, segment=128)
-    assert frf.frdata.shape[:2] == (2, 2)
-    assert np.median(frf.coherence) > 0.5
-
-
 def test_motor_bench_resonates_at_77_hz_and_is_still_at_53():
     frf = cr.spectral_frf(cr.datasets.load("motor_bench").record, period=2500)
     assert frf.frequency_hz.tolist() == pytest.approx(list(range(11, 251)))
