@@ -4,8 +4,6 @@ Some come with the package; the others are not part of the project, and a test t
 skipped where they are absent.
 """
 
-from __future__ import annotations
-
 from functools import cache
 from pathlib import Path
 

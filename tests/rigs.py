@@ -4,8 +4,6 @@ R3, R4, R2 and R1 are the lags that the project's accuracy figures refer to: a 2
 8 Hz pair of damping 0.7 (R3), the same with a 30 Hz sensor (R4), 2.2 Hz and 11 Hz (R2), 2 Hz (R1).
 """
 
-from __future__ import annotations
-
 import control as ct
 import numpy as np
 from scipy.signal import lfilter

@@ -1,7 +1,5 @@
 """Cards say in words what is no number, whatever the case."""
 
-from __future__ import annotations
-
 import pickle
 import re
 

@@ -1,7 +1,5 @@
 """A campaign at the command line that is stopped, and what is in the way of its results."""
 
-from __future__ import annotations
-
 import errno
 import hashlib
 import json

@@ -1,7 +1,5 @@
 """Every tuned constant of the fits says where it comes from; every rule has its switch."""
 
-from __future__ import annotations
-
 import ast
 import re
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Data that come with the package: complete, readable, licensed, and as described."""
 
-from __future__ import annotations
-
 import io
 import zipfile
 

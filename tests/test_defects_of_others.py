@@ -3,8 +3,6 @@
 Each test is the defect turned round, so that it would fail if we had it too.
 """
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys

@@ -1,7 +1,5 @@
 """Continuous systems with dead time: closed forms, mpmath, Lambert's W, and a second solver."""
 
-from __future__ import annotations
-
 import pickle
 from math import factorial
 

@@ -1,7 +1,5 @@
 """Laws of systems with delays inside, against augmented matrices and closed forms."""
 
-from __future__ import annotations
-
 import copy
 import pickle
 import tracemalloc

@@ -1,7 +1,5 @@
 """Laws of systems that carry a dead time."""
 
-from __future__ import annotations
-
 import copy
 import pickle
 import tracemalloc

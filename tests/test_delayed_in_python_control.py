@@ -1,7 +1,5 @@
 """Systems with dead time in python-control's hands: products, names, texts, warnings."""
 
-from __future__ import annotations
-
 import copy
 import pickle
 

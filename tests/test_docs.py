@@ -1,7 +1,5 @@
 """The documentation names everything that is public, and names nothing that is not there."""
 
-from __future__ import annotations
-
 import ast
 import importlib.util
 import inspect

@@ -1,7 +1,5 @@
 """What cannot be answered is refused: one table by the class of the error, with its words."""
 
-from __future__ import annotations
-
 import control as ct
 import numpy as np
 import pytest

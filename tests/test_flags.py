@@ -4,8 +4,6 @@ The worlds are those of the honesty benchmark, which counts how often. Flags of
 frequency responses and loops are tested beside them.
 """
 
-from __future__ import annotations
-
 import pytest
 
 from benchmarks.honesty import runs

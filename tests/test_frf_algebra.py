@@ -1,7 +1,5 @@
 """Arithmetic of measured responses: deviations by simulation, coherence and hold by their laws."""
 
-from __future__ import annotations
-
 import contextlib
 
 import control as ct

@@ -1,7 +1,5 @@
 """The lane of coverage and alarms: every flag has its worlds, rates are right, runs go on."""
 
-from __future__ import annotations
-
 import math
 import re
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Where python-control has a word or a habit, records, models and controllers follow it."""
 
-from __future__ import annotations
-
 import control as ct
 import numpy as np
 import pytest

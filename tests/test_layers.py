@@ -1,7 +1,5 @@
 """Folders are floors, their wings are named by topic: imports go strictly down."""
 
-from __future__ import annotations
-
 import ast
 from collections import Counter
 from functools import cache

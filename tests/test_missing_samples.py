@@ -1,7 +1,5 @@
 """Records with missing samples, irregular time stamps and two sample times."""
 
-from __future__ import annotations
-
 import control as ct
 import numpy as np
 import pytest

@@ -1,7 +1,5 @@
 """Notebooks run from top to bottom, and their last cells assert what they claim."""
 
-from __future__ import annotations
-
 import ast
 import os
 import re

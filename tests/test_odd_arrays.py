@@ -1,7 +1,5 @@
 """Masked, complex and non-finite numbers are seen at every public border."""
 
-from __future__ import annotations
-
 import control as ct
 import numpy as np
 import pytest

@@ -1,7 +1,5 @@
 """A test of the tests: they hold the package to its answers, and know nothing of its inside."""
 
-from __future__ import annotations
-
 import ast
 import importlib.util
 import sys

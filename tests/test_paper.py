@@ -1,7 +1,5 @@
 """The paper's numbers, against its printed text."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

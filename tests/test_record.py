@@ -1,7 +1,5 @@
 """Units, parts, tables and the steady state of a record."""
 
-from __future__ import annotations
-
 import pickle
 
 import numpy as np

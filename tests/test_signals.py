@@ -1,7 +1,5 @@
 """Records and responses: what they accept, keep and refuse."""
 
-from __future__ import annotations
-
 import pickle
 
 import control as ct

@@ -1,7 +1,5 @@
 """The paper about the package: its sections, its sources, numbers that are those of the tables."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 

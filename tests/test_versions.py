@@ -1,7 +1,5 @@
 """What pyproject.toml promises of versions is what the matrix tries."""
 
-from __future__ import annotations
-
 import re
 import tomllib
 from importlib import metadata

@@ -1,7 +1,5 @@
 """One vocabulary: public names of attributes and arguments against the glossary."""
 
-from __future__ import annotations
-
 import dataclasses
 import inspect
 import re

@@ -1,7 +1,5 @@
 """How estimates and intervals are written."""
 
-from __future__ import annotations
-
 from hypothesis import given
 from hypothesis import strategies as st
 

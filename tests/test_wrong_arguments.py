@@ -1,7 +1,5 @@
 """What is of the wrong kind is refused in our words, by whatever function it meets first."""
 
-from __future__ import annotations
-
 import control as ct
 import numpy as np
 import pytest

@@ -1,7 +1,5 @@
 """Actuators as arrays, as systems of python-control, and in loops: the same motion each time."""
 
-from __future__ import annotations
-
 import control as ct
 import numpy as np
 import pytest

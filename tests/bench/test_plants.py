@@ -1,7 +1,5 @@
 """Heater, tank and flow loop, against closed forms and against what `identify` finds."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose

@@ -1,7 +1,5 @@
 """The simulated valve, against independent simulations of the same equations."""
 
-from __future__ import annotations
-
 import control as ct
 import numpy as np
 import pytest

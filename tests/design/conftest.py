@@ -1,7 +1,5 @@
 """Plants that the design tests share."""
 
-from __future__ import annotations
-
 import control as ct
 import numpy as np
 import pytest

@@ -1,7 +1,5 @@
 """Conversions against closed forms and arbitrary precision."""
 
-from __future__ import annotations
-
 import math
 
 import control as ct

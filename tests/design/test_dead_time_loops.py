@@ -1,7 +1,5 @@
 """Design functions take systems with dead time inside, and return them."""
 
-from __future__ import annotations
-
 import pickle
 
 import control as ct

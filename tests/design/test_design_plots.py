@@ -1,7 +1,5 @@
 """Design plots: every result draws itself, into given axes too, and marks the right places."""
 
-from __future__ import annotations
-
 import control as ct
 import matplotlib.pyplot as plt
 import numpy as np

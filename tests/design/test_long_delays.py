@@ -1,7 +1,5 @@
 """Controllers with lines of a hundred thousand past outputs, and what cannot be made."""
 
-from __future__ import annotations
-
 import pickle
 
 import control as ct

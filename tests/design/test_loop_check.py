@@ -1,7 +1,5 @@
 """What design functions say of the loop on the model itself."""
 
-from __future__ import annotations
-
 import pickle
 import re
 

@@ -1,7 +1,5 @@
 """Margins against arbitrary precision, closed forms and brute-force closed loops."""
 
-from __future__ import annotations
-
 import control as ct
 import mpmath as mp
 import numpy as np

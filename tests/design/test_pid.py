@@ -1,7 +1,5 @@
 """Tuning rules against their published forms, loops against brute-force simulation."""
 
-from __future__ import annotations
-
 import control as ct
 import numpy as np
 import pytest

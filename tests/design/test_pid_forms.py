@@ -1,7 +1,5 @@
 """PID forms against the equations of their documents, the algorithm against the linear loop."""
 
-from __future__ import annotations
-
 import control as ct
 import numpy as np
 import pytest

@@ -1,7 +1,5 @@
 """Regulator and filter against the big Riccati equations, controllers against eigenvalues."""
 
-from __future__ import annotations
-
 import control as ct
 import numpy as np
 import pytest

@@ -1,7 +1,5 @@
 """The page on python-control says what python-control does: its examples run."""
 
-from __future__ import annotations
-
 import re
 import warnings
 from pathlib import Path

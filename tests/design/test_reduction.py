@@ -1,7 +1,5 @@
 """Process models and reductions against published examples and closed forms."""
 
-from __future__ import annotations
-
 import control as ct
 import numpy as np
 import pytest

@@ -1,7 +1,5 @@
 """Uncertainty bounds against the plants that they must hold, and small gain against eigenvalues."""
 
-from __future__ import annotations
-
 import control as ct
 import numpy as np
 import pytest

@@ -1,7 +1,5 @@
 """Smith predictors against feedback of the whole models, and in brute-force simulation."""
 
-from __future__ import annotations
-
 import control as ct
 import numpy as np
 import pytest

@@ -1,7 +1,5 @@
 """Exported code is compiled or parsed, run, and compared with the simulation."""
 
-from __future__ import annotations
-
 import ctypes
 import re
 import shutil

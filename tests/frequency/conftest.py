@@ -1,7 +1,5 @@
 """One stepped sine through the simulated valve, which several files look at."""
 
-from __future__ import annotations
-
 import pytest
 
 import ctrl_realize as cr

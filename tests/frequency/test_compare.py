@@ -1,7 +1,5 @@
 """Model against measured frequency response."""
 
-from __future__ import annotations
-
 import control as ct
 import numpy as np
 import pytest

@@ -1,7 +1,5 @@
 """Transfer function with dead time from a frequency response."""
 
-from __future__ import annotations
-
 import warnings
 from functools import cache
 

@@ -1,7 +1,5 @@
 """Unit-pulse response from a frequency response."""
 
-from __future__ import annotations
-
 import control as ct
 import numpy as np
 import pytest

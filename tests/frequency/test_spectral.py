@@ -1,7 +1,5 @@
 """Frequency responses from noise and periodic records."""
 
-from __future__ import annotations
-
 import pickle
 
 import control as ct

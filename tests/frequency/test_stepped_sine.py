@@ -1,7 +1,5 @@
 """Frequency response from stepped sines."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose

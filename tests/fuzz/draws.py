@@ -1,7 +1,5 @@
 """Numbers, texts, bytes and arrays of every kind, drawn from a `random.Random`."""
 
-from __future__ import annotations
-
 import struct
 from collections.abc import Callable, Sequence
 from random import Random

@@ -15,8 +15,6 @@ FUZZ_LOG      file to which each target adds a line: cases, ends, failures, time
 Ctrl-C ends a target with its line in the log.
 """
 
-from __future__ import annotations
-
 import functools
 import inspect
 import json

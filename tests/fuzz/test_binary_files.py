@@ -1,7 +1,5 @@
 """Damaged .npz, .npy, .mat and Parquet files."""
 
-from __future__ import annotations
-
 import io
 from importlib.util import find_spec
 

@@ -1,7 +1,5 @@
 """Campaigns of good, corrupt and odd records, stopped anywhere, with a store that was damaged."""
 
-from __future__ import annotations
-
 import contextlib
 import pickle
 import warnings

@@ -1,7 +1,5 @@
 """The command line with files and arguments that nobody meant."""
 
-from __future__ import annotations
-
 import contextlib
 import csv
 import io

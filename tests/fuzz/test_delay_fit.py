@@ -4,8 +4,6 @@ A step at order 1 takes 20 ms, a random input five times, the choice of the orde
 so these are drawn more seldom.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 import ctrl_realize as cr

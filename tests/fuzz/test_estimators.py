@@ -1,7 +1,5 @@
 """Impulse responses and records of every size, shape and scale, through the estimators."""
 
-from __future__ import annotations
-
 import numpy as np
 
 import ctrl_realize as cr

@@ -1,7 +1,5 @@
 """Cases that the fuzz lane has found, each as a test of its own with what was wrong."""
 
-from __future__ import annotations
-
 import functools
 import os
 

@@ -1,7 +1,5 @@
 """Frequency responses of every kind, through what is made of them."""
 
-from __future__ import annotations
-
 import control as ct
 import numpy as np
 

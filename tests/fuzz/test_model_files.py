@@ -1,7 +1,5 @@
 """Model files with bytes changed, and with values changed by somebody who can sign them."""
 
-from __future__ import annotations
-
 import copy
 import json
 

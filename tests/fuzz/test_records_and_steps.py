@@ -1,7 +1,5 @@
 """Arrays that are no record, and records that are no step."""
 
-from __future__ import annotations
-
 import numpy as np
 
 import ctrl_realize as cr

@@ -1,7 +1,5 @@
 """Text tables, from nearly right to nonsense."""
 
-from __future__ import annotations
-
 import csv
 import io
 import re

@@ -1,7 +1,5 @@
 """Samples of every kind, streamed into the delay tracker."""
 
-from __future__ import annotations
-
 import control as ct
 import numpy as np
 

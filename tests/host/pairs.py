@@ -7,8 +7,6 @@ which hang on them. Those are compared without a delay, or have oracles of their
 `tests/test_delayed.py` and `tests/design`.
 """
 
-from __future__ import annotations
-
 import warnings
 from typing import Any
 

@@ -3,8 +3,6 @@
 `gangof4_response` is left out: python-control 0.10.2 evaluates discrete systems at jw there.
 """
 
-from __future__ import annotations
-
 import control as ct
 import numpy as np
 import pytest

@@ -1,7 +1,5 @@
 """Values, poles, algebra, indexing, conversion: the answers of `StateSpace`, for any delay."""
 
-from __future__ import annotations
-
 import copy
 
 import control as ct

@@ -1,7 +1,5 @@
 """Fits that several files look at; results are frozen."""
 
-from __future__ import annotations
-
 import pytest
 
 import ctrl_realize as cr

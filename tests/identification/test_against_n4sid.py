@@ -1,7 +1,5 @@
 """Fit on the half of a measured record that was not used, beside N4SID of the package nfoursid."""
 
-from __future__ import annotations
-
 import control as ct
 import numpy as np
 import pandas as pd

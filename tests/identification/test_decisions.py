@@ -1,7 +1,5 @@
 """What an estimate decides by itself, each decision on simulated data whose truth is known."""
 
-from __future__ import annotations
-
 import control as ct
 import numpy as np
 import pytest

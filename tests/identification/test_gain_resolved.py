@@ -1,7 +1,5 @@
 """A gain and a total delay are stated as well as the record tells them, and designs heed it."""
 
-from __future__ import annotations
-
 import warnings
 
 import numpy as np

@@ -1,7 +1,5 @@
 """One call from record to model."""
 
-from __future__ import annotations
-
 import pickle
 
 import control as ct

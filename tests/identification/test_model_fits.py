@@ -1,7 +1,5 @@
 """What the results of all estimators have in common, and that a model file keeps it."""
 
-from __future__ import annotations
-
 import pickle
 
 import control as ct

@@ -4,8 +4,6 @@ One unit in the last place of every sample is what another processor, or another
 does to the same record.
 """
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

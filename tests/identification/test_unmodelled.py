@@ -3,8 +3,6 @@
 One record of a family each, beside those of test_flags; `benchmarks.worlds` counts all of them.
 """
 
-from __future__ import annotations
-
 from functools import cache
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Files as plants and laboratories give them, made from plants whose truth is known."""
 
-from __future__ import annotations
-
 import datetime
 from collections.abc import Callable
 from dataclasses import dataclass, field

@@ -1,7 +1,5 @@
 """A campaign that is stopped goes on where it was."""
 
-from __future__ import annotations
-
 import functools
 import hashlib
 import json

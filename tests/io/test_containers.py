@@ -1,7 +1,5 @@
 """Records in .npz, .npy, .mat and Parquet files."""
 
-from __future__ import annotations
-
 import datetime
 import inspect
 import pickle

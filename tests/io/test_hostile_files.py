@@ -1,7 +1,5 @@
 """Files that nobody meant well: every one ends in one of our errors, soon and without memory."""
 
-from __future__ import annotations
-
 import io
 import os
 import socket

@@ -1,7 +1,5 @@
 """Model files of systems with internal delays."""
 
-from __future__ import annotations
-
 import json
 
 import control as ct

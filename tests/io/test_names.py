@@ -1,7 +1,5 @@
 """Names and units of every printable character, on their way from a file to a report."""
 
-from __future__ import annotations
-
 import csv
 import dataclasses
 import html

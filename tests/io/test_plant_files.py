@@ -1,7 +1,5 @@
 """From the files of plants and laboratories to stable loops, and what is asked on the way."""
 
-from __future__ import annotations
-
 import inspect
 import json
 import shlex

@@ -1,7 +1,5 @@
 """Text files as they come from loggers, scopes, spreadsheets and other programs."""
 
-from __future__ import annotations
-
 import csv
 import math
 import re

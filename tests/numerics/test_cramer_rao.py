@@ -1,7 +1,5 @@
 """What can be known about a dead time: bound and identifiability."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Trimmed statistics, and threads of the BLAS."""
 
-from __future__ import annotations
-
 import threading
 
 import control as ct

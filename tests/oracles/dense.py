@@ -3,8 +3,6 @@
 Slow on purpose; the fast routes of the toolbox are tested against it.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 

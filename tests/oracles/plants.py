@@ -1,7 +1,5 @@
 """Random stable plants and noisy responses, for comparisons of fast and dense routes."""
 
-from __future__ import annotations
-
 import numpy as np
 from scipy.signal import butter, sosfilt, sosfiltfilt
 

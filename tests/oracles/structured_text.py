@@ -1,7 +1,5 @@
 """Structured Text (IEC 61131-3) parsed by blark and run over its syntax tree."""
 
-from __future__ import annotations
-
 import operator
 
 from blark import transform as ast

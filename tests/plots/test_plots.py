@@ -1,7 +1,5 @@
 """Plots show what results hold, to scale and with units."""
 
-from __future__ import annotations
-
 import control as ct
 import matplotlib as mpl
 import matplotlib.pyplot as plt

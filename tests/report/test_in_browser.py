@@ -1,7 +1,5 @@
 """Reports in a real browser: desktop, phone and dark."""
 
-from __future__ import annotations
-
 import importlib.util
 import sys
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Reports: what they say first, what they must not leave out, and that they stay whole."""
 
-from __future__ import annotations
-
 import base64
 import hashlib
 import re

@@ -1,7 +1,5 @@
 """Figures on a page: thin, apart from each other, and in the page's colours."""
 
-from __future__ import annotations
-
 import re
 from xml.etree import ElementTree
 

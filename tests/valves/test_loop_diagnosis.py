@@ -1,7 +1,5 @@
 """Oscillating loops: indices in closed form, and verdicts on simulated and measured loops."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

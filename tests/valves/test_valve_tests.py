@@ -1,7 +1,5 @@
 """Valve tests on simulated valves whose metrics are known in closed form."""
 
-from __future__ import annotations
-
 import pickle
 from pathlib import Path
 

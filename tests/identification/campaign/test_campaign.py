@@ -1,7 +1,5 @@
 """Many records: table, statistics, final model, and one bad record among them."""
 
-from __future__ import annotations
-
 import functools
 import os
 import pickle

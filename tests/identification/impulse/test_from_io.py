@@ -1,7 +1,5 @@
 """Pulse responses from any input, and the regressions behind them against plain least squares."""
 
-from __future__ import annotations
-
 import control as ct
 import numpy as np
 import pytest

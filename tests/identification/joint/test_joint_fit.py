@@ -1,7 +1,5 @@
 """Time records and a frequency response together: simulated plants with known truth."""
 
-from __future__ import annotations
-
 import pickle
 import re
 from functools import cache

@@ -1,7 +1,5 @@
 """Output-error fits of records whose input is no step, one or several."""
 
-from __future__ import annotations
-
 import control as ct
 import numpy as np
 import pytest

@@ -1,7 +1,5 @@
 """How much of a record a fit follows, and why not more."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

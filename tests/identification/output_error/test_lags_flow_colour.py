@@ -1,7 +1,5 @@
 """Output-error fits of many lags, dispersing flows and coloured noise. Simulated."""
 
-from __future__ import annotations
-
 import control as ct
 import numpy as np
 import pytest

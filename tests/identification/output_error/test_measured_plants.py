@@ -4,8 +4,6 @@ Bands: what the sources state or the first motion allows (README of the data). T
 by a sample or two themselves.
 """
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Several records of one plant with common dynamics and a gain for each."""
 
-from __future__ import annotations
-
 import functools
 import pickle
 from pathlib import Path

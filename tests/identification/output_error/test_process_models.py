@@ -1,7 +1,5 @@
 """Process models by name, with fixed and bounded parameters."""
 
-from __future__ import annotations
-
 import control as ct
 import numpy as np
 import pytest

@@ -1,7 +1,5 @@
 """Gain, lags and dead time of a fit with their errors, as a table, in one line, in files."""
 
-from __future__ import annotations
-
 import re
 
 import control as ct

@@ -1,7 +1,5 @@
 """Several step records of one plant: mean, scatter, trend, outliers, differences."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import control as ct

@@ -1,7 +1,5 @@
 """Dead times of a few samples, where noise at rest, rounding or friction decide on the estimate."""
 
-from __future__ import annotations
-
 import control as ct
 import numpy as np
 import pytest

@@ -1,7 +1,5 @@
 """fit_output_error: right on simulated plants, honest where the model is wrong."""
 
-from __future__ import annotations
-
 import control as ct
 import numpy as np
 import pytest

@@ -1,7 +1,5 @@
 """estimate_delay: the dense answers, the conventions and the flags."""
 
-from __future__ import annotations
-
 import control as ct
 import numpy as np
 import pytest

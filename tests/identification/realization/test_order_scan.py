@@ -1,7 +1,5 @@
 """scan_orders: the surface, and the order that it suggests."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import control as ct

@@ -1,7 +1,5 @@
 """realize: exact data come back exactly, in python-control's own hands as well."""
 
-from __future__ import annotations
-
 import control as ct
 import numpy as np
 import pytest

@@ -1,5 +1,3 @@
-from __future__ import annotations
-
 import control as ct
 import numpy as np
 import pytest

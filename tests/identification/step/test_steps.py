@@ -1,7 +1,5 @@
 """From a measured step to an impulse response."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given

@@ -1,7 +1,5 @@
 """Drawing the noise again: seeded, parallel, and blind to bias."""
 
-from __future__ import annotations
-
 from functools import partial
 
 import control as ct

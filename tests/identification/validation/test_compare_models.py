@@ -1,7 +1,5 @@
 """Several models on one record that they were not fitted to."""
 
-from __future__ import annotations
-
 import control as ct
 import numpy as np
 import pytest

@@ -1,7 +1,5 @@
 """Ways to find one dead time, held against each other: simulated data, and views by hand."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Residuals of models that are right and wrong, and simulation from an unknown start."""
 
-from __future__ import annotations
-
 import control as ct
 import numpy as np
 import pytest

@@ -1,7 +1,5 @@
 """Laws of the elements of actuators, with closed forms and one model against another."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose

@@ -1,7 +1,5 @@
 """Hankel matrices: dense, by FFT, their norm, and leading eigenpairs."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose

@@ -1,7 +1,5 @@
 """State-space matrices from Hankel pairs; responses and misfits of many models at once."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given

@@ -1,7 +1,5 @@
 """Points of a frequency response as rows of a separable problem, against the transfer function."""
 
-from __future__ import annotations
-
 import control as ct
 import numpy as np
 import pytest

@@ -1,7 +1,5 @@
 """Crossings and closest points of curves; loops from frequency responses alone."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Ends of intervals, and minima that profiles lead to."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Decisions within a thousandth of their threshold are reported, others are not."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

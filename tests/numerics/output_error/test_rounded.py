@@ -1,7 +1,5 @@
 """Likelihood of rounded samples."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose

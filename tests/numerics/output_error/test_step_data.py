@@ -1,7 +1,5 @@
 """From the record of a step to least-squares problems; long records condensed."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose

@@ -1,7 +1,5 @@
 """Transfer functions with dead time, least-squares sines, spectral sums."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given

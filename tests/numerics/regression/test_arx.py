@@ -1,7 +1,5 @@
 """Regressions on lagged samples: ARX, their normal equations, kernels."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose

@@ -1,7 +1,5 @@
 """Chains of nearly equal lags, and dispersing flows."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose

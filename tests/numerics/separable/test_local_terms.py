@@ -1,7 +1,5 @@
 """Level, drift and initial state of every stretch, noise and criterion of its fit."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

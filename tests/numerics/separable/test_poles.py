@@ -1,7 +1,5 @@
 """Poles and their derivatives, structures made of them, responses of their modes."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given

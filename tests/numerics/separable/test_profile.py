@@ -1,7 +1,5 @@
 """Misfit over a dead time that is held, and minima that are found to the bottom."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

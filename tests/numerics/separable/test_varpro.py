@@ -1,7 +1,5 @@
 """The separable fit: responses, derivatives, optimum; batches of starts against closed forms."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose

@@ -1,7 +1,5 @@
 """Edges of an input, its moves, and where in a long record it moves."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given

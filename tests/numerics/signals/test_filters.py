@@ -1,7 +1,5 @@
 """Filters, means over bins, and correlation, against their definitions."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose

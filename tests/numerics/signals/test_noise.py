@@ -1,7 +1,5 @@
 """Noise at rest: its level, steps, colour and lines; coloured noise made white."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose

@@ -1,7 +1,5 @@
 """What an output does before its step, and when it first moves."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given

@@ -1,7 +1,5 @@
 """Dead times in samples, delays of channels, half rule, step responses in closed form."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given

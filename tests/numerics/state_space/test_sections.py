@@ -1,7 +1,5 @@
 """Responses of state-space models and of sums of sections, and their fit."""
 
-from __future__ import annotations
-
 import control as ct
 import numpy as np
 import pytest

@@ -1,7 +1,5 @@
 """Outputs that repeat themselves while a plant moves, or stop at a limit."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

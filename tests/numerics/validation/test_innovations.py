@@ -1,7 +1,5 @@
 """Feedback, nonlinearity, change and repetition, seen in what a model leaves over."""
 
-from __future__ import annotations
-
 import control as ct
 import numpy as np
 import pytest

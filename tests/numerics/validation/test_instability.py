@@ -1,7 +1,5 @@
 """An unstable plant in a loop is told from stable ones by how its output predicts itself."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy.signal import lfilter
