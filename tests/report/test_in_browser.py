@@ -1,18 +1,10 @@
 """Reports in a real browser: desktop, phone and dark."""
 
-import importlib.util
-import sys
-from pathlib import Path
-
 import pytest
 
 import ctrl_realize as cr
 from ctrl_realize import report
-
-_spec = importlib.util.spec_from_file_location("browser", Path(__file__).with_name("browser.py"))
-browser = importlib.util.module_from_spec(_spec)
-sys.modules["browser"] = browser
-_spec.loader.exec_module(browser)
+from tests import browser
 
 MEASURE = """
 const wide = [...document.querySelectorAll('main > *, figure, svg.plot, .verdict, pre')]
@@ -86,7 +78,6 @@ const box = svg.getBoundingClientRect();
 return [Math.round(box.left + box.width / 2), Math.round(box.top + box.height / 2)];
 """
 READ = "return document.querySelector('.tools output').textContent;"
-ARROW_RIGHT = "\ue014"
 
 
 @pytest.mark.browser
@@ -100,7 +91,7 @@ def test_figures_zoom_by_button_key_and_hand_and_are_whole_on_paper(tmp_path, pa
         near = window.run(VIEW)
         assert near[2] == pytest.approx(whole[2] / 1.5)
         assert near[3] / near[2] == pytest.approx(whole[3] / whole[2])
-        window.press(ARROW_RIGHT)  # the button that was clicked has the focus
+        window.press("ArrowRight")  # the button that was clicked has the focus
         assert window.run(VIEW)[0] == pytest.approx(near[0] + near[2] / 8)
         before = window.run(VIEW)
         x, y = window.run(MIDDLE)

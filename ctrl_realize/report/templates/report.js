@@ -51,6 +51,7 @@ for (const svg of document.querySelectorAll("svg.plot")) {
     ArrowLeft: () => pan(-view[2] / 8, 0), ArrowRight: () => pan(view[2] / 8, 0),
     ArrowUp: () => pan(0, -view[3] / 8), ArrowDown: () => pan(0, view[3] / 8),
   };
+  figure.tabIndex = -1; // a click on the drawing leaves the keys with this figure
   figure.addEventListener("keydown", (event) => {
     const act = keys[event.key];
     const page = event.ctrlKey || event.metaKey || event.altKey;
