@@ -11,10 +11,13 @@ import numpy as np
 import pytest
 
 import ctrl_realize as cr
+from ctrl_realize.cli import main
 
 ROOT = Path(__file__).resolve().parents[1]
 DOCS = ROOT / "docs"
 PAGES = sorted(path for path in DOCS.rglob("*.md") if not {"_build", "generated"} & set(path.parts))
+OUTSIDE = sorted(ROOT.glob("*.md"))
+"""README, CONTRIBUTING and the like, which are no pages of the site."""
 
 
 def public_names():
@@ -58,8 +61,8 @@ def test_every_entry_can_be_imported_and_has_a_docstring(reference):
             assert inspect.getdoc(value), entry
 
 
-@pytest.mark.parametrize("page", PAGES, ids=lambda path: str(path.relative_to(DOCS)))
-def test_links_inside_the_site_lead_somewhere(page: Path, reference):
+@pytest.mark.parametrize("page", [*PAGES, *OUTSIDE], ids=lambda path: str(path.relative_to(ROOT)))
+def test_links_inside_the_project_lead_somewhere(page: Path, reference):
     text = re.sub(r"```.*?```", "", page.read_text(), flags=re.S)
     for target in re.findall(r"\]\(([^)#\s]+)(?:#[\w-]+)?\)", text):
         if "://" in target or target.startswith("mailto:"):
@@ -112,6 +115,44 @@ def test_sample_files_are_those_that_the_program_beside_them_writes(tmp_path):
             < 1.5 * 10.0 ** -len(re.split("[.,]", a)[1])
             for a, b in pairs
         )
+
+
+def test_code_on_pages_is_python_and_uses_names_that_exist():
+    """Cells run when the site is built; other blocks run nowhere."""
+    unknown, blocks = [], 0
+    for page in [*PAGES, *OUTSIDE]:
+        fences = r"^ *```(?:\{code-cell\} ?i?python3?|python)\n(.*?)^ *```$"
+        found = re.findall(fences, page.read_text(), re.S | re.M)
+        blocks += len(found)
+        for block in found:
+            tree = ast.parse(re.sub(r"\A(?::[\w-]+:.*\n)+", "", block))
+            chains = (ast.unparse(n) for n in ast.walk(tree) if isinstance(n, ast.Attribute))
+            for chain in filter(re.compile(r"cr(\.\w+)+").fullmatch, chains):
+                value: object = cr
+                for part in chain.split(".")[1:]:
+                    if not hasattr(value, part):
+                        unknown.append((page.name, chain))
+                        break
+                    value = getattr(value, part)
+    assert unknown == []
+    assert blocks > 100
+
+
+def test_command_lines_on_pages_use_options_that_exist(capsys):
+    lines = [
+        line
+        for page in [*PAGES, *OUTSIDE]
+        for line in page.read_text().replace("\\\n", " ").splitlines()
+        if re.match(r"(\$ )?ctrl-realize [a-z]", line)
+    ]
+    assert len(lines) > 5
+    for line in lines:
+        command, *_ = line.removeprefix("$ ").split()[1:]
+        assert main([command, "--help"]) == 0
+        offered = set(re.findall(r"(?<![\w-])--?[a-z][\w-]*", capsys.readouterr().out))
+        words = re.sub(r"\$\(.*?\)", "", line.partition("  #")[0])
+        used = set(re.findall(r"(?<!\S)--?[a-z][\w-]*", words))
+        assert used <= offered, line
 
 
 def test_glossary_terms_that_pages_use_are_defined():
