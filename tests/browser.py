@@ -1,7 +1,5 @@
 """A headless Chromium without any other program: the DevTools protocol through two pipes."""
 
-from __future__ import annotations
-
 import json
 import os
 import select
@@ -9,7 +7,7 @@ import shutil
 import subprocess
 import time
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 NAMES = ("chromium", "chromium-browser", "google-chrome", "chrome")
 PATIENCE = 60.0
@@ -37,7 +35,7 @@ class Browser:
         self._number, self._rest, self._session = 0, b"", ""
         self._events: list[dict[str, Any]] = []
 
-    def __enter__(self) -> Browser:
+    def __enter__(self) -> Self:
         # Chromium reads from descriptor 3 and writes to 4.
         pipes = 'exec "$@" 3<&0 4>&1 0</dev/null 1>/dev/null 2>/dev/null'
         arguments = [

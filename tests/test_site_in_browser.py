@@ -1,7 +1,5 @@
 """Pages of the site in a real browser, as wide as a desk and as a telephone."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys
