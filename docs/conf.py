@@ -19,6 +19,7 @@ import flag_table  # noqa: E402
 import gallery_pages  # noqa: E402
 import measured_numbers  # noqa: E402
 import public_names  # noqa: E402
+import related  # noqa: E402
 import student_copy  # noqa: E402
 
 import ctrl_realize  # noqa: E402
@@ -157,6 +158,7 @@ html_math_renderer = "mathml"
 # -- API reference -------------------------------------------------------------------------------
 
 autosummary_generate = True
+autosummary_context = {"related": related.section}
 autosummary_imported_members = True
 autodoc_typehints = "none"
 autodoc_member_order = "bysource"

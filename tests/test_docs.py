@@ -20,8 +20,8 @@ OUTSIDE = sorted(ROOT.glob("*.md"))
 """README, CONTRIBUTING and the like, which are no pages of the site."""
 
 
-def public_names():
-    spec = importlib.util.spec_from_file_location("public_names", DOCS / "_ext" / "public_names.py")
+def extension(name: str):
+    spec = importlib.util.spec_from_file_location(name, DOCS / "_ext" / f"{name}.py")
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     return module
@@ -29,7 +29,7 @@ def public_names():
 
 @pytest.fixture(scope="module")
 def reference() -> dict[str, str]:
-    return public_names().pages()
+    return extension("public_names").pages()
 
 
 def listed(reference: dict[str, str]) -> set[str]:
@@ -98,10 +98,8 @@ def test_cells_that_a_reader_sees_check_nothing_and_invent_no_data(page: Path):
             assert "default_rng" not in code, code
 
 
-def test_sample_files_are_those_that_the_program_beside_them_writes(tmp_path):
-    spec = importlib.util.spec_from_file_location("samples", DOCS / "_ext" / "sample_files.py")
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
+def test_sample_files_are_those_that_the_program_beside_them_writes():
+    module = extension("sample_files")
     written = dict(module.files())
     assert set(written) == {path.name for path in module.STORED.iterdir()}
     for name, text in written.items():
@@ -191,10 +189,18 @@ def test_every_public_name_shows_how_it_is_used(reference):
     assert not silent
 
 
+def test_every_entry_leads_to_a_page_of_the_guide(reference):
+    related = extension("related")
+    chosen = {entry: related.pages(entry) for entry in listed(reference)}
+    assert not [entry for entry, pages in chosen.items() if not pages]
+    pages = {page for several in related.PAGES.values() for page in several}
+    assert not [page for page in pages if not (DOCS / f"{page}.md").exists()]
+    # no pattern is behind one that takes all its names
+    assert set(chosen.values()) == set(related.PAGES.values())
+
+
 def test_every_flag_has_its_words_on_the_page_of_flags():
-    spec = importlib.util.spec_from_file_location("flag_table", DOCS / "_ext" / "flag_table.py")
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
+    module = extension("flag_table")
     listed_flags = module.flags(Path(cr.__file__).parent)
     assert len({code for code, _, _ in listed_flags}) > 40
     assert [code for code, _, words in listed_flags if words.strip("… :") == ""] == []
@@ -205,9 +211,7 @@ def test_every_flag_has_its_words_on_the_page_of_flags():
 
 def test_docstrings_of_everything_public_are_those_of_numpydoc(reference):
     validate = pytest.importorskip("numpydoc.validate", reason="numpydoc checks them").validate
-    spec = importlib.util.spec_from_file_location("rules", DOCS / "_ext" / "docstring_rules.py")
-    rules = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(rules)
+    rules = extension("docstring_rules")
     faults = []
     for entry in sorted(listed(reference)):
         module, _, name = entry.rpartition(".")

@@ -3,6 +3,7 @@
 import ast
 import os
 import re
+import sys
 import warnings
 from pathlib import Path
 
@@ -46,6 +47,8 @@ def run(source: str, scope: dict) -> None:
 def test_notebook_runs_and_its_numbers_hold(path: Path, monkeypatch: pytest.MonkeyPatch):
     """In this process; the first one runs in a kernel below, and all do where they are stored."""
     monkeypatch.chdir(path.parent)
+    # without sliders, what they would move is drawn once, and an error in it is one here
+    monkeypatch.setitem(sys.modules, "ipywidgets", None)
     scope: dict = {"__name__": "__main__"}
     with mpl.rc_context(), warnings.catch_warnings():
         warnings.simplefilter("default")  # as in a kernel
