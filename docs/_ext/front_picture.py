@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 import ctrl_realize as cr
 
-WIDTH, HEIGHT = 640, 300
+WIDTH, HEIGHT = 640, 215
 LEFT, BOTTOM, TOP, RIGHT = 52, 40, 12, 12
 
 
@@ -38,7 +38,7 @@ def candidates(dead_times: NDArray[np.float64]) -> Candidates:
     record = heater.step_record(rng=3)
     sys = cr.identify(record)
     at = int(np.flatnonzero(np.diff(record.input))[0]) + 1
-    window = slice(at - 20, at + 130)
+    window = slice(at - 15, at + 70)
     curves, misses = [], []
     for dead_time in dead_times:
         structures = [
@@ -82,7 +82,7 @@ def html(found: Candidates) -> str:
     best = int(np.argmin(np.abs(np.array(found.dead_times) - found.estimate)))
     begin, end = found.interval
     dots = "".join(
-        f'<circle cx="{x(t):.1f}" cy="{y(v):.1f}" r="2"/>'
+        f'<circle cx="{x(t):.1f}" cy="{y(v):.1f}" r="2.2"/>'
         for t, v in zip(found.time, found.measured, strict=True)
     )
     ticks = "".join(
@@ -121,8 +121,8 @@ def html(found: Candidates) -> str:
 </svg>
 <label hidden>Assume another dead time:
 <input type="range" min="0" max="{len(found.dead_times) - 1}" value="{best}"></label>
-<figcaption>Simulated heater (dots), identified model (line), dead time <b>{found.estimate:.1f}
-s</b> with its 95 % interval {begin:.1f} to {end:.1f} s (band); the true one is {found.truth:g} s.
+<figcaption>Simulated heater (dots; true dead time {found.truth:g} s), identified model (line), its
+dead time <b>{found.estimate:.1f} s</b>, 95 % interval {begin:.1f} to {end:.1f} s (band).
 <span class="said"></span></figcaption>
 <script type="application/json">{json.dumps(stored)}</script>
 </figure>"""
