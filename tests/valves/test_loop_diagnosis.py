@@ -45,15 +45,15 @@ def test_the_moving_average_over_a_period_takes_drift_and_leaves_the_cycle():
 @pytest.mark.parametrize("kind", ["white", "lag", "walk"])
 def test_noise_is_rarely_taken_for_an_oscillation(kind):
     said = []
-    for seed in range(40):
+    for seed in range(20):
         noise = np.random.default_rng(seed).standard_normal(1500)
         if kind == "lag":
             for k in range(1, noise.size):
                 noise[k] += 0.9 * noise[k - 1]
         value = np.cumsum(noise) if kind == "walk" else noise
         said.append(diagnosed(np.roll(value, 3), value).oscillates is True)
-    # binomial with 10 %: more than 9 of 40 with a probability below 1 %
-    assert sum(said) <= 9
+    # binomial with 10 %: more than 6 of 20 with a probability below 1 %
+    assert sum(said) <= 6
 
 
 @pytest.mark.parametrize("degrees", [0.0, 20.0, 45.0, 70.0, 90.0])
@@ -94,6 +94,22 @@ def test_movements_of_a_valve_that_sticks_half_of_the_time():
     assert movement_indices(op, op, 64.0) == pytest.approx((0.0, 0.0), abs=0.03)
 
 
+@pytest.mark.parametrize("process", ["flow", "integrating"])
+def test_the_fit_finds_the_stiction_of_a_simulated_loop_and_none_in_a_linear_one(process):
+    sticking = cr.bench.valve_loop(cr.actuators.KanoStiction(5, 2), process=process, noise=0.05)
+    period = {"flow": 15.0, "integrating": 100.0}[process]
+    linear = cr.bench.valve_loop(process=process, oscillation=(2.0, period), noise=0.05)
+    for loop, truth in ((sticking, 5.0), (linear, 0.0)):
+        record = loop.simulate(60 * period, rng=1).record
+        fit = cr.valves.diagnose_loop(record, process=process).stiction_fit
+        # of the swing: a linear loop has a stem that could stick by as much unseen
+        assert abs(fit.S - truth) < 0.1 * truth + 0.25 * (truth == 0) * fit.swing
+        assert fit.S_range[0] <= fit.S <= fit.S_range[1]
+        assert (fit.significance > 2 and fit.error < 0.7 * fit.linear_error) == (truth > 0)
+        assert fit.gain > 0
+    assert cr.valves.diagnose_loop(-record.input, record.output, dt=1.0).stiction_fit.gain < 0
+
+
 def worlds():
     sticky = cr.actuators.KanoStiction
     kinds = {"flow": (1500.0, 15.0), "first-order": (4000.0, 60.0), "integrating": (6000.0, 100.0)}
@@ -102,7 +118,7 @@ def worlds():
         for S, J in ((5, 2), (8, 4)):
             yield STICKS, process, duration, {"actuator": sticky(S, J), "noise": 0.1}
         yield NOT_SO, process, duration, {"oscillation": (2.0, period), "noise": 0.1}
-        if process != "flow":  # six samples in a cycle
+        if process != "flow":  # there six samples in a cycle
             tight = {"tightness": TIGHT * plain.gain_margin, "noise": 0.3}
             yield NOT_SO, process, duration, tight
         yield "no oscillation", process, duration, {"noise": 0.3}
@@ -115,11 +131,12 @@ def test_the_cause_of_a_simulated_oscillation_is_never_told_wrongly(
     loop = cr.bench.valve_loop(process=process, **options)
     kind = "self-regulating" if process == "first-order" else process
     said = []
-    for seed in range(3):
+    for seed in range(2):
         record = loop.simulate(duration, rng=seed).record
         said.append(cr.valves.diagnose_loop(record, process=kind).verdict)
     assert set(said) <= {truth, "cannot tell"}
-    assert said.count(truth) >= 2 or "tightness" in options
+    # of a level at the limit of stability only the fit says that it does not stick
+    assert said.count(truth) >= 1 or (process == "integrating" and "tightness" in options)
 
 
 def test_units_and_directions_do_not_matter():

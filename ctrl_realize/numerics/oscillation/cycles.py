@@ -85,8 +85,9 @@ def smoothed(signal: FloatArray, period: float, part: float) -> FloatArray:
 def find_cycles(signal: FloatArray) -> Cycles | None:
     """Measure the strongest oscillation of `signal` (N,); None if nothing can be measured.
 
-    The period is first that of the largest peak of the periodogram, times the frequency, between
-    two samples and a quarter of the record; then that of the autocorrelation function.
+    Tried are the periods of the largest peaks of the periodogram and of the periodogram times the
+    frequency, between two samples and a quarter of the record: the first may be drift, the second
+    noise. The one whose autocorrelation function decays slower is taken.
     """
     n = signal.size
     if n < 4 * SHORTEST_PERIOD or np.ptp(signal) == 0:
@@ -95,26 +96,30 @@ def find_cycles(signal: FloatArray) -> Cycles | None:
     inside = frequency >= FEWEST_CYCLES / n
     if not inside.any() or not power[inside].any():
         return None
-    # drift has a power of 1 / f^2: the peak is looked for above it
-    level = uniform_filter1d(power * frequency, 3)
-    period = 1 / float(frequency[inside][np.argmax(level[inside])])
-    found = None
+    found = []
+    for weight in (frequency, np.ones_like(frequency)):
+        level = uniform_filter1d(power * weight, 3)[inside]
+        cycles = _cycles(signal, 1 / float(frequency[inside][np.argmax(level)]))
+        found += [] if cycles is None else [cycles]
+    return max(found, key=lambda one: one.decay_ratio, default=None)
+
+
+def _cycles(signal: FloatArray, period: float) -> Cycles | None:
+    """Measure the oscillation whose period is about `period`."""
+    n = signal.size
+    regularity = decay = 0.0
     for _ in range(3):
         clean = smoothed(without_drift(signal, period), period, _SMOOTHED)
         rho = correlation(clean, clean, min(int(7 * period) + 2, clean.size - 1))
         found = _of_correlation(rho)
-        if found is None:
+        if found is None or not 2 <= found[0] <= n / FEWEST_CYCLES:
             return None
-        if abs(found[0] - period) < 0.02 * period:
+        before, (period, regularity, decay) = period, found
+        if abs(period - before) < 0.02 * before:
             break
-        if not 2 <= found[0] <= n / FEWEST_CYCLES:
-            return None
-        period = found[0]
-    assert found is not None
-    clean = smoothed(without_drift(signal, found[0]), found[0], _SMOOTHED)
-    edges = crossings(clean)
-    alike, area = _alike(clean, edges)
-    return Cycles(found[0], found[1], found[2], alike, area, n / found[0])
+    clean = smoothed(without_drift(signal, period), period, _SMOOTHED)
+    alike, area = _alike(clean, crossings(clean))
+    return Cycles(period, regularity, decay, alike, area, n / period)
 
 
 def _of_correlation(rho: FloatArray) -> tuple[float, float, float] | None:

@@ -35,6 +35,14 @@ class LoopData:
         """Process value minus set point, or the process value if there is none."""
         return self.pv if self.sp is None else self.pv - self.sp
 
+    @property
+    def record(self) -> Record:
+        """The same as a record from time zero, OP as input and PV as output."""
+        time = self.dt * np.arange(self.op.size)
+        return Record(
+            time, self.op, self.pv, name="loop", input_labels=["OP"], output_labels=["PV"]
+        )
+
 
 def loop_data(loop: Any, pv: Any, sp: Any, dt: Any) -> LoopData:
     """Take a record, or arrays.

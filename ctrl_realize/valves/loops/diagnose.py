@@ -20,6 +20,7 @@ from ...numerics.oscillation.cycles import (
 from ...numerics.oscillation.ellipse import fit_ellipse
 from ...numerics.oscillation.half_cycles import HalfCycles, half_cycles
 from ...numerics.oscillation.movements import movement_indices
+from ...numerics.oscillation.stiction_fit import fit_stiction
 from . import methods
 from .data import loop_data
 from .methods import LoopProcess
@@ -72,9 +73,11 @@ def diagnose_loop(
     decays slowly [2]_, and the areas between the zeros of PV are alike [3]_. Then its cause: the
     cross-correlation of OP and PV is odd for stiction in a self-regulating loop [4]_; half cycles
     of OP, of PV in an integrating loop, are triangles rather than sines [5]_; those of PV are
-    responses to a relay rather than sines [6]_; flows rest while OP moves [7]_. The verdict on the
-    cause needs two of these methods that agree, and twice as many as contradict them. The
-    bicoherence [8]_ tells whether the loop is nonlinear, not why, and is not counted.
+    responses to a relay rather than sines [6]_; flows rest while OP moves [7]_; and a model of
+    stiction before a linear process, fitted to OP and PV, has an S that is a large part of the
+    swing of OP [8]_ [9]_. The verdict on the cause needs two of these methods that agree, and twice
+    as many as contradict them. The bicoherence [10]_ tells whether the loop is nonlinear, not why,
+    and is not counted.
 
     An external disturbance with edges, and a limit cycle by other nonlinearities, look like
     stiction to all of these.
@@ -96,7 +99,12 @@ def diagnose_loop(
        simulation and application to industrial data, Journal of Process Control 15 (2005) 505-514.
     .. [7] Y. Yamashita, An automatic method for detection of valve stiction in process control
        loops, Control Engineering Practice 14 (2006) 503-510.
-    .. [8] M. A. A. S. Choudhury, S. L. Shah and N. F. Thornhill, Diagnosis of poor control-loop
+    .. [8] R. Srinivasan, R. Rengaswamy, S. Narasimhan and R. Miller, Control loop performance
+       assessment. 2. Hammerstein model approach for stiction diagnosis, Ind. Eng. Chem. Res. 44
+       (2005) 6719-6728.
+    .. [9] M. Jelali, Estimation of valve stiction in control loops using separable least-squares
+       and global search algorithms, Journal of Process Control 18 (2008) 632-642.
+    .. [10] M. A. A. S. Choudhury, S. L. Shah and N. F. Thornhill, Diagnosis of poor control-loop
        performance using higher-order statistics, Automatica 40 (2004) 1719-1728.
 
     Examples
@@ -112,10 +120,14 @@ def diagnose_loop(
     kind = one_of(process, "process", ("self-regulating", "flow", "integrating"))
     data = loop_data(loop, pv, sp, dt)
     value = data.deviation
-    cycles = find_cycles(value)
+    cycles, seen = find_cycles(value), "PV"
     state = oscillates(cycles)
+    if not state:  # noise may hide in PV what the controller has integrated
+        of_output = find_cycles(data.op)
+        if oscillates(of_output):
+            cycles, seen, state = of_output, "OP", True
     note = "" if state is not False else "no oscillation"
-    correlation = halves_op = halves_pv = moved = ellipse = higher = None
+    correlation = halves_op = halves_pv = moved = ellipse = higher = fit = None
     if cycles is not None and state is not False:
         period = cycles.period
         output, deviation = without_drift(data.op, period), without_drift(value, period)
@@ -125,21 +137,24 @@ def diagnose_loop(
             halves_op, halves_pv = _halves(output, period), _halves(deviation, period)
             moved = movement_indices(output, deviation, period)
             higher = bicoherence(value, period)
+            if state:
+                fit = fit_stiction(data.op, value, period, ellipse.phase, kind == "integrating")
         else:
             note = "too few samples in a cycle"
     found = (
-        *methods.oscillation_methods(cycles),
+        *methods.oscillation_methods(cycles, seen),
         methods.horch(correlation, kind, note),
         methods.curve_fit(halves_op, halves_pv, kind, note),
         methods.relay_fit(halves_pv, note),
         methods.movements(moved, kind, note),
+        methods.stiction_fit(fit, note),
         methods.bicoherence(higher, note),
     )
     flags = flags_of(data, cycles)
     verdict, reason = judge(state, found, flags)
     return LoopDiagnosis(
         verdict, reason, state, found, kind, data, cycles, correlation, halves_op, halves_pv,
-        ellipse, tuple(flags), (f"process: {kind}, as given or by default",),
+        ellipse, fit, tuple(flags), (f"process: {kind}, as given or by default",),
     )  # fmt: skip
 
 

@@ -7,6 +7,7 @@ from typing import Literal, TypeAlias
 
 import numpy as np
 
+from ...numerics.constants import Z_95
 from ...numerics.oscillation import bicoherence as higher_order
 from ...numerics.oscillation.cross_correlation import (
     EVEN_HEIGHT,
@@ -18,6 +19,7 @@ from ...numerics.oscillation.cross_correlation import (
 from ...numerics.oscillation.cycles import Cycles
 from ...numerics.oscillation.half_cycles import HalfCycles
 from ...numerics.oscillation.movements import LIMIT
+from ...numerics.oscillation.stiction_fit import FEWEST_BLOCKS, StictionFit
 
 LoopProcess: TypeAlias = Literal["self-regulating", "flow", "integrating"]
 MethodVerdict: TypeAlias = Literal[
@@ -27,6 +29,9 @@ MethodVerdict: TypeAlias = Literal[
 
 _HE_STICTION, _HE_NONE = 0.6, 0.4
 _RELAY = 0.21
+_FIT_STICTION, _FIT_NONE = 0.4, 0.25
+"""S over the swing of OP. A stem that sticks turns only after the output has changed by S, so that
+a limit cycle swings by S or a little more; our own."""
 _ACF_REGULAR, _ACF_DECAY, _IAE_ALIKE, _IAE_NOT_ALIKE = 1.0, 0.5, 0.8, 0.4
 
 _SOURCES = {
@@ -37,6 +42,7 @@ _SOURCES = {
     "curve_fit": "He et al. 2007",
     "relay_fit": "Rossi and Scali 2005",
     "movements": "Yamashita 2006",
+    "stiction_fit": "Srinivasan et al. 2005; Jelali 2008",
     "bicoherence": "Choudhury, Shah and Thornhill 2004",
 }
 _NAMES = {
@@ -47,9 +53,10 @@ _NAMES = {
     "curve_fit": "curve fit: sine or triangle",
     "relay_fit": "relay fit",
     "movements": "movements of OP and flow",
+    "stiction_fit": "fit of stiction (Hammerstein)",
     "bicoherence": "bicoherence",
 }
-VOTERS = ("cross_correlation", "curve_fit", "relay_fit", "movements")
+VOTERS = ("cross_correlation", "curve_fit", "relay_fit", "movements", "stiction_fit")
 """Methods that are counted in the verdict."""
 
 
@@ -95,8 +102,8 @@ class LoopMethod:
     source: str
 
 
-def oscillation_methods(cycles: Cycles | None) -> list[LoopMethod]:
-    """Judge whether there is an oscillation at all."""
+def oscillation_methods(cycles: Cycles | None, signal: str) -> list[LoopMethod]:
+    """Judge whether there is an oscillation at all, in PV or OP."""
     limits = (
         f"above {_ACF_REGULAR:g}",
         f"above {_ACF_DECAY:g}",
@@ -106,7 +113,7 @@ def oscillation_methods(cycles: Cycles | None) -> list[LoopMethod]:
     if cycles is None:
         note = "no zeros, or too few samples"
         return [
-            _method(key, "PV", np.nan, limit, "not applicable", note=note)
+            _method(key, signal, np.nan, limit, "not applicable", note=note)
             for key, limit in zip(keys, limits, strict=True)
         ]
     values = (cycles.regularity, cycles.decay_ratio, cycles.alike)
@@ -117,7 +124,7 @@ def oscillation_methods(cycles: Cycles | None) -> list[LoopMethod]:
             "oscillation" if value > high or value == high < 1
             else "no oscillation" if value <= low else "cannot tell"
         )  # fmt: skip
-        found.append(_method(key, "PV", value, limit, said))
+        found.append(_method(key, signal, value, limit, said))
     return found
 
 
@@ -181,6 +188,24 @@ def movements(found: tuple[float, float] | None, process: LoopProcess, note: str
         return _method("movements", "OP, PV", np.nan, limit, "not applicable", note=note)
     said: MethodVerdict = "stiction" if min(found) >= LIMIT else "cannot tell"
     return _method("movements", "OP, PV", found[0], limit, said, found[1])
+
+
+def stiction_fit(found: StictionFit | None, note: str) -> LoopMethod:
+    """Judge by the stiction of a Hammerstein model, and by what it explains beyond a linear one."""
+    limit = f"stiction from {_FIT_STICTION:g} and {Z_95:.2f}, none up to {_FIT_NONE:g}"
+    if found is None:
+        note = (
+            note
+            or f"no clear oscillation, fewer than {FEWEST_BLOCKS + 2} cycles, or no process fits"
+        )
+        return _method("stiction_fit", "OP, PV", np.nan, limit, "not applicable", note=note)
+    index = found.S / found.swing
+    said: MethodVerdict = "cannot tell"
+    if index >= _FIT_STICTION and found.significance > Z_95:
+        said = "stiction"
+    elif index <= _FIT_NONE:
+        said = "no stiction"
+    return _method("stiction_fit", "OP, PV", index, limit, said, found.significance)
 
 
 def bicoherence(found: higher_order.Bicoherence | None, note: str) -> LoopMethod:

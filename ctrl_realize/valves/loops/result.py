@@ -13,6 +13,7 @@ from ...numerics.oscillation.cross_correlation import CrossCorrelation
 from ...numerics.oscillation.cycles import Cycles
 from ...numerics.oscillation.ellipse import Ellipse
 from ...numerics.oscillation.half_cycles import HalfCycles
+from ...numerics.oscillation.stiction_fit import StictionFit
 from ...results import Flag, Result
 from .data import LoopData
 from .methods import LoopMethod, LoopProcess
@@ -49,6 +50,9 @@ class LoopDiagnosis(Result):
         Half cycles, interpolated to the same length and turned to one side.
     ellipse : Ellipse or None
         Of the fundamentals of controller output and process value.
+    stiction_fit : StictionFit or None
+        Kano's model of stiction and a linear process fitted to the record: ``S`` and ``J`` with
+        their ranges, in the unit of OP, and the errors with and without stiction.
     flags : tuple of Flag
     choices : tuple of str
 
@@ -71,6 +75,7 @@ class LoopDiagnosis(Result):
     op_shapes: HalfCycles | None = field(repr=False)
     pv_shapes: HalfCycles | None = field(repr=False)
     ellipse: Ellipse | None = field(repr=False)
+    stiction_fit: StictionFit | None = field(repr=False)
     flags: tuple[Flag, ...] = ()
     choices: tuple[str, ...] = ()
 
@@ -136,6 +141,11 @@ class LoopDiagnosis(Result):
             rows.append(("period", f"{in_time(self.period)}, {self.cycles.count:.1f} cycles"))
         if self.verdict == "stiction" and np.isfinite(self.apparent_stiction):
             rows.append(("apparent stiction (ellipse)", f"{self.apparent_stiction:.3g}"))
+        if self.verdict == "stiction" and self.stiction_fit is not None:
+            fit = self.stiction_fit
+            for name, value, ends in (("S", fit.S, fit.S_range), ("J", fit.J, fit.J_range)):
+                told = f"{value:.3g} (range {ends[0]:.3g} to {ends[1]:.3g})"
+                rows.append((f"apparent {name} (fit)", told))
         for one in self.methods:
             indices = [f"{each:.3g}" for each in (one.index, one.second_index) if each == each]
             told = f"{one.verdict} ({', '.join(indices)}; {one.limit})" if indices else one.verdict
