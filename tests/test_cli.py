@@ -183,6 +183,23 @@ def test_a_valve_test_gives_tables_and_a_report_and_limits_are_judged(tmp_path, 
     assert "expected metric=largest" in capsys.readouterr().err
 
 
+def test_a_loop_is_diagnosed_from_a_file_with_a_set_point(tmp_path, capsys):
+    loop = cr.bench.valve_loop(cr.actuators.KanoStiction(5, 2), process="flow", noise=0.1)
+    record = loop.simulate(600.0, rng=2).record
+    columns = {"time_s": record.time, "op": record.input, "pv": record.output, "sp": 50.0}
+    file, out = tmp_path / "trend.csv", tmp_path / "out"
+    pd.DataFrame(columns).to_csv(file, index=False)
+    words = ["loop", str(file), "--input", "op", "--output-column", "pv",
+             "--set-point", "sp", "--process", "flow", "-o"]  # fmt: skip
+    assert main([*words, str(out)]) == 0
+    assert "verdict" in capsys.readouterr().out
+    assert pd.read_csv(out / "methods.csv", index_col=0).loc["curve_fit", "verdict"] == "stiction"
+    page = (out / "report.html").read_text(encoding="utf-8")
+    assert page.count("<svg ") == 4
+    assert "the valve sticks" in page
+    assert main(["loop", str(file), str(file), "-o", str(tmp_path / "no")]) == 2
+
+
 class Terminal(StringIO):
     def isatty(self):
         return True
@@ -316,7 +333,7 @@ def test_records_of_different_plants_are_kept_apart_on_request(folder, tmp_path,
     assert {"step_0/model.json", "slow/model.json"} <= files_in(tmp_path / "out")
 
 
-@pytest.mark.parametrize("command", [[], ["identify"], ["compare"], ["valve"], ["demo"]])
+@pytest.mark.parametrize("command", [[], ["identify"], ["compare"], ["valve"], ["loop"], ["demo"]])
 def test_help_has_examples_and_exit_codes(command, capsys):
     assert main([*command, "--help"]) == 0
     said = " ".join(capsys.readouterr().out.split())

@@ -19,6 +19,7 @@ from typer.main import get_command
 from ..errors import CtrlRealizeError
 from .signatures import compare, demo, identify, valve
 from .terminal import EXIT_CODES, complain, one_line, plain_warning
+from .valve.signatures import loop
 
 app = typer.Typer(
     name="ctrl-realize",
@@ -31,6 +32,7 @@ app = typer.Typer(
 app.command(epilog=EXIT_CODES)(identify)
 app.command(epilog=EXIT_CODES)(compare)
 app.command(epilog=EXIT_CODES)(valve)
+app.command(epilog=EXIT_CODES)(loop)
 app.command(epilog=EXIT_CODES)(demo)
 
 

@@ -42,6 +42,14 @@ class Missing(str, Enum):  # noqa: UP042
     hold = "hold"
 
 
+class LoopKind(str, Enum):  # noqa: UP042
+    """Kinds of the process in a loop."""
+
+    self_regulating = "self-regulating"
+    flow = "flow"
+    integrating = "integrating"
+
+
 class Hold(str, Enum):  # noqa: UP042
     """Treatment of the model's zero-order hold."""
 
@@ -121,6 +129,11 @@ Limit = Annotated[
 ]  # fmt: skip
 NoFit = Annotated[
     bool, _OPTION("--no-fit", help="Do not fit the dead time of each size and direction.")
+]
+# how to judge a loop
+ProcessOption = Annotated[LoopKind, _OPTION("--process", help="What the process value is.")]
+SetPoint = Annotated[
+    str | None, _OPTION("--set-point", help="Column of the set point, if it moves.")
 ]
 
 # how to read records

@@ -20,6 +20,13 @@ from .responses import impulse_estimate_plot, impulse_plot, mimo_realization_plo
 from .robustness import delay_robustness_plot, robustness_plot, uncertainty_plot
 from .scans import delay_plot, order_plot, singular_value_plot
 from .tuning import hankel_plot, pid_comparison_plot, process_model_plot
+from .valves.loops import (
+    loop_correlation_plot,
+    loop_diagnosis_plot,
+    loop_phase_plot,
+    loop_shape_plot,
+    loop_trend_plot,
+)
 from .valves.tests import (
     valve_loop_plot,
     valve_plan_plot,
@@ -48,6 +55,11 @@ __all__ = [
     "impulse_estimate_plot",
     "impulse_plot",
     "joint_fit_plot",
+    "loop_correlation_plot",
+    "loop_diagnosis_plot",
+    "loop_phase_plot",
+    "loop_shape_plot",
+    "loop_trend_plot",
     "margins_plot",
     "mimo_realization_plot",
     "model_comparison_plot",

@@ -29,6 +29,7 @@ from .robustness import delay_robustness_plot, robustness_plot, uncertainty_plot
 from .scans import delay_plot, order_plot, singular_value_plot
 from .shared_docs import documented
 from .tuning import hankel_plot, pid_comparison_plot, process_model_plot
+from .valves.loops import loop_diagnosis_plot
 from .valves.tests import valve_plan_plot, valve_plot
 
 
@@ -90,6 +91,7 @@ for _plot in (
     hankel_plot,
     impulse_estimate_plot,
     impulse_plot,
+    loop_diagnosis_plot,
     margins_plot,
     mimo_realization_plot,
     model_comparison_plot,

@@ -1,6 +1,7 @@
 """HTML reports: one self-contained file, the verdict first."""
 
 from .build import write_campaign, write_comparison, write_identification
+from .loops import write_loop_report
 from .page import Column, Page, Row, Table, pairs, write_page
 from .sketches import Sketch
 from .valves import write_valve_report
@@ -17,6 +18,7 @@ __all__ = [
     "write_campaign",
     "write_comparison",
     "write_identification",
+    "write_loop_report",
     "write_page",
     "write_valve_report",
 ]

@@ -1,0 +1,82 @@
+"""``ctrl-realize loop``: whether the valve makes a loop oscillate."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from ...data import Record
+from ...errors import OptionError
+from ...io import read_record
+from ...io.text.csv_files import write_csv
+from ...report.loops import write_loop_report
+from ...valves.loops.diagnose import diagnose_loop
+from ...valves.loops.methods import LoopProcess
+from ..inputs import python_keywords, typed_call
+from ..manifest import Run, refuse_other_results
+from ..options import words_of
+from ..results import told_if_it_fails
+from ..staging import appearing
+from ..terminal import printable, say
+
+
+def run_loop(
+    files: list[Path],
+    output: Path,
+    *,
+    process: LoopProcess,
+    set_point: str | None,
+    reading: Mapping[str, Any],
+    report: bool,
+    overwrite: bool,
+) -> int:
+    """Diagnose, write the results, and return the exit code."""
+    if len(files) != 1:
+        raise OptionError(f"{len(files)} files; expected one record of operation")
+    choices: dict[str, Any] = {"process": process}
+    words = [str(files[0]), *words_of({**choices, **reading})]
+    words += [] if set_point is None else ["--set-point", set_point]
+    run = Run(typed_call("loop", words), tuple(files), overwrite)
+    refuse_other_results(output, run)
+    record, sp = _read(files[0], set_point, reading)
+    say(printable(f"{files[0]}: {record!r}"))
+    result = diagnose_loop(record, sp=sp, **choices)
+    say(result.report())
+    words += ["--output", str(output)]
+    calls = [("In a terminal", typed_call("loop", words))]
+    if set_point is None:
+        calls.append(("In Python", _in_python(files[0], reading, choices)))
+    written: list[str] = []
+    with appearing(output, run) as folder:
+        write_csv(folder / "methods.csv", result.table(), index=True)
+        if report:
+            with told_if_it_fails(folder, "the table of methods") as written:
+                write_loop_report(
+                    folder / "report.html", result, files=files, settings=choices, calls=calls,
+                    figures=folder / "figures",
+                )  # fmt: skip
+                written.append("report.html, figures/")
+    say(f"\nwritten to {printable(str(output))}: {', '.join(['methods.csv', *written])}")
+    return 0 if written or not report else 1
+
+
+def _read(file: Path, set_point: str | None, reading: Mapping[str, Any]) -> tuple[Record, Any]:
+    """Record of OP and PV, and the set point if there is one."""
+    if set_point is None:
+        return read_record(file, **reading), None
+    given = reading.get("output")
+    if given is None or isinstance(given, list):
+        raise OptionError("--set-point needs the column of the process value: --output-column")
+    both = read_record(file, **{**reading, "output": [given, set_point]})
+    return Record(both.time, both.input, both.output[0], name=both.name), both.output[1]
+
+
+def _in_python(file: Path, reading: Mapping[str, Any], choices: Mapping[str, Any]) -> str:
+    return "\n".join(
+        (
+            "import ctrl_realize as cr",
+            f"record = cr.read_record({str(file)!r}{python_keywords(reading)})",
+            f"print(cr.valves.diagnose_loop(record{python_keywords(choices)}).report())",
+        )
+    )

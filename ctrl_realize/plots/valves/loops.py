@@ -1,0 +1,266 @@
+"""Plots of oscillating loops."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import control as ct
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.lines import Line2D
+
+from ...numerics.oscillation.half_cycles import POINTS, HalfCycles
+from ...valves.loops.result import LoopDiagnosis
+from .. import style
+from ..shared_docs import documented
+
+_CYCLES = 10
+"""Of the trends that are shown: more cannot be told apart."""
+_MOST_SHAPES = 40
+
+
+@documented("Axes, sequence of Axes")
+def loop_diagnosis_plot(
+    diagnosis: LoopDiagnosis,
+    *,
+    ax: style.AxesLike = None,
+    title: str | None = None,
+    **kwargs: Any,
+) -> ct.ControlPlot:
+    """Draw an oscillating loop: trends, PV over OP, cross-correlation, half cycles.
+
+    The four are `loop_trend_plot`, `loop_phase_plot`, `loop_correlation_plot` and
+    `loop_shape_plot`.
+
+    Parameters
+    ----------
+    diagnosis : LoopDiagnosis
+    **kwargs
+        Line properties of the measured curves.
+
+    Examples
+    --------
+    >>> import ctrl_realize as cr
+    >>> loop = cr.bench.valve_loop(cr.actuators.Stiction(5, 2), noise=0.1).simulate(3000.0, rng=1)
+    >>> cplt = cr.valves.diagnose_loop(loop.record).plot()
+    >>> cplt.axes.shape
+    (2, 2)
+    """
+    with style.canvas(
+        ax, 2, columns=2, sharex=False, size=(11.0, 8.0), title=title,
+        default_title=diagnosis.verdict,
+    ) as axes:  # fmt: skip
+        lines = [
+            _draw_trend(axes[0], diagnosis, kwargs),
+            _draw_phase(axes[1], diagnosis, kwargs),
+            _draw_correlation(axes[2], diagnosis, kwargs),
+            _draw_shapes(axes[3], diagnosis, kwargs),
+        ]
+        return style.finished(axes, lines, columns=2, legends=(0, 1, 3), loc="best")
+
+
+@documented()
+def loop_trend_plot(
+    diagnosis: LoopDiagnosis,
+    *,
+    ax: style.AxesLike = None,
+    title: str | None = None,
+    **kwargs: Any,
+) -> ct.ControlPlot:
+    """Draw controller output and process value over time, both scaled to their standard deviation.
+
+    At most ten cycles from the middle of the record.
+
+    Parameters
+    ----------
+    diagnosis : LoopDiagnosis
+    **kwargs
+        Line properties.
+
+    Examples
+    --------
+    >>> import ctrl_realize as cr
+    >>> loop = cr.bench.valve_loop(cr.actuators.Stiction(5, 2), noise=0.1).simulate(3000.0, rng=1)
+    >>> cplt = cr.plots.loop_trend_plot(cr.valves.diagnose_loop(loop.record))
+    >>> [text.get_text() for text in cplt.figure.axes[0].get_legend().get_texts()]
+    ['OP', 'PV']
+    """
+    with style.canvas(ax, title=title, default_title=diagnosis.verdict, size=(11.0, 4.2)) as axes:
+        return style.finished(axes, [_draw_trend(axes[0], diagnosis, kwargs)])
+
+
+@documented()
+def loop_phase_plot(
+    diagnosis: LoopDiagnosis,
+    *,
+    ax: style.AxesLike = None,
+    title: str | None = None,
+    **kwargs: Any,
+) -> ct.ControlPlot:
+    """Draw the process value over the controller output, and the ellipse of their fundamentals.
+
+    Parameters
+    ----------
+    diagnosis : LoopDiagnosis
+    **kwargs
+        Line properties.
+
+    Examples
+    --------
+    >>> import ctrl_realize as cr
+    >>> loop = cr.bench.valve_loop(cr.actuators.Stiction(5, 2), noise=0.1).simulate(3000.0, rng=1)
+    >>> cplt = cr.plots.loop_phase_plot(cr.valves.diagnose_loop(loop.record))
+    >>> cplt.figure.axes[0].get_xlabel()
+    'controller output OP'
+    """
+    with style.canvas(ax, title=title, default_title="PV over OP") as axes:
+        return style.finished(axes, [_draw_phase(axes[0], diagnosis, kwargs)])
+
+
+@documented()
+def loop_correlation_plot(
+    diagnosis: LoopDiagnosis,
+    *,
+    ax: style.AxesLike = None,
+    title: str | None = None,
+    **kwargs: Any,
+) -> ct.ControlPlot:
+    """Draw the cross-correlation function of controller output and process value.
+
+    Parameters
+    ----------
+    diagnosis : LoopDiagnosis
+    **kwargs
+        Line properties.
+
+    Examples
+    --------
+    >>> import ctrl_realize as cr
+    >>> loop = cr.bench.valve_loop(cr.actuators.Stiction(5, 2), noise=0.1).simulate(3000.0, rng=1)
+    >>> cplt = cr.plots.loop_correlation_plot(cr.valves.diagnose_loop(loop.record))
+    >>> cplt.figure.axes[0].get_xlabel()
+    'lag [s]'
+    """
+    with style.canvas(ax, title=title, default_title="cross-correlation of OP and PV") as axes:
+        return style.finished(axes, [_draw_correlation(axes[0], diagnosis, kwargs)])
+
+
+@documented()
+def loop_shape_plot(
+    diagnosis: LoopDiagnosis,
+    *,
+    ax: style.AxesLike = None,
+    title: str | None = None,
+    **kwargs: Any,
+) -> ct.ControlPlot:
+    """Draw the half cycles on one another, with their mean, a sine and a triangle.
+
+    Those of the controller output, or of the process value if the process is integrating.
+
+    Parameters
+    ----------
+    diagnosis : LoopDiagnosis
+    **kwargs
+        Line properties of the half cycles.
+
+    Examples
+    --------
+    >>> import ctrl_realize as cr
+    >>> loop = cr.bench.valve_loop(cr.actuators.Stiction(5, 2), noise=0.1).simulate(3000.0, rng=1)
+    >>> cplt = cr.plots.loop_shape_plot(cr.valves.diagnose_loop(loop.record))
+    >>> [text.get_text() for text in cplt.figure.axes[0].get_legend().get_texts()]
+    ['mean', 'sine', 'triangle']
+    """
+    with style.canvas(ax, title=title, default_title="half cycles") as axes:
+        return style.finished(axes, [_draw_shapes(axes[0], diagnosis, kwargs)])
+
+
+def _shown(diagnosis: LoopDiagnosis) -> slice:
+    """Samples of some cycles from the middle of the record."""
+    size = diagnosis.signals.op.size
+    if not np.isfinite(diagnosis.period) or diagnosis.cycles is None:
+        return slice(0, size)
+    many = min(int(_CYCLES * diagnosis.cycles.period) + 1, size)
+    start = (size - many) // 2
+    return slice(start, start + many)
+
+
+def _draw_trend(axes: Axes, diagnosis: LoopDiagnosis, looks: dict[str, Any]) -> list[Line2D]:
+    signals, part = diagnosis.signals, _shown(diagnosis)
+    time = signals.dt * np.arange(signals.op.size)[part]
+    unit, name = style.axis_time_unit(float(time[-1]), axes)
+    lines = []
+    for label, signal, colour in (
+        ("OP", signals.op, style.INPUT),
+        ("PV", signals.pv, style.MEASURED),
+        ("SP", signals.sp, style.OTHERS[0]),
+    ):
+        if signal is None:
+            continue
+        scale = float((signals.pv if label == "SP" else signal).std()) or 1.0
+        middle = float((signals.pv if label == "SP" else signal).mean())
+        own = {"color": colour, "linewidth": 1.2, "label": label, **looks}
+        lines += axes.plot(time * unit, (signal[part] - middle) / scale, **own)
+    axes.set(xlabel=f"time [{name}]", ylabel="deviation / standard deviation")
+    return lines
+
+
+def _draw_phase(axes: Axes, diagnosis: LoopDiagnosis, looks: dict[str, Any]) -> list[Line2D]:
+    signals, part = diagnosis.signals, _shown(diagnosis)
+    op, pv = signals.op[part], signals.pv[part]
+    lines = axes.plot(op, pv, **{"color": style.MEASURED, "linewidth": 0.8, **looks})
+    if diagnosis.ellipse is not None:
+        found, angle = diagnosis.ellipse, np.linspace(0, 2 * np.pi, 181)
+        lines += axes.plot(
+            op.mean() + found.output * np.cos(angle),
+            pv.mean() + found.value * np.cos(angle - found.phase),
+            color=style.MODEL, linewidth=1.6, linestyle=style.DASHES[0],
+            label=f"ellipse, width {found.width:.3g}",
+        )  # fmt: skip
+    axes.set(xlabel="controller output OP", ylabel="process value PV")
+    return list(lines)
+
+
+def _draw_correlation(axes: Axes, diagnosis: LoopDiagnosis, looks: dict[str, Any]) -> list[Line2D]:
+    found = diagnosis.cross_correlation
+    if found is None:
+        _say_nothing(axes, "no oscillation")
+        return []
+    dt = diagnosis.signals.dt
+    unit, name = style.axis_time_unit(float(found.lags[-1]) * dt, axes)
+    own = {"color": style.MEASURED, "linewidth": 1.5, **looks}
+    lines = axes.plot(found.lags * dt * unit, found.values, **own)
+    axes.axhline(0, color=style.NOISE, linewidth=0.8)
+    axes.axvline(0, color=style.NOISE, linewidth=0.8)
+    axes.set(xlabel=f"lag [{name}]", ylabel="cross-correlation")
+    return list(lines)
+
+
+def _draw_shapes(axes: Axes, diagnosis: LoopDiagnosis, looks: dict[str, Any]) -> list[Line2D]:
+    integrating = diagnosis.process == "integrating"
+    name = "PV" if integrating else "OP"
+    found: HalfCycles | None = diagnosis.pv_shapes if integrating else diagnosis.op_shapes
+    axes.set(xlabel="part of the half cycle", ylabel=f"half cycles of {name}")
+    if found is None:
+        _say_nothing(axes, "no half cycles")
+        return []
+    inside = np.linspace(0, 1, POINTS)
+    few = found.shapes[:: max(len(found.shapes) // _MOST_SHAPES, 1)]
+    own = {"color": style.MEASURED, "linewidth": 0.7, "alpha": 0.4, **looks}
+    lines = axes.plot(inside, few.T, **own)
+    mean = found.shapes.mean(axis=0)
+    lines += axes.plot(inside, mean, color=style.INK, linewidth=2.0, label="mean")
+    sine = np.sin(np.pi * inside)
+    top = inside[int(np.argmax(mean))]
+    tent = np.minimum(inside / max(top, 0.05), (1 - inside) / max(1 - top, 0.05))
+    for label, shape, colour, dash in (
+        ("sine", sine, style.TRUTH, style.DASHES[1]),
+        ("triangle", tent, style.MODEL, style.DASHES[0]),
+    ):
+        fitted = shape * (shape @ mean) / (shape @ shape)
+        lines += axes.plot(inside, fitted, color=colour, linestyle=dash, label=label)
+    return list(lines)
+
+
+def _say_nothing(axes: Axes, why: str) -> None:
+    axes.text(0.5, 0.5, why, ha="center", va="center", transform=axes.transAxes)

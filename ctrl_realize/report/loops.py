@@ -1,0 +1,147 @@
+"""Diagnosis of an oscillating loop as a page."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from .. import plots
+from .._wording import in_time
+from ..errors import DataError
+from ..valves.loops.result import LoopDiagnosis
+from .build import write_report
+from .page import Column, Row, Table
+from .sketches import Sketch
+from .tables import Paths, data_table, settings_tables
+from .verdict import Level, Verdict
+
+_LEVELS: dict[str, Level] = {"stiction": "poor", "no oscillation": "good"}
+_JUDGEMENTS: dict[Level, str] = {
+    "good": "The loop does not oscillate.",
+    "caution": "The loop may oscillate; the valve is not shown to be the cause.",
+    "poor": "The loop oscillates, and the valve sticks.",
+}
+
+
+def write_loop_report(
+    path: str | os.PathLike[str],
+    diagnosis: LoopDiagnosis,
+    *,
+    files: Paths = (),
+    settings: Mapping[str, Any] | None = None,
+    calls: Sequence[tuple[str, str]] = (),
+    title: str = "Oscillating loop",
+    simulated: bool = False,
+    figures: str | os.PathLike[str] | None = None,
+) -> Path:
+    """Write the diagnosis of a loop as a self-contained HTML file.
+
+    Parameters
+    ----------
+    path : path-like
+        File to write, atomically.
+    diagnosis : LoopDiagnosis
+        From `valves.diagnose_loop`.
+    files, settings, calls, simulated, figures
+        As for `write_identification`.
+    title : str, optional
+
+    Returns
+    -------
+    pathlib.Path
+
+    Raises
+    ------
+    DataError
+        `diagnosis` is not that of a loop.
+    OSError
+        The folder is missing or cannot be written.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> from pathlib import Path
+    >>> import ctrl_realize as cr
+    >>> from ctrl_realize import report
+    >>> loop = cr.bench.valve_loop(cr.actuators.Stiction(5, 2), noise=0.1).simulate(3000.0, rng=1)
+    >>> found = cr.valves.diagnose_loop(loop.record)
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     path = report.write_loop_report(Path(folder) / "loop.html", found, simulated=True)
+    ...     print(path.read_text(encoding="utf-8").count("<svg "), "figures")
+    4 figures
+    """
+    if not isinstance(diagnosis, LoopDiagnosis):
+        raise DataError(f"diagnosis is a {type(diagnosis).__name__}; expected that of a loop")
+    many = diagnosis.signals.op.size
+    return write_report(
+        path,
+        title=title,
+        subtitle=f"{many} samples of {in_time(diagnosis.signals.dt)}",
+        verdict=_verdict(diagnosis),
+        sketches=_sketches(diagnosis),
+        tables=[
+            _method_table(diagnosis),
+            data_table((diagnosis.signals.record,), files),
+            *settings_tables(settings),
+        ],
+        calls=calls,
+        simulated=simulated,
+        figures=figures,
+    )
+
+
+def _verdict(diagnosis: LoopDiagnosis) -> Verdict:
+    level = _LEVELS.get(diagnosis.verdict, "caution")
+    rows = [row for row in diagnosis._rows() if row[0] not in {"verdict", "because"}]
+    names = {one.name for one in diagnosis.methods}
+    facts = tuple(row for row in rows if row[0] not in names)
+    reasons = (diagnosis.reason, *map(str, diagnosis.flags), *diagnosis.choices)
+    sentence = diagnosis.verdict[0].upper() + diagnosis.verdict[1:] + "."
+    return Verdict(level, sentence, facts, reasons, _JUDGEMENTS[level])
+
+
+def _sketches(diagnosis: LoopDiagnosis) -> list[Sketch]:
+    return [
+        Sketch(
+            "trend",
+            "Trends",
+            "Controller output and process value, each scaled to its standard deviation.",
+            lambda figure: plots.loop_trend_plot(diagnosis, ax=figure),
+        ),
+        Sketch(
+            "phase",
+            "PV over OP",
+            "With the ellipse of the fundamentals; its width in the direction of OP is the "
+            "apparent stiction, if the valve sticks.",
+            lambda figure: plots.loop_phase_plot(diagnosis, ax=figure),
+        ),
+        Sketch(
+            "correlation",
+            "Cross-correlation",
+            "Odd about lag zero for stiction in a self-regulating loop, even otherwise.",
+            lambda figure: plots.loop_correlation_plot(diagnosis, ax=figure),
+        ),
+        Sketch(
+            "shapes",
+            "Half cycles",
+            "Triangles for stiction, sines for tuning or an external oscillation.",
+            lambda figure: plots.loop_shape_plot(diagnosis, ax=figure),
+        ),
+    ]
+
+
+def _method_table(diagnosis: LoopDiagnosis) -> Table:
+    columns = (
+        Column("method"), Column("of"), Column("index", "number"), Column("limit"),
+        Column("verdict"), Column("source"),
+    )  # fmt: skip
+    rows = []
+    for one in diagnosis.methods:
+        known = [f"{each:.3g}" for each in (one.index, one.second_index) if np.isfinite(each)]
+        said = f"{one.verdict}: {one.note}" if one.note else one.verdict
+        rows.append(Row((one.name, one.signal, ", ".join(known), one.limit, said, one.source)))
+    return Table("Methods", tuple(rows), columns)
