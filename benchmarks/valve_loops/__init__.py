@@ -1,0 +1,1 @@
+"""Oscillating loops: what each method says on simulated and measured ones."""
