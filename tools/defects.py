@@ -92,7 +92,7 @@ DEFECTS = (
        "noise", KERNELS),
     _d("drift in coloured noise", "slow noise before the step passes for a drift",
        "error = sigma * np.sqrt(12 * correlation_time(residual) / residual.size**3)",
-       "error = sigma * np.sqrt(12 / residual.size**3)", "noise step_data", KERNELS),
+       "error = sigma * np.sqrt(12 / residual.size**3)", "noise decisions", KERNELS),
     _d("clipped noise", "noise comes out 4 % too small",
        "max(values.size - lost, 1))) / 0.96", "max(values.size - lost, 1)))", "noise", KERNELS),
     _d("correlation time", "coloured samples count for half of what they share",

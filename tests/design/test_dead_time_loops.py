@@ -36,17 +36,6 @@ def test_a_smith_predictor_s_loop_is_the_delay_free_loop_later():
     assert (predictor.name, predictor.input_labels) == ("smith", ["e"])
 
 
-def test_a_filter_makes_the_predictor_robust():
-    plain, filtered = (design.smith_predictor(P, C, filter_time=time) for time in (None, 0.3))
-    slower = CORE * cr.delay(0.4)
-    assert (
-        design.margins(slower, filtered).modulus_margin
-        > design.margins(slower, plain).modulus_margin
-    )
-    # the filter has gain 1 at rest: no steady-state error
-    assert ct.feedback(P * filtered).dcgain() == pytest.approx(1, abs=1e-9)
-
-
 def test_a_sampled_smith_predictor_is_a_controller_with_an_internal_delay():
     predictor = design.smith_predictor(PLANT, PI)
     loop = PLANT * predictor

@@ -129,22 +129,6 @@ def test_margins_equal_those_of_arbitrary_precision(
         assert np.isnan(found.delay_margin)
 
 
-@pytest.mark.parametrize(
-    ("delay", "gm", "pm"),
-    [
-        (37, 4.956, 95.97),
-        (50, 4.354, 94.34),
-        (70, 3.749, 91.84),
-        (100, 3.191, 88.09),
-        (300, 1.925, 63.07),
-    ],
-)
-def test_margins_are_those_measured_with_brentq_on_the_core(valve, pi_controller, delay, gm, pm):
-    found = cr.design.margins(valve(delay), pi_controller(0.5, 0.2))
-    assert found.gain_margin == pytest.approx(gm, abs=6e-4)  # printed digits
-    assert found.phase_margin == pytest.approx(pm, abs=6e-3)
-
-
 @settings(max_examples=60, deadline=None, derandomize=True)
 @given(data=st.data())
 def test_the_count_is_the_number_of_unstable_eigenvalues_of_the_closed_loop(data):
