@@ -13,8 +13,9 @@ from .loops.margin_result import Margins
 from .loops.margins import margins
 from .loops.performance import Performance, performance
 from .loops.phase import unwrapped_phase
-from .loops.robustness import RobustnessCheck, UncertaintyBound, robust_stability, uncertainty_bound
+from .loops.robust_stability import RobustnessCheck, UncertaintyBound, robust_stability
 from .loops.root_locus import root_locus
+from .loops.uncertainty import uncertainty_bound
 from .models.approximations import pade_ss, thiran
 from .models.balanced import BalancedReduction, hankel_singular_values, reduce
 from .models.conversions import ContinuousModel, to_continuous, to_discrete, to_tf

@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
 from ..design.loops.delay_robustness_result import DelayRobustness
-from ..design.loops.robustness import RobustnessCheck, UncertaintyBound
+from ..design.loops.robust_stability import RobustnessCheck, UncertaintyBound
 from ..numerics.arrays import FloatArray
 from . import style
 from .shared_docs import documented
