@@ -34,6 +34,7 @@ SHOWN = {
     "SciPy, order 2": "SciPy: curve_fit, second order and dead time",
     "pysib, OE": "pysib: OE(3, 3) for 26 delays",
     "SIPPY, ARX": "SIPPY: ARX(3, 3) for each delay",
+    "SRIVC": "SRIVC (a prototype of ours), order 3",
 }
 """Ways that find a delay, in the table of single records."""
 
@@ -44,6 +45,7 @@ RIVALS = {
     "50 starts": f"SciPy: least_squares from {STARTS} starts",
     "ARX": "pysib: ARX(3, 3) for each delay",
     "pysib, OE": SHOWN["pysib, OE"],
+    "SRIVC": SHOWN["SRIVC"],
 }
 """Ways in the table of fits."""
 NEARLY = 0.5

@@ -17,6 +17,7 @@ WAYS = (
     "pysib: ARX(3, 3) for each delay",
     "nfoursid: N4SID, order 3",
     "SIPPY: N4SID, order 3",
+    "SRIVC (a prototype of ours), order 3",
 )
 Ask = Callable[[str, Measured], Answer | None]
 

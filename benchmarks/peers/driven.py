@@ -36,6 +36,7 @@ RIVALS = {
     "50 starts": f"SciPy: least_squares from {STARTS} starts",
     "ARX": "pysib: ARX(3, 3) for each delay",
     "pysib, OE": "pysib: OE(3, 3) for 26 delays",
+    "SRIVC": "SRIVC (a prototype of ours), order 3",
 }
 """Ways that take moving inputs, beside `identify`."""
 

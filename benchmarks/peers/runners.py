@@ -13,6 +13,7 @@ from scipy.signal import lfilter
 import ctrl_realize as cr
 
 from .answers import Answer, of_matrices, of_polynomials, of_step
+from .srivc import from_srivc
 from .starts import STARTS, from_many_starts
 from .tasks import ORDER, Task
 
@@ -172,6 +173,11 @@ def scipy_second_order(task: Task) -> Answer:
 @runner(f"SciPy: least_squares from {STARTS} starts", "scipy", "order of `identify`, any zeros")
 def scipy_many_starts(task: Task) -> Answer:
     return from_many_starts(task, cr.identify(task.record).fit.order)
+
+
+@runner("SRIVC (a prototype of ours), order 3", "scipy", "order")
+def srivc(task: Task) -> Answer:
+    return from_srivc(task)
 
 
 def best_delay(
