@@ -28,11 +28,10 @@ from ..arrays import ComplexArray, FloatArray
 from ..constants import CHI2_95, SMALLEST, Z_95
 from ..separable.poles import parameters_from_poles
 from ..separable.static_gain import INTEGRATOR
-from ..separable.structures import FASTEST, Candidate, Scales
+from ..separable.structures import FASTEST, SLOWEST, Candidate, Scales
 from ..separable.varpro import Problem, Structure, respond
 from .physical import ProcessParameter
 
-_SLOWEST_POLE = 1e-4  # times 1 / length: stands for an integrator, as in `parameter_bounds`
 _LEAST_DAMPING = 0.005  # as in `parameter_bounds`
 _MOST_TURNS = 60  # of a search, each about the evaluations of a gradient
 _STEP = 1e-6  # relative, for derivatives at the optimum
@@ -77,14 +76,18 @@ class ProcessForm:
         return bool(self.fixed or self.bounds or self.start)
 
     def admits(self, candidate: Candidate, length: float) -> bool:
-        """Whether a model of the structure has the form."""
+        """Whether a model of the structure has the form, without an integrator.
+
+        With one, the pole that stands for it is prescribed: the gain is known less closely if that
+        is estimated as well.
+        """
         poles = candidate.poles
         slow = np.abs(poles) * length < INTEGRATOR
         complex_pairs = np.count_nonzero(poles.imag > 0)
         return (
-            not self.prescribed
+            not (self.prescribed or self.integrator)
             and self.dead_time
-            and bool(slow.any()) == self.integrator
+            and not slow.any()
             and complex_pairs == int(self.pair)
         )
 
@@ -145,7 +148,7 @@ class _Search:
             roots += [complex(-size * damping, swing), complex(-size * damping, -swing)]
         monic = values["gain"] * float(np.prod(-np.array(roots, dtype=np.complex128)).real)
         if form.integrator:
-            roots.append(-_SLOWEST_POLE / self.scales.length)
+            roots.append(-SLOWEST / self.scales.length)
         numerator = np.array([monic, monic * values["lead_1"]] if form.lead else [monic])
         poles: ComplexArray = np.array(roots, dtype=np.complex128)
         theta = np.concatenate([[values["dead_time"]], parameters_from_poles(poles)])

@@ -35,6 +35,11 @@ NEEDLESS_ZERO, NEEDLESS_POLE = 6.0, 4.0
 ones lower the sum of squares by so many variances in one record of 70, and of 22. Ablation:
 needless parameters."""
 
+SLOWEST = 1e-4
+"""Smallest pole, over the length of the record: stands for an integrator."""
+_DAMPING = 20.0
+"""Largest damping of a pair: two lags with a ratio of 1600."""
+_NO_INTEGRATOR = 10.0  # natural frequency times length of a pair that is none, in such a record
 FASTEST, SLOWER_WITH_ZEROS = 40.0, 2.0
 """Largest pole, in 1/samples. A response that jumps from one sample to the next needs it: with a
 lag of half a sample at least, its dead time would be known better than to the sample. Ablation:
@@ -60,7 +65,8 @@ class Scales:
     `onset` is when it starts to move, `rise` the time from there to 63 % of its final value,
     `length` the duration of the record after the change of the input, `dt` the sample time.
     `latest` and `earliest` bound the dead time; `ringing` is an angular frequency that stands out
-    of the residual of a first-order fit, or 0.
+    of the residual of a first-order fit, or 0; `integrating`: the pole of that fit is far slower
+    than the record.
     """
 
     onset: float
@@ -70,6 +76,7 @@ class Scales:
     latest: float
     earliest: float = 0.0
     ringing: float = 0.0
+    integrating: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -166,13 +173,20 @@ def parameter_bounds(structure: Structure, scales: Scales) -> Bounds:
     """
     order = structure.order
     fast = np.log((SLOWER_WITH_ZEROS if structure.zeros else FASTEST) / scales.dt)
+    slow = np.log(SLOWEST / scales.length)
     low, high = [scales.earliest], [scales.latest]
     if order % 2:
-        low.append(np.log(1e-4 / scales.length))
+        low.append(slow)
         high.append(fast)
-    for _ in range(order // 2):
+    for pair in range(order // 2):
+        size, damping = fast, np.log(_DAMPING)
+        if scales.integrating and pair == 0 and order % 2 == 0:
+            # An integrator and a lag: the bounds of their sum and of its inverse, as of a pair.
+            total = np.log(2 * _DAMPING) + fast
+            size = max((total + slow) / 2, np.log(_NO_INTEGRATOR / scales.length))
+            damping = (total - slow) / 2 - np.log(2.0)
         low += [np.log(1e-2 / scales.length), np.log(0.005)]
-        high += [fast, np.log(20.0)]
+        high += [size, damping]
     return Bounds(np.array(low), np.array(high))
 
 

@@ -44,6 +44,9 @@ from .structures import (
 from .varpro import Problem, Structure, evaluate, respond
 
 _PASSES = 2  # of modified residuals; see `fit_window`
+_RAMP = 0.1
+"""Pole of a first-order fit times the length of the record, below which there may be an integrator
+beside a lag that is faster by any ratio."""
 _LONG = 2**18  # samples that tell a frequency, for time and memory
 
 
@@ -224,7 +227,11 @@ def fit_window(
     rough = search(problem, [Structure(1, 1)], scales)[Structure(1, 1)]
     error = window.output - window.predict(problem, rough)
     spacing = window.spacing * scales.dt
-    scales = replace(scales, ringing=_ringing(error[window.start :], spacing))
+    scales = replace(
+        scales,
+        ringing=_ringing(error[window.start :], spacing),
+        integrating=bool(np.abs(rough.poles[0]) * scales.length < _RAMP),
+    )
     candidates = search(problem, structures, scales)
     passes = _PASSES if huber else 0
     rivals: dict[Structure, float] = {}

@@ -1,5 +1,7 @@
 """Process models by name, with fixed and bounded parameters."""
 
+import re
+
 import control as ct
 import numpy as np
 import pytest
@@ -50,7 +52,18 @@ def test_an_integrator_is_exact_in_the_model_and_in_words():
     system = cr.fit_output_error(record(INTEGRATOR), structures="P1DI")
     assert np.isclose(system.delay_free.poles(), 1.0, rtol=0, atol=1e-12).sum() == 1
     assert system.fit.integrators == 1
-    assert system.fit.formula.startswith("0.30007 (+-0.00005) e^(-1.504 s) / (s (3.00")
+    form = r"0\.3000\d \(\+-0\.0000\d\) e\^\(-1\.50\d s\) / \(s \(3\.00\d s \+ 1\)\)"
+    assert re.fullmatch(form, system.fit.formula)
+
+
+@pytest.mark.parametrize("count", [600, 8000])
+@pytest.mark.parametrize("asked", ["P1ID", [(2, 2)]])
+def test_a_longer_ramp_tells_no_less_of_lag_and_dead_time(asked, count):
+    # Integrator and lag are one pair of poles, whose ratio grows with the length of the ramp.
+    fit = cr.fit_output_error(record(INTEGRATOR, count, seed=3), structures=asked).fit
+    assert fit.integrators == 1
+    assert fit.interval[0] <= DEAD_TIME <= fit.interval[1]
+    assert fit.interval[1] - fit.interval[0] < 0.1
 
 
 def test_fixed_parameters_stay_and_the_others_have_the_errors_of_least_squares():
