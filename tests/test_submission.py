@@ -70,6 +70,7 @@ def test_errors_in_the_paper_are_those_of_the_table_of_peers(stated, row, digits
     ("stated", "row"),
     [
         (37, "| ctrl_realize: identify | nothing |"),
+        (27, "| pysib: OE(3, 3) for 26 delays |"),
         (18, "| SIPPY: ARX(3, 3) for each delay |"),
         (7, "| SciPy: curve_fit, second order and dead time |"),
     ],
@@ -78,8 +79,12 @@ def test_counts_in_the_paper_are_those_of_the_measured_records(stated, row):
     table = "peers_measured_table.md"
     cells = re.findall(r"(\d+) of (\d+)", " ".join(column(table, row, k) for k in range(3, 12)))
     found = sum(int(hits) for hits, _ in cells)
-    assert (found, sum(int(of) for _, of in cells), len(cells)) == (stated, 46, 9)
-    assert re.search(rf"\b{stated}\b", PAPER)
+    records = sum(int(of) for _, of in cells)
+    slow = column(table, row, 4).startswith("over")  # two records of one plant took too long
+    assert (found, records + 2 * slow) == (stated, 46)
+    readme = (ROOT / "README.md").read_text(encoding="utf-8")
+    for text in (PAPER, readme[readme.index("On 46 step records") :]):
+        assert re.search(rf"\b{stated}\b", text)
 
 
 def test_coverage_and_silent_misses_in_the_paper_are_those_of_the_studies():
