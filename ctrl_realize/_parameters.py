@@ -27,6 +27,8 @@ _LABELS = {
     "lead": "lead",
     "zero_time": "time constant of the zeros",
     "zero_damping": "damping of the zeros",
+    "slew_rate": "slew rate",
+    "dead_band": "dead band",
 }
 
 

@@ -38,6 +38,7 @@ class IdentifyOptions(TypedDict, total=False):
     structures: Structures | None
     include_known: bool
     gains: Literal["common", "own"]
+    actuator: Literal["auto", "slew_rate", "dead_band", "stiction"] | None
     cutoff_hz: float | Literal["auto"] | None
     samples: int | None
     feedthrough: bool | None
@@ -57,6 +58,7 @@ def identify(
     structures: Structures | None = None,
     include_known: bool = False,
     gains: Literal["common", "own"] = "common",
+    actuator: Literal["auto", "slew_rate", "dead_band", "stiction"] | None = None,
     cutoff_hz: float | Literal["auto"] | None = "auto",
     samples: int | None = None,
     feedthrough: bool | None = None,
@@ -81,7 +83,7 @@ def identify(
         Largest delay in samples. Default: for ``"scan"`` the time at which the step response has
         reached half of its final value, for ``"paper"`` 100, for ``"output_error"`` see
         `fit_output_error`.
-    known, loss, noise, structures, include_known, gains : optional
+    known, loss, noise, structures, include_known, gains, actuator : optional
         For ``"output_error"``, see `fit_output_error`.
     cutoff_hz, samples, feedthrough : optional
         For ``"scan"`` and ``"paper"``, see `impulse_from_step` and `estimate_delay`.
@@ -143,6 +145,7 @@ def identify(
     fit_only = {"known": known is not None, "structures": structures is not None}
     fit_only |= {"loss": loss != "huber", "noise": noise != "auto"}
     fit_only |= {"include_known": include_known, "gains": gains != "common"}
+    fit_only["actuator"] = actuator is not None
     if frf is not None and method == "output_error":
         given = [name for name, used in (scan_only | fit_only).items() if used]
         if strange := [name for name in given if name != "structures"]:
@@ -186,10 +189,13 @@ def identify(
             structures=structures,
             include_known=include_known,
             gains=gains,
+            actuator=actuator,
         )
         from .output_error.result import OutputErrorFit
 
         fit = fit_of(system, OutputErrorFit)
+        if fit.actuator is not None:
+            return system
         missing = any(record.n_missing for record in fit.records)
         if np.isfinite(fit.onset) or known is not None or missing:
             return system

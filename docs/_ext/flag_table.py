@@ -20,6 +20,7 @@ RAISED_BY = {
     "identification/methods": "identify",
     "identification/model_class": "identify",
     "identification/output_error": "fit_output_error",
+    "identification/output_error/actuated": "fit_output_error",
     "identification/realization": "realize",
     "identification/realization/scan_curve": "estimate_delay",
     "identification/state_space_fit": "fit_state_space",

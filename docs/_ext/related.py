@@ -19,6 +19,7 @@ PAGES: dict[str, tuple[str, ...]] = {
     "Campaign": ("howto/several_records",),
     "identification.CampaignRow": ("howto/several_records",),
     "identification.RecordGains": ("howto/several_records",),
+    "identification.ActuatorFit": ("theory/actuators", "howto/valve_test"),
     "fit_output_error": ("theory/output_error", "howto/process_models"),
     "identification.OutputErrorFit": ("howto/process_models", "howto/trust_delay"),
     "identification.ProcessStructure": ("howto/process_models",),

@@ -16,7 +16,7 @@ from ...data import Record, StepEdge
 from ...data.given import as_records, check_input
 from ...data.shown_units import in_shown_units
 from ...delayed import DelayedStateSpace
-from ...errors import DataError, NoStepError
+from ...errors import DataError, NoStepError, OptionError
 from ...numerics.arrays import FloatArray
 from ...numerics.blas_threads import single_threaded
 from ...numerics.constants import SMALLEST
@@ -28,6 +28,7 @@ from ...numerics.separable.varpro import KnownFactor, Structure
 from ...numerics.signals.edges import despike, difference_noise
 from ..process_structures import Structures, requested
 from ..step.steps import found_step
+from .actuated.fit import ASKED, Asked, with_actuator
 from .any_input import fit_any_input
 from .averaging import (
     aligned_steps,
@@ -72,6 +73,7 @@ def fit_output_error(
     noise: Noise = "auto",
     include_known: bool = False,
     gains: Gains = "common",
+    actuator: Asked | None = None,
 ) -> DelayedStateSpace:
     """Fit a transfer function with dead time to raw records.
 
@@ -108,6 +110,13 @@ def fit_output_error(
         For several records. ``"own"``: each has its own gain, with common dynamics and dead time;
         records that do not agree with the others are named and left out. The model has the median
         gain, and ``fit.gains`` has all of them as a schedule over the operating point.
+    actuator : {"auto", "slew_rate", "dead_band", "stiction"}, optional
+        Fit also models with this nonlinearity (``"auto"``: all that the command can tell) before or
+        behind the lags. Where the evidence for one is very strong by the same criterion, the model
+        that is returned is its linear part, and ``fit.actuator`` the actuator with the intervals of
+        its parameters; the interval of the dead time is that of both together. Otherwise the fit
+        is linear, and its interval also covers the actuators that are not ruled out. Several
+        records share actuator and linear part.
 
     Returns
     -------
@@ -186,6 +195,12 @@ def fit_output_error(
     loss = one_of(loss, "loss", ("huber", "least_squares"))
     noise = one_of(noise, "noise", ("auto", "white"))
     gains = one_of(gains, "gains", ("common", "own"))
+    if actuator is not None:
+        one_of(actuator, "actuator", ASKED)
+        if known is not None or gains == "own":
+            raise OptionError(
+                f"actuator={actuator!r} with known dynamics or gains='own': expected one of them"
+            )
     asked = requested(structures)
     limit = None if max_delay is None else positive(max_delay, "max_delay", "number of samples")
     factor = known_factor(known)
@@ -203,14 +218,16 @@ def fit_output_error(
         way = _fit_mean if stepped else fit_any_input
         if gains == "own":
             start = relative_gains(aligned_steps(several)) if stepped else None
-            result, fit = fit_own_gains(several, partial(way, several, limit, settings), start)
+            result, _ = fit_own_gains(several, partial(way, several, limit, settings), start)
         else:
-            result, fit = way(several, limit, settings)
+            result, _ = way(several, limit, settings)
         result = replace(result, flags=result.flags + same_record_flags(several))
     else:
-        result, fit = _fit_one(several[0], limit, settings)
+        result, _ = _fit_one(several[0], limit, settings)
     result = checked(result, alone=known is None)
-    core = fitted_core(fit, result.poles)
+    if actuator is not None:
+        result = with_actuator(result, actuator, settings["structures"])
+    core = fitted_core(result.estimate, result.poles)
     if include_known and known is not None:
         core = ct.ss(known) * core
     return fitted_model(core, result)

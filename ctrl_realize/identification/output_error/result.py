@@ -24,6 +24,7 @@ from ...numerics.separable.static_gain import INTEGRATOR
 from ...numerics.signals.correlation import fit_percent
 from ...results import Flag, FractionalDelayFit, IntervalKind
 from ..process_parameters import with_intervals
+from .actuated.result import ActuatorFit
 from .record_gains import RecordGains
 from .repeat_flags import BY_CHANCE
 from .repeatability import Repeatability
@@ -62,6 +63,8 @@ class OutputErrorFit(FractionalDelayFit):
         Automatic choices, with reasons.
     flags : tuple of Flag
         Warnings about the result.
+    actuator : ActuatorFit or None
+        Actuator before or behind the linear model, if one was asked for and is needed.
 
     Examples
     --------
@@ -84,6 +87,7 @@ class OutputErrorFit(FractionalDelayFit):
     gains: RecordGains | None = None
     choices: tuple[str, ...] = ()
     flags: tuple[Flag, ...] = ()
+    actuator: ActuatorFit | None = None
 
     def __post_init__(self) -> None:
         profile = self.estimate.profile
@@ -349,6 +353,7 @@ class OutputErrorFit(FractionalDelayFit):
             ("model", structure_words(self.estimate)),
             ("poles", poles_in_words(self.poles)),
             ("gain", gain_in_words(self.gain, self.gain_interval)),
+            *([("actuator", self.actuator.in_words())] if self.actuator is not None else []),
             ("fit", self._fit_in_words()),
             (
                 "residual",

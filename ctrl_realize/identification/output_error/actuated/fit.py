@@ -1,0 +1,314 @@
+"""Fit an actuator to the records of an output-error fit, and choose between the two."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Literal
+
+import numpy as np
+
+from ...._parameters import Parameter
+from ....actuators import Actuator, Backlash, KanoStiction, SlewRateLimit, Stiction
+from ....data import Record
+from ....errors import NoStepError
+from ....numerics.actuated.choice import ActuatedFit, Rival, fit_actuated
+from ....numerics.actuated.errors import Errors, propagated
+from ....numerics.actuated.motions import Kind, Place
+from ....numerics.actuated.records import MOST_MOVES, ActuatedRecord, actuated_record
+from ....numerics.arrays import FloatArray, IntArray
+from ....numerics.output_error.any_input.fit import WHITE
+from ....numerics.output_error.result import Followed, OutputErrorEstimate, StructureFit
+from ....numerics.output_error.step_data import bare_data, own_regressors
+from ....numerics.output_error.step_fit import ADEQUATE
+from ....numerics.separable.local_terms import Segments, local_columns
+from ....numerics.separable.structures import PLAUSIBLE, Scales
+from ....numerics.separable.varpro import Structure
+from ....numerics.signals.correlation import fit_percent
+from ....numerics.signals.noise import mad_sigma
+from ...step.steps import found_step
+from ..flags import model_flags
+from ..result import OutputErrorFit
+from .result import ActuatorFit
+from .words import missing_test, not_needed, of_the_record, structured, unresolved
+
+Asked = Literal["auto", "slew_rate", "dead_band", "stiction"]
+ASKED: tuple[str, ...] = ("auto", "slew_rate", "dead_band", "stiction")
+
+_KINDS: dict[str, tuple[tuple[Kind, Place], ...]] = {
+    "slew_rate": (("slew_rate", "input"), ("slew_rate", "stem")),
+    "dead_band": (("dead_band", "input"), ("dead_band", "stem")),
+    "stiction": (("kano", "input"), ("choudhury", "input")),
+}
+_MOST_EDGES = 24  # of a command with noise, whose levels are then found
+
+
+def with_actuator(
+    result: OutputErrorFit, asked: str, structures: tuple[Structure, ...] | None
+) -> OutputErrorFit:
+    """Replace a linear fit by one with an actuator, if the evidence for it is very strong.
+
+    Where it is not, and an actuator is not ruled out either, the interval of the dead time covers
+    both. `structures` are those that were asked for.
+    """
+    parts = _parts(result)
+    names = tuple(_KINDS) if asked == "auto" else (asked,)
+    told = [name for name in names if name == "slew_rate" or _reverses(parts)]
+    skipped = tuple(missing_test(name) for name in names if name not in told)
+    wanted = [one for name in told for one in _KINDS[name]]
+    scales = _scales(result)
+    found = fit_actuated(
+        parts, scales, wanted, rivals=_rivals(result, parts), structures=structures
+    )
+    if found is None:
+        return replace(result, choices=result.choices + skipped)
+    if not found.chosen:
+        said = (*skipped, not_needed(told, found.evidence))
+        return replace(_both(result, found), choices=result.choices + said)
+    return _replaced(result, parts, scales, found, skipped)
+
+
+def _both(result: OutputErrorFit, found: ActuatedFit) -> OutputErrorFit:
+    """Let the interval cover a model with an actuator that is not ruled out."""
+    if found.evidence < -PLAUSIBLE:
+        return result
+    low, high = found.dead_time_ends
+    old = result.estimate
+    return replace(result, estimate=replace(old, low=min(low, old.low), high=max(high, old.high)))
+
+
+def _parts(result: OutputErrorFit) -> list[ActuatedRecord]:
+    """Records for the fit of an actuator."""
+    crossing = int(np.ceil(result.dead_time / result.dt)) + 1
+    if len(result.records) == 1:
+        return [_only_part(result, crossing)]
+    found = []
+    for record in result.records:
+        output, command = np.ravel(record.output), np.ravel(record.input)
+        edges = _edges(record)
+        own = None if edges else _free_motion(result, output.size)
+        found.append(
+            actuated_record(output, command, record.dt, edges=edges, crossing=crossing, own=own)
+        )
+    return found
+
+
+def _only_part(result: OutputErrorFit, crossing: int) -> ActuatedRecord:
+    record, data = result.records[0], result.data
+    output, command = np.ravel(record.output).copy(), np.ravel(record.input)
+    if np.isfinite(result.onset):
+        every = replace(data, rows=np.arange(command.size), output=np.zeros(command.size))
+        own = own_regressors(every, result.estimate.poles if result.estimate.relaxing else None)
+        return actuated_record(
+            output, command, record.dt, edges=data.edges, crossing=crossing, own=own
+        )
+    rows = _rows(result)
+    output[: rows[0]] = np.nan
+    part = slice(0, int(rows[-1]) + 1)
+    if rows[-1] - rows[0] + 1 < output.size // 2:
+        # Of a long record the same part as that of the linear fit.
+        part = slice(int(rows[0]), int(rows[-1]) + 1)
+    few = np.count_nonzero(np.diff(command[part])) <= MOST_MOVES  # a test, which begins at rest
+    free = None if few else _free_motion(result, output[part].size)
+    return actuated_record(output[part], command[part], record.dt, crossing=crossing, own=free)
+
+
+def _rows(result: OutputErrorFit) -> IntArray:
+    start = result.records[0].time[0]
+    return np.asarray(np.round((result.time - start) / result.dt), dtype=np.int64)
+
+
+def _free_motion(result: OutputErrorFit, size: int) -> FloatArray:
+    """Level, drift, and free response of the lags of the linear model, (N, q)."""
+    clock = result.dt * np.arange(size, dtype=np.float64)
+    fixed = np.stack([np.ones(size), np.linspace(0, 1, size)], axis=1)
+    stretch = Segments(np.array([0, size]), clock, fixed)
+    return np.asarray(local_columns(stretch, result.estimate.poles[None])[0])
+
+
+def _edges(record: Record) -> list[tuple[int, int]]:
+    try:
+        edges = found_step(record, most=_MOST_EDGES).edges
+    except NoStepError:
+        return []
+    return [(edge.index, edge.samples) for edge in edges] if len(edges) <= _MOST_EDGES else []
+
+
+def _reverses(parts: Sequence[ActuatedRecord]) -> bool:
+    """Whether commands move on in one direction and turn: less tells no dead band from the gain."""
+    moves = [np.diff(part.command[np.concatenate([[0], part.moves])]) for part in parts]
+    turned = any(np.any(own[1:] * own[:-1] < 0) for own in moves)
+    return turned and sum(own.size for own in moves) > 2
+
+
+def _scales(result: OutputErrorFit) -> Scales:
+    dt = result.dt
+    onset = result.onset if np.isfinite(result.onset) else result.dead_time
+    longest = max(record.time[-1] - record.time[0] for record in result.records)
+    lags = result.total_delay - result.dead_time
+    return Scales(
+        onset=max(onset, 0.5 * dt),
+        rise=float(np.clip(lags, 2 * dt, longest / 4)),
+        length=float(longest),
+        dt=dt,
+        latest=max(result.estimate.latest, result.dead_time),
+    )
+
+
+def _rivals(result: OutputErrorFit, parts: Sequence[ActuatedRecord]) -> list[Rival]:
+    """Linear models of a single record: the one chosen, and the one that follows it closest."""
+    if len(parts) > 1:
+        return []
+    part = parts[0]
+    residual = np.zeros(part.command.size)
+    left = result.measured - result.fitted
+    if left.size != part.rows.size:
+        return []
+    residual[part.rows] = left
+    followed = result.estimate.followed
+    found = [Rival(residual, result.estimate.structure)]
+    if followed.complete < 100:
+        # Of the closest one only the size of the residual is known.
+        smaller = (100 - followed.by_closest) / (100 - followed.complete)
+        found.append(Rival(smaller * residual, followed.closest))
+    return found
+
+
+def _replaced(
+    result: OutputErrorFit,
+    parts: Sequence[ActuatedRecord],
+    scales: Scales,
+    found: ActuatedFit,
+    skipped: tuple[str, ...],
+) -> OutputErrorFit:
+    errors = propagated(found.task, found.member, found.coefficients, found.variance, scales.length)
+    several = len(parts) > 1
+    measured = np.concatenate([part.measured[part.rows] for part in parts])
+    fitted = np.concatenate(
+        [model[part.rows] for part, model in zip(parts, found.fitted, strict=True)]
+    )
+    data, time = result.data, result.time
+    if several or measured.size != result.measured.size:
+        command = np.concatenate([part.command[part.rows] for part in parts])
+        span = sum(part.rows.size for part in parts) * result.dt
+        data = bare_data(measured, command, result.dt, found.sigma, span)
+        time = result.dt * np.arange(measured.size, dtype=np.float64)
+    estimate = _estimate(result, found, errors, (measured, fitted))
+    actuator = _actuator_fit(result, found, errors, parts)
+    replaced = replace(
+        result,
+        estimate=estimate,
+        data=data,
+        time=time,
+        repeatability=None,
+        choices=(*skipped, *actuator.unresolved),
+        flags=(),
+        actuator=actuator,
+    )
+    flags = [flag for flag in result.flags if of_the_record(flag.code)]
+    told = model_flags(estimate, result.dt, scales.length, None)
+    flags += [flag for flag in told if flag is not None]
+    if not estimate.adequate:
+        flags.append(structured(replaced.normalized_rms))
+    return replace(replaced, flags=tuple(flags))
+
+
+def _estimate(
+    result: OutputErrorFit,
+    found: ActuatedFit,
+    errors: Errors,
+    shown: tuple[FloatArray, FloatArray],
+) -> OutputErrorEstimate:
+    measured, fitted = shown
+    member, structure = found.member, found.member.family.structure
+    low, high = found.dead_time_ends
+    low, high = min(low, member.dead_time), max(high, member.dead_time)
+    complete = float(fit_percent(measured[None], fitted[None])[0])
+    stepped = np.isfinite(result.onset) and len(result.records) == 1
+    if stepped:
+        noise = result.data.sigma
+        free = max(found.task.records.data.size - member.parameters, 1)
+        misfit = float(np.sqrt(member.cost / free)) / noise
+        adequate = misfit <= ADEQUATE * max(result.data.colour, 1.0)
+    else:
+        misfit, adequate = float(np.sqrt(found.correlation)), found.correlation <= WHITE
+    row = StructureFit(
+        structure, member.dead_time, errors.static.total, 0.0, (low, high), found.poles,
+        errors.static.gain,
+    )  # fmt: skip
+    profile = (np.array([low, member.dead_time, high]), np.array([3.84, 0.0, 3.84]))
+    return replace(
+        result.estimate,
+        dead_time=member.dead_time,
+        low=low,
+        high=high,
+        std=found.std,
+        structure=structure,
+        poles=found.poles,
+        numerator=found.numerator,
+        adequate=bool(adequate),
+        normalized_rms=misfit,
+        residual=mad_sigma(measured - fitted),
+        correlation=found.correlation,
+        structures=(row,),
+        delay_estimates=(),
+        fitted=fitted,
+        followed=Followed(complete, complete, structure, complete),
+        profile=profile,
+        chain=None,
+        endless=False,
+        open_start=False,
+        flows=(),
+        other_models=(),
+        follows_flow=False,
+        whitened=False,
+        static=errors.static,
+        alike=(),
+        better=None,
+        close=(),
+        rounded=None,
+        parameters=errors.parameters,
+        noise_lags=0,
+        unweighted=None,
+    )
+
+
+def _actuator_fit(
+    result: OutputErrorFit, found: ActuatedFit, errors: Errors, parts: Sequence[ActuatedRecord]
+) -> ActuatorFit:
+    member = found.member
+    unit = result.input_unit
+    names: dict[Kind, tuple[str, ...]] = {
+        "slew_rate": ("slew_rate",),
+        "dead_band": ("dead_band",),
+    }
+    parameters = []
+    for name, value, std, (low, high) in zip(
+        names.get(member.family.kind, ("S", "J")),
+        member.values,
+        errors.value_std,
+        found.value_ends,
+        strict=True,
+    ):
+        timed = name == "slew_rate"
+        shown = f"{unit}/s" if unit and timed else unit
+        parameters.append(Parameter(name, value, std, low, high, False, shown, -1 if timed else 0))
+    return ActuatorFit(
+        model=_model(member.family.kind, member.values, member.starts),
+        actuator_at=member.family.place,
+        parameters=tuple(parameters),
+        starts=tuple(member.starts.tolist()),
+        evidence=found.evidence,
+        unresolved=unresolved(parameters),
+    )
+
+
+def _model(kind: Kind, values: tuple[float, ...], starts: FloatArray) -> Actuator:
+    """The actuator, at the place of the first record."""
+    start = float(starts[0]) if starts.size else 0.0
+    if kind == "slew_rate":
+        return SlewRateLimit(values[0])
+    if kind == "dead_band":
+        return Backlash(values[0], start)
+    model = KanoStiction if kind == "kano" else Stiction
+    return model(values[0], values[1], start)

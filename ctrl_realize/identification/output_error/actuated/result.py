@@ -1,0 +1,80 @@
+"""What a fit has found about an actuator."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from ...._parameters import Parameter
+from ....actuators import Actuator
+from ....numerics.arrays import FloatArray
+
+Place = Literal["input", "stem"]
+_PLACES: dict[Place, str] = {"input": "before the lags", "stem": "behind the lags"}
+
+
+@dataclass(frozen=True)
+class ActuatorFit:
+    """Actuator that was estimated together with dead time and lags.
+
+    ``output = level + gain * G(model(input))`` for an actuator at the input, where G is the linear
+    part with unit gain, and ``level + gain * model(G(input))`` for one at the stem.
+
+    Attributes
+    ----------
+    model : Actuator
+        From `ctrl_realize.actuators`, in the unit of the input.
+    actuator_at : {"input", "stem"}
+        Whether it acts before the lags of the linear part, or behind them. The dead time commutes
+        with it.
+    parameters : tuple of Parameter
+        Estimates with standard errors and 95 % intervals (profile likelihood): ``"slew_rate"`` per
+        second, ``"dead_band"``, or ``"S"`` and ``"J"``.
+    starts : tuple of float
+        Place within play or friction at the beginning of each record, from -1 (came from above) to
+        1 (from below); empty for a slew rate.
+    evidence : float
+        Information criterion of the best linear model minus that of this one.
+    unresolved : tuple of str
+        What the records cannot tell, in words, and the test that would.
+
+    Examples
+    --------
+    >>> import ctrl_realize as cr
+    >>> slow = cr.actuators.SlewRateLimit(300.0)
+    >>> valve = cr.bench.valve(actuator=slow, actuator_at="input", lvdt_hz=None)
+    >>> record = valve.step_record(16, rng=1)  # 300 % of 16 mA in a second
+    >>> fit = cr.fit_output_error(record, structures=[(3, 3)], actuator="slew_rate").fit
+    >>> rate = fit.actuator["slew_rate"]
+    >>> low, high = fit.interval
+    >>> print(f"{rate.value:.1f}, true 48; {low < valve.truth.dead_time < high}")
+    48.0, true 48; True
+    """
+
+    model: Actuator
+    actuator_at: Place
+    parameters: tuple[Parameter, ...]
+    starts: tuple[float, ...]
+    evidence: float
+    unresolved: tuple[str, ...] = ()
+
+    def __getitem__(self, name: str) -> Parameter:
+        """Parameter by its name."""
+        for one in self.parameters:
+            if one.name == name:
+                return one
+        raise KeyError(f"{name!r}; expected one of {[one.name for one in self.parameters]}")
+
+    def in_words(self) -> str:
+        """Write the actuator with its parameters and intervals."""
+        numbers = ", ".join(
+            f"{one.label} {one.text()} ({one.interval_text() or 'one end is not told'})"
+            for one in self.parameters
+        )
+        return f"{numbers}; {_PLACES[self.actuator_at]}"
+
+    def position(self, command: FloatArray, dt: float) -> FloatArray:
+        """Pass a command through the actuator alone."""
+        return self.model.simulate(np.asarray(command), dt)

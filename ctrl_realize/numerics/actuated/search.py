@@ -1,0 +1,162 @@
+"""Search of the best member of a family: a grid of actuators, then the best ones improved.
+
+The misfit is a piecewise smooth function of stiction: which moves of the command set a stem in
+motion changes at once. The slip jump is therefore searched without derivatives [1]_.
+
+References
+----------
+.. [1] R. P. Brent, Algorithms for Minimization without Derivatives, Prentice Hall 1973, chapter 5.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from scipy.optimize import minimize_scalar
+
+from ..arrays import FloatArray
+from ..separable.poles import parameters_from_poles, poles_from_parameters
+from ..separable.structures import Candidate, Scales, neighbour_starts, pattern_starts
+from ..separable.varpro import Structure
+from .family import STICKING, VALUES, Family, Member, Records, Task
+
+_MOST_STARTS = 16
+_FOLLOWED = 2  # starts that are followed to the bottom: time
+_ROUGH = 6  # iterations in which starts are compared
+_ACTUATORS = 2  # of a grid, that are tried with each linear part
+_QUICK = 0.2
+_SHORTEST, _LONG, _RISES = 3.0, 20.0, 5  # samples, parts of a record: lags behind what sticks
+_QUICKLY = 3  # iterations beside a point that was followed to the bottom
+_RATES = np.geomspace(0.1, 10.0, 9)  # ranges of the command in the visible rise
+_WIDTHS = np.geomspace(3e-3, 0.6, 10)  # parts of the range of the command
+_PLACES = (-1.0, 0.0, 1.0)
+_RESOLVED = 5e-3  # of a logarithm, to which a slip jump is searched
+_BESIDE = 0.4  # of a logarithm: reach of the last search about the best slip jump
+_POINTS = 9
+
+
+def searched(
+    records: Records, family: Family, scales: Scales, beside: Sequence[Member] = ()
+) -> Member:
+    """Find the best member of a family.
+
+    Parameters
+    ----------
+    records : Records
+    family : Family
+    scales : Scales
+        Initial guess of the response, see `structures`.
+    beside : sequence of Member
+        Models that were found already, as starts.
+    """
+    task = Task(records, family, scales)
+    linear = _linear_starts(family, scales, beside)
+    best = [x for start in linear for x in _best_actuators(task, start)]
+    costs = [task.cost(x) for x in best]
+    best = [best[i] for i in np.argsort(costs)[:_MOST_STARTS]]
+    rough = sorted((task.improved(x, turns=_ROUGH) for x in best), key=_cost)
+    found = min((task.improved(one.x) for one in rough[:_FOLLOWED]), key=_cost)
+    return _jumped(task, found) if VALUES[family.kind] == 2 else found
+
+
+def _best_actuators(task: Task, linear: FloatArray) -> list[FloatArray]:
+    """Starts with these dead time and poles, and the best actuators of a grid."""
+    starts = [np.clip(np.concatenate([linear, more]), *task.bounds) for more in _actuators(task)]
+    costs = [task.cost(x) for x in starts]
+    few = _ACTUATORS if task.family.kind in STICKING else 1
+    return [starts[i] for i in np.argsort(costs)[:few]]
+
+
+def with_other_lags(
+    records: Records, found: Member, structures: Sequence[Structure], scales: Scales
+) -> list[Member]:
+    """Best members with the same actuator and other lags, from one that was found."""
+    members = {found.family.structure: found}
+    for structure in sorted(structures, key=lambda s: (s.order, s.zeros)):
+        if structure in members:
+            continue
+        task = Task(records, replace(found.family, structure=structure), scales)
+        own = {s: Candidate(s, m.x[: 1 + s.order], m.cost) for s, m in members.items()}
+        starts = neighbour_starts(structure, scales, own)
+        if not starts:
+            poles = poles_from_parameters(found.theta[None])[0][0]
+            slowest = poles[np.argsort(np.abs(poles))][: structure.order]
+            if structure.order < poles.size and not slowest.imag.any():
+                starts = [np.concatenate([found.x[:1], parameters_from_poles(slowest)])]
+            else:
+                starts = pattern_starts(structure, scales)
+        rest = found.x[1 + found.family.structure.order :]
+        tried = [task.improved(np.concatenate([start, rest])) for start in starts[:_FOLLOWED]]
+        members[structure] = min(tried, key=_cost)
+    return list(members.values())
+
+
+def _linear_starts(family: Family, scales: Scales, beside: Sequence[Member]) -> list[FloatArray]:
+    """Dead times and poles that are tried."""
+    order = family.structure.order
+    plain = Structure(order, order)
+    every = pattern_starts(plain, scales)
+    if family.kind == "none":
+        return every
+    # The lags of the response are longer than those of the plant.
+    quick = pattern_starts(plain, replace(scales, rise=_QUICK * scales.rise))
+    if family.kind == "slew_rate":
+        return every + quick
+    same = [one.x[: 1 + order] for one in beside if one.family.structure == family.structure]
+    # What sticks makes linear models find lags and dead times of any length.
+    rises = np.geomspace(_SHORTEST * scales.dt, scales.length / _LONG, _RISES)
+    return same + [
+        pattern_starts(plain, replace(scales, rise=rise, onset=min(rise, scales.latest)))[0]
+        for rise in rises.tolist()
+    ]
+
+
+def _actuators(task: Task) -> list[FloatArray]:
+    """Logarithms of values, and starts, that are tried."""
+    kind, reach = task.family.kind, task.records.range
+    if kind == "none":
+        return [np.empty(0)]
+    if kind == "slew_rate":
+        return [np.log([ratio * reach / task.scales.rise]) for ratio in _RATES]
+    count = len(task.records.parts)
+    at = [np.full(count, place) for place in _PLACES]
+    if kind == "dead_band":
+        return [np.concatenate([np.log([w * reach]), place]) for w in _WIDTHS for place in at]
+    return [
+        np.concatenate([np.log([stick * reach, jump * reach]), place])
+        for i, stick in enumerate(_WIDTHS)
+        for jump in _WIDTHS[: i + 1]
+        for place in at
+    ]
+
+
+def _jumped(task: Task, found: Member) -> Member:
+    """Search the slip jump, everything else following it."""
+    at = 2 + task.family.structure.order  # logarithm of J in x
+    best = [found]
+
+    def cost(jump: float) -> float:
+        x = best[0].x.copy()
+        x[at] = jump
+        member = task.improved(x, fixed=[at], turns=_QUICKLY)
+        if member.cost < best[0].cost:
+            best[0] = member
+        return member.cost
+
+    middle = float(found.x[at])
+    for jump in np.linspace(middle - _BESIDE, middle + _BESIDE, _POINTS):
+        cost(float(jump))
+    middle, reach = float(best[0].x[at]), 2 * _BESIDE / (_POINTS - 1)
+    minimize_scalar(
+        cost,
+        bounds=(middle - reach, middle + reach),
+        method="bounded",
+        options={"xatol": _RESOLVED, "maxiter": _POINTS},
+    )
+    return task.improved(best[0].x)
+
+
+def _cost(member: Member) -> float:
+    return member.cost

@@ -1,0 +1,96 @@
+"""Fits of records through an actuator, against simulated truth."""
+
+from __future__ import annotations
+
+import control as ct
+import numpy as np
+import pytest
+
+import ctrl_realize as cr
+from ctrl_realize.actuators import Backlash, KanoStiction, SlewRateLimit
+
+DT, DEAD_TIME = 0.1, 0.73
+PLANT = cr.delayed_ss(2 * ct.tf([1], [0.5, 1.5, 1]), dead_time=DEAD_TIME, dt=DT)
+FINE = 20
+"""Steps within a sample for a position that moves within it."""
+
+
+def through(actuator, command, seed, noise=0.005):
+    """Record of an actuator before two lags, with white noise as a part of the range."""
+    fine = DT / FINE
+    position = actuator.simulate(np.repeat(command, FINE), fine)
+    # A position that moves is held at its mean over each step.
+    held = 0.5 * (position + np.concatenate([position[:1], position[:-1]]))
+    held = np.where(np.abs(np.diff(position, prepend=position[0])) > 3, position, held)
+    plant = cr.delayed_ss(2 * ct.tf([1], [0.5, 1.5, 1]), dead_time=DEAD_TIME, dt=fine)
+    y = np.ravel(plant.simulate(held - held[0]))[::FINE]
+    y += noise * np.ptp(y) * np.random.default_rng(seed).standard_normal(y.size)
+    return cr.Record(DT * np.arange(y.size), command, y, units={"u": "%", "y": "mm"})
+
+
+def staircase(*moves, hold=120):
+    return np.repeat(50.0 + np.cumsum([0.0, *moves]), hold)
+
+
+def test_a_single_large_step_tells_a_slew_rate_and_the_dead_time_behind_it():
+    record = through(SlewRateLimit(12.0), staircase(40.0, hold=150), 1)
+    linear = cr.fit_output_error(record).fit
+    fit = cr.fit_output_error(record, actuator="slew_rate").fit
+    assert linear.actuator is None
+    rate = fit.actuator["slew_rate"]
+    assert rate.low <= 12.0 <= rate.high
+    assert rate.high - rate.low < 1.2
+    assert rate.unit == "%/s"
+    assert fit.interval[0] <= DEAD_TIME <= fit.interval[1]
+    assert abs(fit.dead_time - DEAD_TIME) < 0.05
+    assert fit.fit_percent > linear.fit_percent
+    assert "slew rate" in fit.report()
+
+
+def test_records_of_several_sizes_share_dead_band_and_linear_part():
+    records = [
+        through(Backlash(1.3, 0.5), staircase(3, -3, 3, 3, -3), 0),
+        through(Backlash(1.3, -0.5), staircase(10, 10, -10, -10), 1),
+    ]
+    fit = cr.fit_output_error(records, actuator="dead_band").fit
+    band = fit.actuator["dead_band"]
+    assert band.low <= 1.3 <= band.high
+    assert band.high - band.low < 0.1
+    assert fit.actuator.starts == pytest.approx((0.5, -0.5), abs=0.1)
+    assert fit.interval[0] <= DEAD_TIME <= fit.interval[1]
+    assert fit.gain_interval[0] <= 2.0 <= fit.gain_interval[1]
+
+
+def test_small_steps_tell_slip_jump_and_stick_band():
+    command = staircase(*[0.5] * 8, *[-0.5] * 14, *[0.5] * 8, hold=40)
+    record = through(KanoStiction(S=2.6, J=1.3, start=1.0), command, 3)
+    fit = cr.fit_output_error(record, actuator="stiction", structures=[(2, 2)]).fit
+    for name, truth in (("S", 2.6), ("J", 1.3)):
+        found = fit.actuator[name]
+        assert found.low <= truth <= found.high
+        assert found.high - found.low < 0.8  # steps are 0.5 high
+
+
+def test_a_linear_valve_gets_no_actuator_and_its_interval_covers_those_not_ruled_out():
+    record = through(SlewRateLimit(1e6), staircase(4, 4, -4, -4, hold=90), 2)
+    linear = cr.fit_output_error(record).fit
+    fit = cr.fit_output_error(record, actuator="auto").fit
+    assert fit.actuator is None
+    assert fit.dead_time == linear.dead_time
+    assert fit.interval[0] <= linear.interval[0] <= linear.interval[1] <= fit.interval[1]
+    assert any("slew-rate limit" in choice for choice in fit.choices)
+
+
+def test_one_step_is_told_not_to_tell_a_dead_band():
+    record = through(Backlash(2.0), staircase(10, hold=90), 2)
+    fit = cr.fit_output_error(record, actuator="dead_band", structures=[(2, 2)]).fit
+    assert fit.actuator is None
+    assert any("staircase" in choice for choice in fit.choices)
+
+
+def test_an_actuator_is_not_fitted_beside_known_dynamics():
+    record = through(Backlash(2.0), staircase(10, hold=40), 2)
+    with pytest.raises(cr.errors.OptionError, match="known"):
+        cr.fit_output_error(record, known=ct.tf([1], [0.1, 1]), actuator="auto")
+    with pytest.raises(cr.errors.OptionError, match="actuator"):
+        cr.fit_output_error(record, actuator="sticky")
