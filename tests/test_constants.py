@@ -9,24 +9,12 @@ import pytest
 from benchmarks.ablation.switches import SWITCHES
 
 PACKAGE = Path(__file__).parents[1] / "ctrl_realize"
-FOLDERS = (
-    "numerics/output_error",
-    "numerics/joint",
-    "numerics/separable",
-    "numerics/signals",
-    "numerics/validation",
-    "numerics/hankel",
-    "numerics/internal_delays",
-    "numerics/loops",
-    "numerics/rational",
-    "numerics/regression",
-    "numerics/state_space",
-    "identification",
-    "identification/output_error",
-    "identification/joint",
-    "identification/state_space_fit",
-    "identification/step",
-)
+NUMERICS = [
+    "output_error", "joint", "separable", "signals", "validation", "hankel", "internal_delays",
+    "loops", "rational", "regression", "state_space",
+]  # fmt: skip
+FITS = [".", "output_error", "joint", "state_space_fit", "step"]
+FOLDERS = [f"numerics/{name}" for name in NUMERICS] + [f"identification/{name}" for name in FITS]
 MODULES = [path for folder in FOLDERS for path in sorted((PACKAGE / folder).glob("*.py"))]
 
 
