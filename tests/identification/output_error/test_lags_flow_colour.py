@@ -195,7 +195,7 @@ def test_colour_that_only_the_response_has_is_a_misfit():
     data, _ = record(2, lambda rng: rng.standard_normal(N), 0.005)
     after = np.arange(N) >= BEFORE
     bent = data.output + 0.02 * after * ringing(np.random.default_rng(5))
-    fit = cr.fit_output_error(cr.Record(data.time, data.input, bent)).fit
+    fit = cr.fit_output_error(cr.Record(data.time, data.input, bent), **LAGS).fit
     assert "generalised" not in fit.report()
 
 
@@ -230,7 +230,7 @@ def test_a_rest_that_is_silent_but_for_bursts_tells_no_colour():
     y = np.where(k > 543, -np.expm1(-(k - 543) / 60), 0)
     for burst in rng.integers(0, 1390, 25):
         y[burst : burst + 6] += 0.05 * rng.standard_normal()
-    fit = cr.fit_output_error(cr.Record(0.1 * k, 1.0 * (k >= 500), y)).fit
+    fit = cr.fit_output_error(cr.Record(0.1 * k, 1.0 * (k >= 500), y), **LAGS).fit
     assert "generalised" not in fit.report()
     low, high = fit.delay_interval
     assert low <= 43 <= high

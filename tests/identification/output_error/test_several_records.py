@@ -83,7 +83,8 @@ def test_play_that_one_height_takes_for_dead_time_is_told_by_several():
     told = [str(flag) for flag in one.flags if flag.code == "onset_open"]
     assert "Backlash" in told[0]
     heights = (1.0, 1.5, 2.0, 3.0)
-    several = cr.fit_output_error([through_play(h, k) for k, h in enumerate(heights)]).fit
+    records = [through_play(h, k) for k, h in enumerate(heights)]
+    several = cr.fit_output_error(records, structures=[(2, 2), (3, 3)]).fit
     assert "amplitude_trend" in codes(several)
     assert several.repeatability.trend < 0
 
