@@ -160,7 +160,7 @@ DEFECTS = (
        "if fit.high < 0.98 * fit.latest:", "if True:", "test_flags step_fit unmodelled", FITS),
     _d("no delay at all", "that no dead time fits as well is not flagged",
        "if fit.low > _SAMPLES_BESIDE_NOTHING * dt:", "if True:",
-       "test_flags step_fit unmodelled", FITS),
+       "short_dead gain_resolved", FITS),
     _d("not settled", "a record that ends early is not flagged", "if not unseen.size:", "if True:",
        "test_flags step_fit unmodelled", FITS),
     _d("integrator", "an integrating plant is not flagged", "if slowest < INTEGRATOR:", "if False:",
