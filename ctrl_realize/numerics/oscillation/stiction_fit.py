@@ -104,29 +104,7 @@ def fit_stiction(
     task = _Task(output, value, period, sign, integrating)
     linear = task.best(0.0, 0.0, task.lags)
     swing = 2 * np.sqrt(2) * float(without_drift(output, period).std())
-    points = [
-        task.best(stick, part * stick, task.lags) for stick in swing * _COARSE for part in _JUMPS
-    ]
-    center = min(points, key=_by_error)
-    near = (
-        [center.lag] if np.isinf(center.lag) else [0.7 * center.lag, center.lag, 1.4 * center.lag]
-    )
-    points += [
-        task.best(stick, part * stick, near)
-        for stick in center.stick + swing * _FINE
-        for part in _FINE_JUMPS
-        if stick > 0
-    ]
-    center = min(points, key=_by_error)
-    near = (
-        [center.lag] if np.isinf(center.lag) else [0.85 * center.lag, center.lag, 1.2 * center.lag]
-    )
-    points += [
-        task.best(stick, jump, near)
-        for stick in center.stick + swing * _FINEST
-        for jump in center.jump + swing * _FINEST
-        if stick > 0 and 0 <= jump <= stick
-    ]
+    points = _searched(task, swing)
     best = min(points, key=_by_error)
     if linear.gain == 0 or best.gain == 0:
         return None
@@ -143,6 +121,34 @@ def fit_stiction(
         best.error, linear.error, _larger(task.blocks(linear), blocks), best.gain,
         every * best.lag, every * best.delay,
     )  # fmt: skip
+
+
+def _searched(task: _Task, swing: float) -> list[_Point]:
+    """Try pairs of S and J on three grids, each about the best pair of the one before."""
+    points = [
+        task.best(stick, part * stick, task.lags) for stick in swing * _COARSE for part in _JUMPS
+    ]
+    center = min(points, key=_by_error)
+    near = _about(center.lag, 1.4)
+    points += [
+        task.best(stick, part * stick, near)
+        for stick in center.stick + swing * _FINE
+        for part in _FINE_JUMPS
+        if stick > 0
+    ]
+    center = min(points, key=_by_error)
+    near = _about(center.lag, 1.2)
+    points += [
+        task.best(stick, jump, near)
+        for stick in center.stick + swing * _FINEST
+        for jump in center.jump + swing * _FINEST
+        if stick > 0 and 0 <= jump <= stick
+    ]
+    return points
+
+
+def _about(lag: float, factor: float) -> list[float]:
+    return [lag] if np.isinf(lag) else [lag / factor, lag, lag * factor]
 
 
 def _by_error(point: _Point) -> float:

@@ -128,16 +128,13 @@ def judge(
     votes = [one for one in methods if one.key in VOTERS]
     sticks = [one.name for one in votes if one.verdict == "stiction"]
     not_so = [one.name for one in votes if one.verdict == "no stiction"]
-    told = f"stiction by {_listed(sticks)}; no stiction by {_listed(not_so)}"
+    named = (("stiction", sticks), ("no stiction", not_so))
+    told = "; ".join(f"{word} by {', '.join(names)}" for word, names in named if names)
     if len(sticks) > 1 and len(sticks) >= 2 * len(not_so):
         return "stiction", told
     if len(not_so) > 1 and len(not_so) >= 2 * len(sticks):
         return "no stiction: tuning or external oscillation", told
-    return "cannot tell", told
-
-
-def _listed(names: Sequence[str]) -> str:
-    return ", ".join(names) if names else "none"
+    return "cannot tell", told or "no method tells"
 
 
 def _resolution(signal: FloatArray) -> float:
