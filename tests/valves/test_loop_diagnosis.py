@@ -166,10 +166,13 @@ def test_records_that_cannot_tell_say_why():
         assert found.verdict == "cannot tell", code
         assert code in {flag.code for flag in found.flags}
     gaps = lagging.copy()
-    gaps[[100, 1500]] = np.nan
+    gaps[100:110], gaps[1500] = np.nan, np.inf
     found = diagnosed(wave, gaps)
-    assert found.signals.op.size == 1399
-    assert found.flags[0].code == "missing_samples"
+    assert found.signals.op.size == 1890
+    assert {flag.code for flag in found.flags[:2]} == {"missing_samples", "filled_samples"}
+    line = 0.5 * (lagging[1499] + lagging[1501])
+    assert found.signals.pv[1500 - 110] == pytest.approx(line)
+    assert diagnosed(wave[:60] * 0, 0.5 ** TIME[:60]).verdict == "cannot tell"
     assert diagnosed(wave, np.full(2000, 3.0)).verdict == "cannot tell"
 
 

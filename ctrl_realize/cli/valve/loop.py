@@ -36,12 +36,18 @@ def run_loop(
         raise OptionError(f"{len(files)} files; expected one record of operation")
     choices: dict[str, Any] = {"process": process}
     words = [str(files[0]), *words_of({**choices, **reading})]
+    reading = {**reading, "missing": "keep"}  # the longest complete part is judged
     words += [] if set_point is None else ["--set-point", set_point]
     run = Run(typed_call("loop", words), tuple(files), overwrite)
     refuse_other_results(output, run)
-    record, sp = _read(files[0], set_point, reading)
+    if set_point is None:
+        record = read_record(files[0], **reading)
+        result = diagnose_loop(record, **choices)
+    else:
+        record = _with_set_point(files[0], set_point, reading)
+        value, wanted = record.output
+        result = diagnose_loop(record.input, value, wanted, record.dt, **choices)
     say(printable(f"{files[0]}: {record!r}"))
-    result = diagnose_loop(record, sp=sp, **choices)
     say(result.report())
     words += ["--output", str(output)]
     calls = [("In a terminal", typed_call("loop", words))]
@@ -61,15 +67,12 @@ def run_loop(
     return 0 if written or not report else 1
 
 
-def _read(file: Path, set_point: str | None, reading: Mapping[str, Any]) -> tuple[Record, Any]:
-    """Record of OP and PV, and the set point if there is one."""
-    if set_point is None:
-        return read_record(file, **reading), None
+def _with_set_point(file: Path, set_point: str, reading: Mapping[str, Any]) -> Record:
+    """Record whose outputs are the process value and the set point."""
     given = reading.get("output")
     if given is None or isinstance(given, list):
         raise OptionError("--set-point needs the column of the process value: --output-column")
-    both = read_record(file, **{**reading, "output": [given, set_point]})
-    return Record(both.time, both.input, both.output[0], name=both.name), both.output[1]
+    return read_record(file, **{**reading, "output": [given, set_point]})
 
 
 def _in_python(file: Path, reading: Mapping[str, Any], choices: Mapping[str, Any]) -> str:

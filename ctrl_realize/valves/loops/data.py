@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -13,6 +14,8 @@ from ...errors import DataError
 from ...numerics.arrays import FloatArray, locked
 from ...numerics.constants import LARGEST
 
+LONGEST_GAP = 3
+"""Missing samples in a row that are interpolated."""
 FEWEST = 24
 """Samples without which there is nothing to look at."""
 
@@ -21,7 +24,8 @@ FEWEST = 24
 class LoopData:
     """Controller output, process value and set point, complete, with a fixed sample time.
 
-    `left_out` counts the samples before and after the longest part without missing ones.
+    `filled` counts the samples in short gaps, which are interpolated; `left_out` those before and
+    after the longest part without long gaps.
     """
 
     op: FloatArray
@@ -29,6 +33,7 @@ class LoopData:
     sp: FloatArray | None
     dt: float
     left_out: int
+    filled: int
 
     @property
     def deviation(self) -> FloatArray:
@@ -84,15 +89,37 @@ def loop_data(loop: Any, pv: Any, sp: Any, dt: Any) -> LoopData:
     largest = float(np.abs(table[complete]).max(initial=0.0))
     if largest > LARGEST:
         raise DataError(f"values up to {largest:.3g}; expected at most {LARGEST:.0e}")
-    first, last = _longest_part(np.asarray(complete.all(axis=0)))
+    good = np.asarray(complete.all(axis=0))
+    first, last = _longest_part(_without_short_gaps(good))
     size = signals["op"].size
     if last - first < FEWEST:
         raise DataError(
-            f"the longest part without missing samples has {last - first} of {size}; expected at "
+            f"the longest part without long gaps has {last - first} of {size}; expected at "
             f"least {FEWEST}, and some cycles of the oscillation"
         )
-    cut = {name: locked(each[first:last]) for name, each in signals.items()}
-    return LoopData(cut["op"], cut["pv"], cut.get("sp"), step, size - (last - first))
+    place, known = np.arange(size, dtype=np.float64), np.flatnonzero(good)
+    cut = {
+        name: locked(np.interp(place[first:last], place[known], each[known]))
+        for name, each in signals.items()
+    }
+    return LoopData(
+        cut["op"],
+        cut["pv"],
+        cut.get("sp"),
+        step,
+        size - (last - first),
+        int(np.sum(~good[first:last])),
+    )
+
+
+def _without_short_gaps(good: np.ndarray) -> np.ndarray:
+    """Mark the samples of short gaps between complete parts as good, too."""
+    bridged = good.copy()
+    known = np.flatnonzero(good)
+    for before, after in pairwise(known.tolist()):
+        if 1 < after - before <= LONGEST_GAP + 1:
+            bridged[before:after] = True
+    return bridged
 
 
 def _longest_part(good: np.ndarray) -> tuple[int, int]:

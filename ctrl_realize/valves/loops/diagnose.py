@@ -63,7 +63,7 @@ def diagnose_loop(
     Raises
     ------
     DataError
-        Several channels, different lengths, or fewer than 24 samples without gaps.
+        Several channels, different lengths, or fewer than 24 samples without long gaps.
     OptionError
         Another process.
 
@@ -79,8 +79,9 @@ def diagnose_loop(
     as many as contradict them. The bicoherence [10]_ tells whether the loop is nonlinear, not why,
     and is not counted.
 
-    An external disturbance with edges, and a limit cycle by other nonlinearities, look like
-    stiction to all of these.
+    Up to three missing samples in a row are interpolated; longer gaps cut the record, and the
+    longest part is judged. An external disturbance with edges, and a limit cycle by other
+    nonlinearities, look like stiction to all of these.
 
     References
     ----------
@@ -151,7 +152,7 @@ def diagnose_loop(
         methods.bicoherence(higher, note),
     )
     flags = flags_of(data, cycles)
-    verdict, reason = judge(state, found, flags)
+    verdict, reason = judge(state, data.op.size, found, flags)
     return LoopDiagnosis(
         verdict, reason, state, found, kind, data, cycles, correlation, halves_op, halves_pv,
         ellipse, fit, tuple(flags), (f"process: {kind}, as given or by default",),

@@ -10,7 +10,7 @@ import numpy as np
 from ...numerics.arrays import FloatArray
 from ...numerics.oscillation.cycles import FEWEST_CYCLES, SHORTEST_PERIOD, Cycles
 from ...results import Flag
-from .data import LoopData
+from .data import LONGEST_GAP, LoopData
 from .methods import VOTERS, LoopMethod
 
 LoopVerdict: TypeAlias = Literal[
@@ -23,6 +23,8 @@ _DECAY, _ALIKE = 0.6, 0.6
 """Limits of decay ratio and like half cycles from which on an oscillation is taken for sure. Above
 the published 0.5 and 0.4: of random walks, which have cycles of all lengths, 7 % pass instead of
 30 %."""
+_FEWEST_TO_DENY = 100
+"""Samples from which on a record without regular cycles is said not to oscillate."""
 _SATURATED = 0.05
 _COARSE = 10.0
 """Levels from the smallest to the largest value, below which the shape of a cycle is lost."""
@@ -46,8 +48,16 @@ def flags_of(data: LoopData, cycles: Cycles | None) -> list[Flag]:
         flags.append(
             Flag(
                 "missing_samples",
-                f"only the longest part without missing samples is used: {data.op.size} of "
+                f"only the longest part without gaps is used: {data.op.size} samples of "
                 f"{data.op.size + data.left_out}",
+            )
+        )
+    if data.filled:
+        flags.append(
+            Flag(
+                "filled_samples",
+                f"{data.filled} of {data.op.size} samples were missing, in gaps of at most "
+                f"{LONGEST_GAP}: they are interpolated",
             )
         )
     for name, signal in (("controller output", data.op), ("process value", data.pv)):
@@ -109,7 +119,7 @@ SPOILS = {"constant_signal", "saturated_output", "set_point_moves", "coarse_quan
 
 
 def judge(
-    state: bool | None, methods: Sequence[LoopMethod], flags: Sequence[Flag]
+    state: bool | None, samples: int, methods: Sequence[LoopMethod], flags: Sequence[Flag]
 ) -> tuple[LoopVerdict, str]:
     """Return the verdict and its reason.
 
@@ -118,6 +128,8 @@ def judge(
     constant = [flag for flag in flags if flag.code == "constant_signal"]
     if constant:
         return "cannot tell", constant[0].message
+    if state is False and samples < _FEWEST_TO_DENY:
+        return "cannot tell", f"{samples} samples are too few to say that there is no oscillation"
     if state is False:
         return "no oscillation", "no regular oscillation in the process value"
     if state is None:
