@@ -87,10 +87,10 @@ def _fit_lines(fits: list[tuple[str, float, float, bool, bool]]) -> list[str]:
 
 def _method_lines(counts: dict[tuple[str, str], Counter[str]]) -> list[str]:
     lines = [
-        f"Simulated loops, {SEEDS} records each, whose process value oscillates or may: of 100 "
+        f"Simulated loops, {SEEDS} records each, whose process value oscillates, or may: of 100 "
         "records, in how many each method says stiction / no stiction / cannot tell.",
         "",
-        "| method | of | valves that stick | tuning or external |",
+        "| method | records: sticking, others | valves that stick | tuning or external |",
         "|---|---|---|---|",
     ]
     for name in dict.fromkeys(name for name, _ in counts):

@@ -22,7 +22,7 @@ from ..arrays import FloatArray
 
 NGI_LIMIT, NLI_LIMIT = 0.001, 0.01
 FEWEST_SEGMENTS = 12
-_Z = 1.645
+_Z_ONE_SIDED = 1.645
 """One-sided 95 % point of the normal distribution."""
 _SEGMENT = 64
 _PER_CYCLE = 10
@@ -57,7 +57,7 @@ def bicoherence(signal: FloatArray, period: float) -> Bicoherence | None:
     squared = np.where(power > 1e-12 * power.max(), cross / np.maximum(power, 1e-300), 0.0)
     count = squared.size
     # mean of `count` squared bicoherences of Gaussian noise, each chi squared of two over 2 K
-    bound = (_Z + np.sqrt(4 * count - 1)) ** 2 / (4 * starts.size * count)
+    bound = (_Z_ONE_SIDED + np.sqrt(4 * count - 1)) ** 2 / (4 * starts.size * count)
     mean, spread = float(squared.mean()), float(squared.std())
     nonlinear = abs(float(squared.max()) - (mean + 2 * spread))
     return Bicoherence(mean - float(bound), nonlinear, starts.size)

@@ -93,8 +93,8 @@ class LoopDiagnosis(Result):
     def apparent_stiction(self) -> float:
         """Width of the ellipse of PV over OP, in the unit of OP; NaN without an oscillation.
 
-        This is S + J or less, as seen through controller and process, if the valve sticks, and
-        says nothing otherwise.
+        As a rule less than S, because the fundamentals are smaller than the signals; without
+        meaning if the valve does not stick.
         """
         return np.nan if self.ellipse is None else self.ellipse.width
 
