@@ -158,7 +158,7 @@ html_math_renderer = "mathml"
 # -- API reference -------------------------------------------------------------------------------
 
 autosummary_generate = True
-autosummary_context = {"related": related.section}
+autosummary_context = {"related": related.sections()}
 autosummary_imported_members = True
 autodoc_typehints = "none"
 autodoc_member_order = "bysource"

@@ -165,3 +165,8 @@ def section(entry: str) -> str:
     if near:
         lines.append("Names: " + ", ".join(f":py:obj:`~{each}`" for each in near))
     return "\n\n   ".join([".. seealso::", *lines]) if lines else ""
+
+
+def sections() -> dict[str, str]:
+    """Return full name -> what stands below it, for every entry; Sphinx can store no function."""
+    return {entry: section(entry) for entry in dict.fromkeys(_entries().values())}
