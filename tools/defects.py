@@ -167,7 +167,7 @@ DEFECTS = (
        "test_flags step_fit unmodelled", FITS),
     _d("outliers", "samples far off the model are not flagged",
        "if wild <= _MANY:", "if True:",
-       "test_flags step_fit unmodelled", FITS),
+       "missing_samples", FITS),
     # --- choices of the method
     _d("modes never asked", "a plant that rings keeps its lags, whatever they leave",
        "if np.isfinite(fit.onset) or known is not None or missing:", "if True:",
