@@ -160,11 +160,13 @@ def test_records_that_cannot_tell_say_why():
         "saturated_output": (np.clip(wave, -0.7, 0.7), lagging, {}),
         "coarse_quantisation": (np.round(2 * wave), lagging, {}),
         "set_point_moves": (wave, lagging, {"sp": 2 * wave}),
+        "few_samples_per_cycle": (np.sin(0.4 * np.pi * TIME), np.sin(0.4 * np.pi * TIME - 1), {}),
     }
     for code, (op, pv, options) in cases.items():
         found = diagnosed(op, pv, **options)
         assert found.verdict == "cannot tell", code
         assert code in {flag.code for flag in found.flags}
+    assert "few_cycles" in {flag.code for flag in diagnosed(wave[:200], lagging[:200]).flags}
     gaps = lagging.copy()
     gaps[100:110], gaps[1500] = np.nan, np.inf
     found = diagnosed(wave, gaps)
