@@ -18,6 +18,7 @@ import re
 import shutil
 import subprocess
 import sys
+import tarfile
 import tempfile
 import tomllib
 import zipfile
@@ -82,6 +83,19 @@ def repository(release: str, tagged: bool) -> Iterator[Item]:
         yield f"the tag {tag} is free", "" if free else there or "git does not answer"
 
 
+def _left_out(files: list[Path]) -> str:
+    """Files of the repository that the source distribution has not, or has beyond it."""
+    source = next(path for path in files if path.name.endswith(".tar.gz"))
+    with tarfile.open(source) as archive:
+        inside = {name.partition("/")[2] for name in archive.getnames()} - {"PKG-INFO"}
+    code, said = call("git", "ls-files")
+    if code:
+        return said
+    kept = {name for name in said.splitlines() if not name.startswith(".ci/")}
+    differ = [f"no {name}" for name in sorted(kept - inside)] + sorted(inside - kept)
+    return ", ".join(differ)
+
+
 def built(release: str) -> Iterator[Item]:
     """Build twice, keep the first, and look into it."""
     code, seconds = call("git", "log", "-1", "--format=%ct")
@@ -115,6 +129,7 @@ def built(release: str) -> Iterator[Item]:
     lacking = {"ctrl_realize/py.typed", "ctrl_realize/__init__.pyi"} - set(inside)
     wrong = ", ".join([*foreign, *(f"no {name}" for name in lacking)])
     yield "the wheel holds the package, typed, and nothing else", wrong
+    yield "the source distribution holds what git holds", _left_out(files)
     for name, digest in sums[0].items():
         print(f"        {digest}  {name}")
 
