@@ -299,6 +299,9 @@ def main() -> None:
             "Each cell: median over all pairs of different records of a plant of the fit in "
             "percent (NRMSE after the step, offset taken off) of one record by the model of the "
             "other, as it is / with the best gain for that record. Way told the order: 3. "
+            "The subspace methods' matrices of a single step are close to singular, so that some "
+            "of their models differ from one processor to another. SRIVC: our prototype of a "
+            "method that no package in Python has, from three starts. "
         )
     elif arguments.table == "joint":
         lines = joint_table(records(arguments.data))
