@@ -37,7 +37,7 @@ def simulate_record(
     u, y = np.atleast_2d(record.input), np.atleast_2d(record.output)
     p, N = y.shape
     # In steady state, the input had its first value before the record.
-    forced = np.atleast_2d(model.simulate(u - u[:, :1]))
+    forced = _forced(model, u, record.dt)
     columns = [np.kron(np.eye(p), np.ones((N, 1)))]
     if start == "estimate":
         columns += _unknown_starts(model, N)
@@ -53,6 +53,16 @@ def simulate_record(
         alike, target = alike[seen], target[seen]
     weights = np.linalg.lstsq(alike, target, rcond=1e-10)[0]
     return np.asarray(forced + (regressors @ (weights / scale)).reshape(p, N))
+
+
+def _forced(model: DelayedStateSpace, u: FloatArray, dt: float) -> FloatArray:
+    """Response (p, N) from steady state, through the actuator that was fitted with the model."""
+    actuator = getattr(model.fit, "actuator", None)
+    if actuator is None:
+        return np.atleast_2d(model.simulate(u - u[:, :1]))
+    gain = float(np.real(np.ravel(model.delay_free.dcgain())[0]))
+    driven = actuator.driven(lambda signal: np.ravel(model.simulate(signal)), u[0], gain, dt)
+    return np.atleast_2d(driven)
 
 
 def _units(outputs: FloatArray) -> FloatArray:

@@ -127,7 +127,7 @@ def fit_actuated(
     wanted : sequence of (kind, place)
         Actuators to try.
     rivals : sequence of Rival
-        Further linear models, of a single record.
+        Linear models of a single record that were fitted before; without any, some are fitted here.
     structures : sequence of Structure, optional
         Of the linear part behind (or before) an actuator.
 
@@ -140,7 +140,7 @@ def fit_actuated(
     behind = BEHIND if structures is None else tuple(s for s in structures if s.zeros <= 1)
     if not wanted or not behind:
         return None
-    linear = [searched(records, Family(s), scales) for s in LINEAR]
+    linear = [] if rivals else [searched(records, Family(s), scales) for s in LINEAR]
     found = _with_actuators(records, scales, wanted, behind, linear)
     best = _leading(records, [*linear, *found])
     residual = _sample_residuals(records, best, scales)

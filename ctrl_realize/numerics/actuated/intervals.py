@@ -22,6 +22,8 @@ from .family import VALUES, Member, Task
 _EDGE = float(np.sqrt(CHI2_95))
 _MOST_WIDENED, _MOST_NARROWED = 8, 7  # steps of an end
 _CLOSE = 0.02  # of the root of the excess, to which an end is sought
+_CLIFF = 0.2  # of the root of the excess, by which it is beyond the end of an interval at once
+_LEVEL = 0.2  # variances by which the misfit rises on what counts as level
 _TURNS = 4  # iterations at every point of a profile
 _LOWER = 0.02  # variances by which a profile must lead below the minimum to be followed
 _MOST_ROUNDS = 3
@@ -66,7 +68,20 @@ def profiled(task: Task, member: Member, variance: float) -> tuple[Member, tuple
         if member.cost - best.cost <= _LOWER * variance:
             break
         member = task.improved(best.x)
+    if VALUES[task.family.kind] == 2:
+        member = _in_the_middle(task, member, ends[-1], variance)
     return member, tuple(ends)
+
+
+def _in_the_middle(task: Task, member: Member, ends: Ends, variance: float) -> Member:
+    """Put a slip jump in the middle of its interval, if the misfit is level there.
+
+    Between two steps of the command, of which one moves the stem, all are as good.
+    """
+    index = 2 + task.family.structure.order
+    x = task.moved(member.x, index, float(np.log((ends.low + ends.high) / 2)))
+    middle = task.improved(x, fixed=[index], turns=_TURNS)
+    return middle if middle.cost <= member.cost + _LEVEL * variance else member
 
 
 def dead_time_ends(task: Task, member: Member, variance: float) -> Ends:
@@ -112,12 +127,10 @@ def _end(
     root, outside, above = -_EDGE, None, np.inf
 
     def at(value: float, start: Member) -> tuple[Member, float]:
-        x = start.x.copy()
-        x[index] = value
+        x = task.moved(start.x, index, value)
         found = task.improved(x, fixed=[index], turns=_TURNS)
         if start is not member:
-            x = member.x.copy()
-            x[index] = value
+            x = task.moved(member.x, index, value)
             found = min(found, task.improved(x, fixed=[index], turns=_TURNS), key=_cost)
         excess = max((found.cost - member.cost) / variance, 0.0)
         return found, float(np.sqrt(excess)) - _EDGE
@@ -151,6 +164,8 @@ def _end(
         else:
             inside, root = point, there
     low, high = float(inside.x[index]), float(outside.x[index])
+    if above > _CLIFF * _EDGE:
+        return high, best  # which steps set a stem in motion changes at once
     return low + root / (root - above) * (high - low), best
 
 

@@ -25,16 +25,18 @@ from .family import STICKING, VALUES, Family, Member, Records, Task
 _MOST_STARTS = 16
 _FOLLOWED = 2  # starts that are followed to the bottom: time
 _ROUGH = 6  # iterations in which starts are compared
-_ACTUATORS = 2  # of a grid, that are tried with each linear part
+_ACTUATORS = 3  # of a grid, that are tried with each linear part
 _QUICK = 0.2
 _SHORTEST, _LONG, _RISES = 3.0, 20.0, 5  # samples, parts of a record: lags behind what sticks
 _QUICKLY = 3  # iterations beside a point that was followed to the bottom
 _RATES = np.geomspace(0.1, 10.0, 9)  # ranges of the command in the visible rise
 _WIDTHS = np.geomspace(3e-3, 0.6, 10)  # parts of the range of the command
+_FINER = np.geomspace(0.02, 0.8, 26)
+_FOLLOWED_FINER = 4
 _PLACES = (-1.0, 0.0, 1.0)
 _RESOLVED = 5e-3  # of a logarithm, to which a slip jump is searched
 _BESIDE = 0.4  # of a logarithm: reach of the last search about the best slip jump
-_POINTS = 9
+_POINTS = 13
 
 
 def searched(
@@ -57,6 +59,9 @@ def searched(
     costs = [task.cost(x) for x in best]
     best = [best[i] for i in np.argsort(costs)[:_MOST_STARTS]]
     rough = sorted((task.improved(x, turns=_ROUGH) for x in best), key=_cost)
+    if VALUES[family.kind] == 2:
+        finer = [x for one in rough[:_FOLLOWED] for x in _finer(task, one)]
+        rough = sorted([*rough, *(task.improved(x, turns=_ROUGH) for x in finer)], key=_cost)
     found = min((task.improved(one.x) for one in rough[:_FOLLOWED]), key=_cost)
     return _jumped(task, found) if VALUES[family.kind] == 2 else found
 
@@ -67,6 +72,21 @@ def _best_actuators(task: Task, linear: FloatArray) -> list[FloatArray]:
     costs = [task.cost(x) for x in starts]
     few = _ACTUATORS if task.family.kind in STICKING else 1
     return [starts[i] for i in np.argsort(costs)[:few]]
+
+
+def _finer(task: Task, found: Member) -> list[FloatArray]:
+    """Best starts of a finer grid of S and J, with the linear part that was found."""
+    linear = found.x[: 1 + task.family.structure.order]
+    starts = [found.starts, *(np.full(found.starts.size, place) for place in _PLACES)]
+    sizes = np.log(_FINER * task.records.range)
+    grid = [
+        np.clip(np.concatenate([linear, [stick, jump], start]), *task.bounds)
+        for i, stick in enumerate(sizes.tolist())
+        for jump in sizes[: i + 1].tolist()
+        for start in starts
+    ]
+    costs = [task.cost(x) for x in grid]
+    return [grid[i] for i in np.argsort(costs)[:_FOLLOWED_FINER]]
 
 
 def with_other_lags(
@@ -138,8 +158,7 @@ def _jumped(task: Task, found: Member) -> Member:
     best = [found]
 
     def cost(jump: float) -> float:
-        x = best[0].x.copy()
-        x[at] = jump
+        x = task.moved(best[0].x, at, jump)
         member = task.improved(x, fixed=[at], turns=_QUICKLY)
         if member.cost < best[0].cost:
             best[0] = member

@@ -34,8 +34,9 @@ def staircase(*moves, hold=120):
 
 def test_a_single_large_step_tells_a_slew_rate_and_the_dead_time_behind_it():
     record = through(SlewRateLimit(12.0), staircase(40.0, hold=150), 1)
-    linear = cr.fit_output_error(record).fit
-    fit = cr.fit_output_error(record, actuator="slew_rate").fit
+    linear_system = cr.fit_output_error(record)
+    system = cr.fit_output_error(record, actuator="slew_rate")
+    linear, fit = linear_system.fit, system.fit
     assert linear.actuator is None
     rate = fit.actuator["slew_rate"]
     assert rate.low <= 12.0 <= rate.high
@@ -45,6 +46,9 @@ def test_a_single_large_step_tells_a_slew_rate_and_the_dead_time_behind_it():
     assert abs(fit.dead_time - DEAD_TIME) < 0.05
     assert fit.fit_percent > linear.fit_percent
     assert "slew rate" in fit.report()
+    other = through(SlewRateLimit(12.0), staircase(-25.0, hold=150), 3)
+    follows = cr.compare({"linear": linear_system, "actuator": system}, other).fit_percent
+    assert follows["actuator"] > 97 > follows["linear"]
 
 
 def test_records_of_several_sizes_share_dead_band_and_linear_part():

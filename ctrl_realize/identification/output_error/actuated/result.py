@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 
 from ...._parameters import Parameter
-from ....actuators import Actuator
+from ....actuators import Actuator, SlewRateLimit
 from ....numerics.arrays import FloatArray
 
 Place = Literal["input", "stem"]
@@ -76,5 +77,38 @@ class ActuatorFit:
         return f"{numbers}; {_PLACES[self.actuator_at]}"
 
     def position(self, command: FloatArray, dt: float) -> FloatArray:
-        """Pass a command through the actuator alone."""
-        return self.model.simulate(np.asarray(command), dt)
+        """Pass a command (N,) through the actuator alone; a slew limit at its mean over samples."""
+        position = self.model.simulate(np.asarray(command), dt)
+        if not isinstance(self.model, SlewRateLimit):
+            return position
+        return np.asarray((position + np.concatenate([position[:1], position[:-1]])) / 2)
+
+    def driven(
+        self,
+        linear: Callable[[FloatArray], FloatArray],
+        command: FloatArray,
+        gain: float,
+        dt: float,
+    ) -> FloatArray:
+        """Response (N,) of the actuator together with a linear part, from rest.
+
+        Parameters
+        ----------
+        linear : callable
+            Response (N,) of the linear part to an input (N,).
+        command : ndarray, shape (N,)
+        gain : float
+            Static gain of the linear part.
+        dt : float
+            Sample time in s.
+
+        Returns
+        -------
+        ndarray, shape (N,)
+        """
+        if self.actuator_at == "input":
+            position = self.position(command, dt)
+            return linear(position - position[0])
+        demand = command[0] + linear(command - command[0]) / gain
+        position = self.model.simulate(demand, dt)
+        return np.asarray(gain * (position - position[0]))

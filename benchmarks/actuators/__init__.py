@@ -1,0 +1,1 @@
+"""Fits of actuators: errors, intervals, needless actuators, and dead times behind them."""
