@@ -69,7 +69,7 @@ class ActuatedFit:
     std : float
         Standard error of the dead time.
     value_ends : tuple of Ends
-        95 % intervals of the values of the actuator.
+        95 % intervals of the values of the actuator, for all orders that are not ruled out.
     fitted : tuple of ndarray
         Output of the model at every sample of each record.
     sigma, correlation : float
@@ -172,10 +172,16 @@ def fit_actuated(
         (one for one in found if _plausible(one, found, values, variance)),
         key=values.__getitem__,
     )
-    spans = [ends[0]] + [
-        dead_time_ends(Task(records, one.family, scales), one, variance)
-        for one in near[: _MOST_PROFILES - 1]
-    ]
+    every = [ends]
+    for one in near[: _MOST_PROFILES - 1]:
+        own_task = Task(records, one.family, scales)
+        alike = (one.family.kind, one.family.place) == (member.family.kind, member.family.place)
+        if alike:
+            every.append(profiled(own_task, one, variance)[1])
+        else:
+            every.append((dead_time_ends(own_task, one, variance),))
+    spans = [found_ends[0] for found_ends in every]
+    values_of = [found_ends[1:] for found_ends in every if len(found_ends) == len(ends)]
     own = criterion(member.cost, member.family.structure, member.parameters)
     return ActuatedFit(
         task=task,
@@ -184,7 +190,10 @@ def fit_actuated(
         evidence=float(min(straight) - own),
         dead_time_ends=Ends(min(low for low, _ in spans), max(high for _, high in spans)),
         std=(ends[0].high - ends[0].low) / (2 * Z_95),
-        value_ends=ends[1:],
+        value_ends=tuple(
+            Ends(min(low for low, _ in own_ends), max(high for _, high in own_ends))
+            for own_ends in zip(*values_of, strict=True)
+        ),
         fitted=_every_sample(parts, member, scales),
         sigma=sigma,
         correlation=correlation,
