@@ -16,11 +16,15 @@ import numpy as np
 from ..arrays import FloatArray, IntArray
 from ..signals.bins import response_bins
 from ..signals.excitation import lively_start
+from ..signals.noise import quantisation_step, rest_noise
+from ..signals.onset import first_motion
 from ..signals.step_sequence import input_moves
 
 MOST_MOVES = 80
 """Of a command that is a list of moves; beyond that a recursion over the samples is faster."""
 MOST_SAMPLES = 4000  # of a record with any other command, to limit the time
+_REST = 8  # samples before the first move that tell the noise
+_LEAST_NOISE = 1e-4  # of the range, as for step records
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,7 +103,6 @@ def actuated_record(
     dt: float,
     *,
     edges: Sequence[tuple[int, int]] = (),
-    crossing: int = 0,
     own: FloatArray | None = None,
 ) -> ActuatedRecord:
     """Set up a record.
@@ -112,8 +115,6 @@ def actuated_record(
         Sample time in s.
     edges : sequence of (index, samples)
         Edges of the command if it is constant between them but for noise.
-    crossing : int
-        Samples from a move of the command to the visible response.
     own : ndarray, shape (N, q), optional
         Terms of the record itself; default: a level.
     """
@@ -125,8 +126,10 @@ def actuated_record(
         command = command[0] + np.cumsum(clean)
     moves = np.flatnonzero(np.diff(command, prepend=command[0]))
     rows = np.flatnonzero(~np.isnan(output))
-    if 0 < moves.size <= MOST_MOVES:
-        bins = response_bins(output.size, moves.tolist(), crossing).holding(rows)
+    few = 0 < moves.size <= MOST_MOVES
+    crossing = _crossing(output[rows], moves, rows) if few else None
+    if crossing is not None or (few and command.size > MOST_SAMPLES):
+        bins = response_bins(output.size, moves.tolist(), crossing or 0).holding(rows)
         return ActuatedRecord(command, dt, rows, bins.first, bins.width, output, own)
     offset = 0
     if command.size > MOST_SAMPLES:
@@ -137,3 +140,23 @@ def actuated_record(
     every = np.arange(rows.size)
     ones = np.ones_like(every)
     return ActuatedRecord(command, dt, rows, every, ones, output, own, offset)
+
+
+def _crossing(output: FloatArray, moves: IntArray, rows: IntArray) -> int | None:
+    """Samples from a move of the command to the first visible motion, None if there is no rest.
+
+    Not from the dead time of a linear model, which may be any: means over bins that are wide where
+    the response begins would bias the dead time.
+    """
+    edge = int(np.searchsorted(rows, moves[0]))
+    if edge < _REST:
+        return None
+    quantum = quantisation_step(output)
+    since = rows - int(moves[0])
+    sigma, drift = rest_noise(output[:edge], output, quantum, since[:edge])
+    sigma = max(sigma, _LEAST_NOISE * float(np.ptp(output)))
+    motion = first_motion(output, edge, sigma, quantum, drift, since)
+    if motion is None:
+        return None
+    visible = int(moves[0]) + motion.crossing
+    return visible - int(moves[moves <= visible][-1])

@@ -79,29 +79,24 @@ def _both(result: OutputErrorFit, found: ActuatedFit) -> OutputErrorFit:
 
 def _parts(result: OutputErrorFit) -> list[ActuatedRecord]:
     """Records for the fit of an actuator."""
-    crossing = int(np.ceil(result.dead_time / result.dt)) + 1
     if len(result.records) == 1:
-        return [_only_part(result, crossing)]
+        return [_only_part(result)]
     found = []
     for record in result.records:
         output, command = np.ravel(record.output), np.ravel(record.input)
         edges = _edges(record)
         own = None if edges else _free_motion(result, output.size)
-        found.append(
-            actuated_record(output, command, record.dt, edges=edges, crossing=crossing, own=own)
-        )
+        found.append(actuated_record(output, command, record.dt, edges=edges, own=own))
     return found
 
 
-def _only_part(result: OutputErrorFit, crossing: int) -> ActuatedRecord:
+def _only_part(result: OutputErrorFit) -> ActuatedRecord:
     record, data = result.records[0], result.data
     output, command = np.ravel(record.output).copy(), np.ravel(record.input)
     if np.isfinite(result.onset):
         every = replace(data, rows=np.arange(command.size), output=np.zeros(command.size))
         own = own_regressors(every, result.estimate.poles if result.estimate.relaxing else None)
-        return actuated_record(
-            output, command, record.dt, edges=data.edges, crossing=crossing, own=own
-        )
+        return actuated_record(output, command, record.dt, edges=data.edges, own=own)
     rows = _rows(result)
     output[: rows[0]] = np.nan
     part = slice(0, int(rows[-1]) + 1)
@@ -110,7 +105,7 @@ def _only_part(result: OutputErrorFit, crossing: int) -> ActuatedRecord:
         part = slice(int(rows[0]), int(rows[-1]) + 1)
     few = np.count_nonzero(np.diff(command[part])) <= MOST_MOVES  # a test, which begins at rest
     free = None if few else _free_motion(result, output[part].size)
-    return actuated_record(output[part], command[part], record.dt, crossing=crossing, own=free)
+    return actuated_record(output[part], command[part], record.dt, own=free)
 
 
 def _rows(result: OutputErrorFit) -> IntArray:
