@@ -19,7 +19,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..arrays import ComplexArray, FloatArray
+from ..arrays import BoolArray, ComplexArray, FloatArray
 from ..constants import Z_95
 from ..separable.poles import poles_from_parameters
 from ..separable.structures import (
@@ -42,6 +42,7 @@ BEHIND = (Structure(1, 1), Structure(2, 2), Structure(3, 3))
 """Structures with an actuator: it takes the place of a lag or a zero."""
 ONE_MORE = Structure(4, 4)  # beside three lags: one lag more than chosen is never ruled out
 _WILD = 4.0  # standard deviations beyond which samples are outliers, and cut
+_SPIKE = 3  # samples in a row: more are a slip that the model has at another time
 _MOST_PROFILES = 4  # of the dead time, for time
 
 
@@ -145,8 +146,9 @@ def fit_actuated(
     best = _leading(records, [*linear, *found])
     residual = _sample_residuals(records, best, scales)
     limit = _WILD * mad_sigma(np.concatenate(residual))
-    if np.mean(np.abs(np.concatenate(residual)) > limit) > 2e-3:
-        records = _without_outliers(records, residual, limit)
+    wild = [_spikes(left, limit) for left in residual]
+    if np.mean(np.concatenate(wild)) > 2e-3:
+        records = _without_outliers(records, residual, wild, limit)
         linear = [Task(records, one.family, scales).improved(one.x) for one in linear]
         found = [Task(records, one.family, scales).improved(one.x) for one in found]
         best = _leading(records, [*linear, *found])
@@ -278,12 +280,24 @@ def _sample_residuals(records: Records, member: Member, scales: Scales) -> list[
     ]
 
 
-def _without_outliers(records: Records, residual: Sequence[FloatArray], limit: float) -> Records:
+def _spikes(residual: FloatArray, limit: float) -> BoolArray:
+    """Samples (N,) beyond a limit, of which there are few in a row."""
+    beyond = np.abs(residual) > limit
+    edges = np.flatnonzero(np.diff(beyond.astype(np.int64), prepend=0, append=0))
+    found = np.zeros(residual.size, dtype=np.bool_)
+    for first, end in edges.reshape(-1, 2).tolist():
+        found[first:end] = end - first <= _SPIKE
+    return found
+
+
+def _without_outliers(
+    records: Records, residual: Sequence[FloatArray], wild: Sequence[BoolArray], limit: float
+) -> Records:
     """Records whose outliers are cut at a limit."""
     parts = []
-    for part, left in zip(records.parts, residual, strict=True):
+    for part, left, cut in zip(records.parts, residual, wild, strict=True):
         measured = part.measured.copy()
-        measured[part.rows] -= left - np.clip(left, -limit, limit)
+        measured[part.rows] -= np.where(cut, left - np.clip(left, -limit, limit), 0.0)
         parts.append(
             ActuatedRecord(
                 part.command, part.dt, part.rows, part.first, part.width, measured, part.own,

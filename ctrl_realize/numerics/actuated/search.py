@@ -33,6 +33,7 @@ _RATES = np.geomspace(0.1, 10.0, 9)  # ranges of the command in the visible rise
 _WIDTHS = np.geomspace(3e-3, 0.6, 10)  # parts of the range of the command
 _FINER = np.geomspace(0.02, 0.8, 26)
 _FOLLOWED_FINER = 4
+_AROUND = np.linspace(-0.24, 0.24, 17)  # of a logarithm, of S and of J
 _PLACES = (-1.0, 0.0, 1.0)
 _RESOLVED = 5e-3  # of a logarithm, to which a slip jump is searched
 _BESIDE = 0.4  # of a logarithm: reach of the last search about the best slip jump
@@ -63,7 +64,7 @@ def searched(
         finer = [x for one in rough[:_FOLLOWED] for x in _finer(task, one)]
         rough = sorted([*rough, *(task.improved(x, turns=_ROUGH) for x in finer)], key=_cost)
     found = min((task.improved(one.x) for one in rough[:_FOLLOWED]), key=_cost)
-    return _jumped(task, found) if VALUES[family.kind] == 2 else found
+    return _jumped(task, _other_slips(task, found)) if VALUES[family.kind] == 2 else found
 
 
 def _best_actuators(task: Task, linear: FloatArray) -> list[FloatArray]:
@@ -87,6 +88,21 @@ def _finer(task: Task, found: Member) -> list[FloatArray]:
     ]
     costs = [task.cost(x) for x in grid]
     return [grid[i] for i in np.argsort(costs)[:_FOLLOWED_FINER]]
+
+
+def _other_slips(task: Task, found: Member) -> Member:
+    """Search S and J about a member: one step of a staircase more or less makes another slip."""
+    at = 1 + task.family.structure.order
+    grid = []
+    for stick in _AROUND:
+        for jump in _AROUND:
+            x = found.x.copy()
+            x[at : at + 2] += stick, jump
+            if x[at + 1] <= x[at]:
+                grid.append(x)
+    costs = [task.cost(x) for x in grid]
+    best = [task.improved(grid[i]) for i in np.argsort(costs)[:_FOLLOWED_FINER]]
+    return min([found, *best], key=_cost)
 
 
 def with_other_lags(

@@ -75,6 +75,21 @@ def test_small_steps_tell_slip_jump_and_stick_band():
         assert found.high - found.low < 0.8  # steps are 0.5 high
 
 
+def test_a_slip_of_another_step_is_no_outlier_and_spikes_are():
+    large = staircase(15, -15, 15, hold=60) - 50.0
+    small = 15.0 + np.repeat(np.cumsum([0.8] * 12 + [-0.8] * 24 + [0.8] * 24), 20)
+    record = through(KanoStiction(S=10.1, J=5.7, start=1.0), np.concatenate([large, small]), 7)
+    output = record.output.copy()
+    output[[40, 333, 700, 1002, 1300]] += 3.0
+    spiked = cr.Record(record.time, record.input, output)
+    fit = cr.fit_output_error(spiked, actuator="stiction", structures=[(2, 2)]).fit
+    for name, truth in (("S", 10.1), ("J", 5.7)):
+        found = fit.actuator[name]
+        assert found.low <= truth <= found.high
+        assert abs(found.value / truth - 1) < 0.05
+    assert fit.interval[0] <= DEAD_TIME <= fit.interval[1]
+
+
 def test_a_linear_valve_gets_no_actuator_and_its_interval_covers_those_not_ruled_out():
     record = through(SlewRateLimit(1e6), staircase(4, 4, -4, -4, hold=90), 2)
     linear = cr.fit_output_error(record).fit
