@@ -13,9 +13,9 @@ from .. import paper
 from .._checks import positive, whole
 from ..actuators import Actuator
 from ..data import Record
-from ..errors import DataError, OptionError
+from ..errors import OptionError
 from ..numerics.arrays import FloatArray
-from .instruments import STROKE_MM, recorded
+from .instruments import STROKE_MM, held_input, recorded
 from .motion import Motion
 from .truth import ValveTruth
 
@@ -196,19 +196,7 @@ class Valve:
         >>> cr.bench.valve().record(8 + 4 * np.repeat(bits, 64), rng=1, name="prbs")
         <Record 'prbs': 3840 samples of 0.00078125 s, 1 input, 1 output>
         """
-        held = np.asarray(current)
-        if held.ndim != 1 or held.size < 3 or held.dtype.kind not in "biuf":
-            raise DataError(
-                f"current has shape {held.shape} and type {held.dtype}; expected N >= 3 real "
-                "numbers"
-            )
-        held = held.astype(np.float64)
-        bad = np.flatnonzero(~((held >= 0) & (held <= _MOST_MA)))
-        if bad.size:
-            raise DataError(
-                f"current is {held[bad[0]]:g} mA at sample {bad[0]}; expected 0-{_MOST_MA:g} "
-                "mA everywhere"
-            )
+        held = held_input(current, "current", (0.0, _MOST_MA), "mA")
         time = self.dt * np.arange(held.size, dtype=np.float64)
         generator = np.random.default_rng(rng)
         moved = self._motion.of_held(held, self.dt, self._dead_time(generator))

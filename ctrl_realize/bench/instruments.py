@@ -5,9 +5,11 @@ from __future__ import annotations
 from typing import Protocol
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from .. import paper
 from ..data import Record
+from ..errors import DataError
 from ..numerics.arrays import FloatArray
 from .imperfections import band_limited_noise, converted, drive_spikes
 
@@ -46,6 +48,24 @@ class Disturbances(Protocol):
     @property
     def bits(self) -> int | None:
         """Of the converter; None for no rounding."""
+
+
+def held_input(values: ArrayLike, name: str, limits: tuple[float, float], unit: str) -> FloatArray:
+    """Check an input that is held over each sample, (N,)."""
+    held = np.asarray(values)
+    if held.ndim != 1 or held.size < 3 or held.dtype.kind not in "biuf":
+        raise DataError(
+            f"{name} has shape {held.shape} and type {held.dtype}; expected N >= 3 real numbers"
+        )
+    held = held.astype(np.float64)
+    low, high = limits
+    bad = np.flatnonzero(~((held >= low) & (held <= high)))
+    if bad.size:
+        raise DataError(
+            f"{name} is {held[bad[0]]:g} {unit} at sample {bad[0]}; expected {low:g}-{high:g} "
+            f"{unit} everywhere"
+        )
+    return held
 
 
 def recorded(

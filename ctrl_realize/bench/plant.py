@@ -9,9 +9,10 @@ from numpy.typing import ArrayLike
 
 from .._checks import real
 from ..data import Record
-from ..errors import DataError, OptionError
+from ..errors import OptionError
 from .control_valve import Seed
 from .imperfections import band_limited_noise, slow_disturbance
+from .instruments import held_input
 from .linear import response_to_changes
 from .truth import PlantTruth
 
@@ -144,19 +145,7 @@ class Plant:
         >>> cr.bench.tank().record(48 + 4 * np.repeat(bits, 30), rng=1, name="prbs")
         <Record 'prbs': 1800 samples of 1 s, 1 input, 1 output>
         """
-        held = np.asarray(input)
-        if held.ndim != 1 or held.size < 3 or held.dtype.kind not in "biuf":
-            raise DataError(
-                f"input has shape {held.shape} and type {held.dtype}; expected N >= 3 real numbers"
-            )
-        held = held.astype(np.float64)
-        low, high = self.input_range
-        bad = np.flatnonzero(~((held >= low) & (held <= high)))
-        if bad.size:
-            raise DataError(
-                f"input is {held[bad[0]]:g} at sample {bad[0]}; expected {low:g}-{high:g} "
-                f"{self.truth.units[0]} everywhere"
-            )
+        held = held_input(input, "input", self.input_range, self.truth.units[0])
         generator = np.random.default_rng(rng)
         truth = self.truth
         start = self.steady_state[1]

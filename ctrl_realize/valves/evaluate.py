@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -10,12 +9,11 @@ import numpy as np
 
 from ..data import Record
 from ..data.given import as_record
-from ..errors import CtrlRealizeError, DataError
-from ..identification.methods import identify
+from ..errors import DataError
 from ..numerics.valve_test.play import slope_of
-from ..results import Flag, ModelFit
+from ..results import Flag
 from .flags import flags_of
-from .groups import STRUCTURES, Interval, grouped
+from .groups import Interval, grouped, linear_fit
 from .metrics import check_limits, collected, judged
 from .part import TestPart
 from .parts import range_of, split_test
@@ -230,19 +228,11 @@ def _statics(
 
 def _fit_of_operation(records: tuple[Record, ...]) -> tuple[Interval, Flag] | None:
     """Dead time of a linear model of records that contain no test."""
-    found = []
-    for record in records:
-        try:
-            with warnings.catch_warnings():
-                warnings.simplefilter("ignore")
-                fit = identify(_few(record), structures=STRUCTURES).fit
-        except CtrlRealizeError:
-            continue
-        if isinstance(fit, ModelFit) and fit.dead_time is not None and fit.interval is not None:
-            found.append((fit, Interval(fit.dead_time, *fit.interval, 1)))
-    if not found:
+    fits = (linear_fit([_few(record)]) for record in records)
+    first = next((found for found in fits if found is not None), None)
+    if first is None:
         return None
-    fit, interval = found[0]
+    fit, interval = first
     gain = np.nan if fit.gain is None else fit.gain
     more = "".join(f"; {flag}" for flag in fit.flags[:2])
     return interval, Flag(

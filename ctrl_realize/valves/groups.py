@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..data import Record
-from ..errors import CtrlRealizeError
+from ..errors import CtrlRealizeError, DataWarning
 from ..identification.methods import identify
 from ..numerics.constants import Z_95
 from ..results import ModelFit
@@ -176,22 +176,28 @@ def _fitted_dead_time(steps: list[StepMetrics], records: Sequence[Record]) -> In
     if not settled:
         return Interval()
     cut = [cut_out(records[one.record], one) for one in settled]
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            if len(cut) == 1:
-                system = identify(cut[0], structures=STRUCTURES)
-            else:
-                system = identify(cut, structures=STRUCTURES, gains="own")
-    except CtrlRealizeError:
-        return Interval()
-    fit = system.fit
+    found = linear_fit(cut)
     # no linear model fits a response at a limited rate: it has no dead time to report
+    if found is None or found[0].interval_kind != "confidence":
+        return Interval()
+    return found[1]
+
+
+def linear_fit(records: Sequence[Record]) -> tuple[ModelFit, Interval] | None:
+    """Linear model of records with gains of their own, and its dead time; None if there is none."""
+    try:
+        # What a fit warns of concerns records given by a user, and these are cut out of one.
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", DataWarning)
+            if len(records) == 1:
+                fit = identify(records[0], structures=STRUCTURES).fit
+            else:
+                fit = identify(records, structures=STRUCTURES, gains="own").fit
+    except CtrlRealizeError:
+        return None
     if not isinstance(fit, ModelFit) or fit.dead_time is None or fit.interval is None:
-        return Interval()
-    if fit.interval_kind != "confidence":
-        return Interval()
-    return Interval(fit.dead_time, *fit.interval, len(cut))
+        return None
+    return fit, Interval(fit.dead_time, *fit.interval, len(records))
 
 
 def cut_out(record: Record, step: StepMetrics) -> Record:
