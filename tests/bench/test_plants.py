@@ -120,7 +120,11 @@ def test_noise_disturbance_and_rounding_are_those_asked_for():
         (lambda: bench.heater(noise=-1), OptionError, "noise=-1"),
         (lambda: bench.heater().step_record(90), OptionError, "from 20 to a value within 0-100 %"),
         (lambda: bench.heater().step_record(0), OptionError, "a step other than 0"),
-        (lambda: bench.tank().record([50, 101, 50]), DataError, "101 % at sample 1; expected 0-100"),
+        (
+            lambda: bench.tank().record([50, 101, 50]),
+            DataError,
+            "101 % at sample 1; expected 0-100",
+        ),
         (lambda: bench.tank().record(np.ones((2, 4))), DataError, "expected N >= 3 real numbers"),
     ],
 )
