@@ -1,11 +1,13 @@
 """Pages of the site in a real browser, as wide as a desk and as a telephone."""
 
 import os
+import runpy
 import subprocess
 import sys
 from importlib.util import find_spec
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from tests import browser
@@ -22,6 +24,17 @@ return {
   scroll: document.documentElement.scrollWidth,
   missing: [...document.images].filter(i => i.complete && !i.naturalWidth).map(i => i.src),
   background: getComputedStyle(document.body).backgroundColor,
+};
+"""
+SLIDER = """
+const figure = document.querySelector('.front-picture');
+const stored = JSON.parse(figure.querySelector('script').textContent);
+return {
+  at: Number(figure.querySelector('input').value),
+  curve: stored.paths.indexOf(figure.querySelector('.model').getAttribute('d')),
+  interval: stored.interval,
+  outside: figure.classList.contains('outside'),
+  said: figure.querySelector('.said').innerText,
 };
 """
 WHITE = "rgb(255, 255, 255)"
@@ -54,3 +67,26 @@ def test_pages_fit_the_window_and_complain_of_nothing(tmp_path, site, width, hei
             assert seen["scroll"] <= width, page
             assert seen["missing"] == [], page
             assert (seen["background"] == WHITE) is not dark, page
+
+
+@pytest.mark.browser
+@pytest.mark.skipif(browser.missing() is not None, reason=str(browser.missing()))
+def test_the_slider_of_the_front_page_shows_the_best_model_of_the_assumed_dead_time(tmp_path):
+    picture = runpy.run_path(str(DOCS / "_ext" / "front_picture.py"))
+    drawn = picture["html"](picture["candidates"](np.arange(0.0, 41.0, 10.0)))
+    script = (DOCS / "_static" / "front.js").read_text(encoding="utf-8")
+    page = tmp_path / "front.html"
+    page.write_text(f"<meta charset='utf-8'><script>{script}</script>{drawn}", encoding="utf-8")
+    with browser.Browser(tmp_path, 1280, 900) as window:
+        window.open(page)
+        assert not window.run(SLIDER)["outside"]  # it begins at the estimate
+        window.click(".front-picture input")
+        for key, at in (("Home", 0), ("End", 4), ("ArrowLeft", 3)):
+            window.press(key)
+            seen = window.run(SLIDER)
+            assert seen["at"] == seen["curve"] == at
+            low, high = seen["interval"]
+            assert seen["outside"] is not (low <= 10 * at <= high)
+            assert f"With {10 * at} s" in seen["said"]
+            assert ("rule it out" in seen["said"]) is seen["outside"]
+        assert window.complaints() == []
