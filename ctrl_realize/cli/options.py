@@ -34,6 +34,15 @@ class Gains(str, Enum):  # noqa: UP042
     own = "own"
 
 
+class ActuatorKind(str, Enum):  # noqa: UP042
+    """What is fitted beside the linear part."""
+
+    auto = "auto"
+    slew_rate = "slew_rate"
+    dead_band = "dead_band"
+    stiction = "stiction"
+
+
 class Missing(str, Enum):  # noqa: UP042
     """Treatment of missing samples."""
 
@@ -93,6 +102,13 @@ Joint = Annotated[
 GainsOption = Annotated[
     Gains | None,
     _OPTION("--gains", help="own: each record of a joint fit has its own gain. Implies --joint."),
+]
+ActuatorOption = Annotated[
+    ActuatorKind | None,
+    _OPTION(
+        "--actuator",
+        help="Fit the limits of a valve or drive as well; auto: choose by information criterion.",
+    ),
 ]
 Separate = Annotated[
     bool, _OPTION("--separate", help="Treat the records as different plants: one folder each.")
@@ -214,9 +230,9 @@ ARGUMENTS = frozenset(
     {"time", "input", "output", "dt", "time_unit", "time_format", "start", "stop", "missing",
      "na_values", "quality", "good", "resample", "rest", "delimiter", "decimal", "encoding",
      "comment", "header", "skip_rows", "variable", "max_bytes", "by", "method", "order",
-     "max_delay", "gains", "structures", "samples", "cutoff_hz", "frequency", "magnitude",
-     "phase", "real", "imag", "frequency_unit", "magnitude_unit", "phase_unit", "min_coherence",
-     "band_hz", "hold"}
+     "max_delay", "gains", "actuator", "structures", "samples", "cutoff_hz", "frequency",
+     "magnitude", "phase", "real", "imag", "frequency_unit", "magnitude_unit", "phase_unit",
+     "min_coherence", "band_hz", "hold"}
 )  # fmt: skip
 """Arguments of Python that have an option."""
 

@@ -44,7 +44,7 @@ COMPOSED = {
     "dynamics differ. The interval spans those of each alone",
     "structured_misfit": "no model fits down to the noise level: the plant is nonlinear or has "
     "unmodelled dynamics; the dead time is the median of five delay estimates and the interval is "
-    "their range",
+    "their range; actuator='auto' also fits what a valve or drive does before or behind the lags",
     "gain_not_resolved": "structures that the data cannot rule out differ in gain or total delay, "
     "or the interval of the gain contains zero",
     "estimates_disagree": "delay estimates far from their median: …",

@@ -225,7 +225,7 @@ def test_the_command_line_offers_options_and_no_arguments_of_python(tmp_path, ca
 def test_every_argument_of_the_readers_is_an_option(capsys):
     reader = set(inspect.signature(cr.read_record).parameters) - {"path", "name"}
     units = {"frequency_unit", "magnitude_unit", "phase_unit"}
-    assert reader | units | {"by", "gains"} <= ARGUMENTS
+    assert reader | units | {"by", "gains", "actuator"} <= ARGUMENTS
     assert main(["identify", "--help"]) == 0
     said = capsys.readouterr().out
     assert [name for name in reader | units if f"{option_of(name)}" not in said] == []
@@ -248,11 +248,15 @@ def test_joint_fits_and_steady_states_have_options(folder, tmp_path):
         ([str(start), "--rest", "0", "20.3", "--joint", "--frf", str(tmp_path / "frf.csv"),
           "--frequency", "f", "--real", "re", "--imag", "im", "--order", "1"],
          cr.identify(cr.read_record(start, rest=(0, 20.3)), order=1, frf=response)),
+        ([str(start), "--rest", "0", "20.3", "--actuator", "slew_rate", "--order", "1"],
+         cr.identify(cr.read_record(start, rest=(0, 20.3)), order=1, actuator="slew_rate")),
     ):  # fmt: skip
         out = tmp_path / "out"
         more = ["--no-report", "--overwrite"]
         assert main(["identify", *words, "-o", str(out), *more]) == 0
-        assert cr.load_model(out / "model.json").dead_time == expected.dead_time
+        stored = cr.load_model(out / "model.json")
+        assert stored.dead_time == expected.dead_time
+        assert stored.fit.choices == expected.fit.choices
         # the command that is kept makes the same model
         command = shlex.split(json.loads((out / "manifest.json").read_text())["command"])
         assert main([*command[1:], "-o", str(tmp_path / "again"), "--no-report"]) == 0

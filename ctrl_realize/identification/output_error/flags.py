@@ -146,7 +146,8 @@ def _misfit(fit: OutputErrorEstimate) -> Flag | None:
             "the dead time is the median of five delay estimates and the interval is their range"
             if fit.delay_estimates
             else "the interval is valid only if a given structure is that of the plant"
-        ),
+        )
+        + "; actuator='auto' also fits what a valve or drive does before or behind the lags",
     )
 
 
@@ -232,7 +233,7 @@ def _open_start(fit: OutputErrorEstimate, firm: str) -> Flag | None:
         "before the visible onset is dead time is not identifiable; it is between "
         f"{interval_in_time(fit.low, fit.high, 'and')}{firm}. Backlash and static friction have "
         "the same effect at one step amplitude: fit records of several amplitudes together, whose "
-        "delays then differ",
+        "delays then differ, or the records with actuator='auto'",
     )
 
 
