@@ -9,7 +9,7 @@ import numpy as np
 from ..._wording import in_time, interval_in_time, numbers_alike, time_within
 from ...numerics.output_error.result import OutputErrorEstimate, RobustKey
 from ...numerics.parameters.process_form import ProcessForm
-from ...numerics.separable.dispersion import DispersedFlow
+from ...numerics.separable.dispersion.fit import DispersedFlow
 from ...numerics.separable.lag_chains import LagChain
 from ...results import Flag
 

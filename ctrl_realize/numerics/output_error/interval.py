@@ -23,7 +23,7 @@ from dataclasses import dataclass, replace
 
 from ..constants import Z_95
 from ..parameters.physical import without_errors
-from ..separable.dispersion import DispersedFlow, flow_profile
+from ..separable.dispersion.fit import DispersedFlow, flow_profile
 from ..separable.lag_chains import (
     FREE_IN_A_CHAIN,
     LagChain,

@@ -18,7 +18,7 @@ import numpy as np
 from ..arrays import ComplexArray, FloatArray
 from ..parameters.physical import ProcessParameter, fitted_parameters
 from ..parameters.process_form import ProcessForm
-from ..separable.dispersion import DispersedFlow
+from ..separable.dispersion.fit import DispersedFlow
 from ..separable.lag_chains import LagChain, lag_sum
 from ..separable.profile_ends import profile_limits
 from ..separable.static_gain import StaticGain, averaged_ends

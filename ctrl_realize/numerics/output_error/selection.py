@@ -22,7 +22,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from ..separable.dispersion import DispersedFlow, fit_flows
+from ..separable.dispersion.fit import DispersedFlow, fit_flows
 from ..separable.lag_chains import FREE_IN_A_CHAIN, LagChain, fit_chains, fit_diffusion
 from ..separable.structures import PLAUSIBLE, Candidate, choose, needless_parameters, search
 from ..separable.varpro import Structure

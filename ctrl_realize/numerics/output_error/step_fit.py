@@ -59,7 +59,7 @@ from ..constants import Z_95
 from ..parameters.physical import without_errors
 from ..parameters.process_form import ProcessForm
 from ..separable.compared_fits import at_dead_time
-from ..separable.dispersion import DispersedFlow
+from ..separable.dispersion.fit import DispersedFlow
 from ..separable.lag_chains import LagChain
 from ..separable.structures import (
     ALL_STRUCTURES,

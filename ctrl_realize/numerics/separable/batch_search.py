@@ -13,7 +13,8 @@ from __future__ import annotations
 import numpy as np
 
 from ..arrays import BoolArray, FloatArray, IntArray
-from .varpro import Bounds, Problem, Structure, evaluate
+from .compressed import compress
+from .varpro import Bounds, Problem, Structure
 
 _LONGEST_STEP = 1.5  # of a logarithmic parameter, in one iteration
 _MOST_FAILURES = 4  # in a row, before a start is given up
@@ -53,7 +54,7 @@ def fit_batch(
     x = np.clip(starts, bounds.low, bounds.high)
     if dead_time_fixed:
         x[:, 0] = starts[:, 0]
-    state = evaluate(problem, structure, x)
+    state = compress(problem, structure, x)
     residual, jacobian, cost = state.residual, state.jacobian, state.cost
     damping = np.full(x.shape[0], 1e-2)
     failures = np.zeros(x.shape[0], dtype=np.int64)
@@ -66,7 +67,7 @@ def fit_batch(
         trial[:, 1:] = np.clip(trial[:, 1:], bounds.low[1:], bounds.high[1:])
         if not dead_time_fixed:
             trial[:, 0] = np.clip(trial[:, 0], bounds.low[0], bounds.high[0])
-        state = evaluate(problem, structure, trial)
+        state = compress(problem, structure, trial)
         new = state.cost
         better = new < cost[active]
         settled = better & short & (cost[active] - new < tolerance * new)

@@ -14,11 +14,16 @@ References
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
+from typing import TypeAlias
+
 import numpy as np
 
 from ..arrays import BoolArray, FloatArray
+from .compressed import compress
 from .sample_kinks import beside_a_sample, cell, leaving, other_side, snapped
-from .varpro import Bounds, Problem, Structure, evaluate
+from .varpro import Bounds, Problem, Structure
 
 IN_ROUNDING = 1e-11
 """Part of the sum of squares: whether so little is a decrease, rounding decides."""
@@ -36,6 +41,9 @@ _GIVEN_UP = 1e6  # by which a step is shortened at most
 _LARGEST = 0.5  # step of a logarithmic parameter
 _ENDLESS = 1e12  # samples, or logarithms of rates: no step of a fit is as long
 _LEVEL = 1e-6  # variances to which a level is met
+
+Slopes: TypeAlias = Callable[[FloatArray], tuple[FloatArray, FloatArray]]
+"""Costs (B,) and their exact gradients (B, n) at parameters (B, n)."""
 
 
 def settle(
@@ -56,16 +64,16 @@ def settle(
     x = start.copy()
     if not dead_time_fixed:
         x[0] = beside_a_sample(x[:1], bounds, dt)[0]
-    held = np.array([dead_time_fixed])
+    held, slopes = np.array([dead_time_fixed]), partial(_slopes, problem, structure)
     for _ in range(_MOST_CELLS):
         low, high = (bound[0] for bound in cell(x[None], bounds, dt, held))
-        x, cost, slope = _newton(problem, structure, x, (low, high), dt)
+        x, cost, slope = minimum(slopes, x, (low, high), _units(x, dt))
         over = int(leaving(x[None], -slope[None], low[None], high[None], bounds, held)[0])
         if not over:
             break
         beside = x.copy()
         beside[0] = other_side(x[:1], np.array([over]), dt)[0]
-        state = evaluate(problem, structure, beside[None])
+        state = compress(problem, structure, beside[None])
         if over * float(state.jacobian[0, :, 0] @ state.residual[0]) > 0:
             x = beside
         else:
@@ -91,11 +99,11 @@ def solve_level(
     derivatives w.r.t. the others are zero there, and the cost is `goal`. None if it does not
     converge.
     """
-    x, unit = start.copy(), np.ones(start.size)
-    unit[0] = dt
+    x, unit = start.copy(), _units(start, dt)
     limits = bounds.low, bounds.high
+    slopes = partial(_slopes, problem, structure)
     others = np.arange(x.size) > 0
-    cost, slope, hessian = _curvature(problem, structure, x, unit, limits)
+    cost, slope, hessian = _curvature(slopes, x, unit, limits)
     before, made = 0.0, 1
     for _ in range(_TURNS):
         free = others & ~((x <= limits[0]) & (slope > 0) | (x >= limits[1]) & (slope < 0))
@@ -125,14 +133,15 @@ def solve_level(
             # The previous Hessian is not valid here.
             if made == _MOST_HESSIANS:
                 return None
-            cost, slope, hessian = _curvature(problem, structure, x, unit, limits)
+            cost, slope, hessian = _curvature(slopes, x, unit, limits)
             before, made = 0.0, made + 1
             continue
         step = np.zeros(x.size)
         step[0], step[free] = away, back + along * away
         step /= max(1.0, float(np.abs(step[1:]).max(initial=0.0)) / _LARGEST)
         x = np.clip(x + step * unit, *limits)
-        (cost,), (slope,) = _slopes(problem, structure, x[None], unit)
+        (cost,), (slope,) = slopes(x[None])
+        slope = slope * unit
         before = off
     return None
 
@@ -145,19 +154,16 @@ def _to_level(slope: float, bend: float, rise: float) -> float:
     return float(2 * rise / (slope + np.sign(slope) * np.sqrt(square)))
 
 
-def _newton(
-    problem: Problem,
-    structure: Structure,
-    x: FloatArray,
-    bounds: tuple[FloatArray, FloatArray],
-    dt: float,
+def minimum(
+    slopes: Slopes, x: FloatArray, bounds: tuple[FloatArray, FloatArray], unit: FloatArray
 ) -> tuple[FloatArray, float, FloatArray]:
-    """Parameters, cost, and its derivative at a minimum within bounds."""
-    unit = np.ones(x.size)
-    unit[0] = dt
+    """Parameters (n,), cost, and its scaled gradient at a minimum within bounds.
+
+    `unit` (n,) are the sizes of the parameters in which steps and differences are measured.
+    """
     low, high = bounds
     damping = 0.0
-    cost, slope, hessian = _curvature(problem, structure, x, unit, bounds)
+    cost, slope, hessian = _curvature(slopes, x, unit, bounds)
     before, made = 0.0, 1
     for _ in range(_TURNS):
         free = ~((x <= low) & (slope > 0) | (x >= high) & (slope < 0) | (low >= high))
@@ -169,7 +175,8 @@ def _newton(
         lost = 0 < _KEPT**2 * before < predicted
         if not lost:
             trial = np.clip(x + step * unit, low, high)
-            (reached,), (turned,) = _slopes(problem, structure, trial[None], unit)
+            (reached,), (turned,) = slopes(trial[None])
+            turned = turned * unit
             if reached < cost or predicted <= IN_ROUNDING * cost:
                 x, cost, slope, damping, before = trial, float(reached), turned, 0.0, predicted
                 continue
@@ -181,7 +188,7 @@ def _newton(
         elif made == _MOST_HESSIANS:
             break
         else:
-            cost, slope, hessian = _curvature(problem, structure, x, unit, bounds)
+            cost, slope, hessian = _curvature(slopes, x, unit, bounds)
             before, made = 0.0, made + 1
     return x, cost, slope
 
@@ -211,8 +218,7 @@ def _newton_step(
 
 
 def _curvature(
-    problem: Problem,
-    structure: Structure,
+    slopes: Slopes,
     x: FloatArray,
     unit: FloatArray,
     bounds: tuple[FloatArray, FloatArray],
@@ -225,17 +231,25 @@ def _curvature(
     rows = np.tile(x, (1 + 2 * moving.size, 1))
     ahead, behind = 1 + np.arange(moving.size), 1 + moving.size + np.arange(moving.size)
     rows[ahead, moving], rows[behind, moving] = later[moving], earlier[moving]
-    cost, slopes = _slopes(problem, structure, rows, unit)
+    cost, steep = slopes(rows)
+    steep = steep * unit
     hessian = np.eye(x.size)
     distance = (later - earlier)[moving] / unit[moving]
-    bend = (slopes[ahead] - slopes[behind]) / distance[:, None]
+    bend = (steep[ahead] - steep[behind]) / distance[:, None]
     hessian[np.ix_(moving, moving)] = (bend[:, moving] + bend[:, moving].T) / 2
-    return float(cost[0]), slopes[0], hessian
+    return float(cost[0]), steep[0], hessian
 
 
 def _slopes(
-    problem: Problem, structure: Structure, rows: FloatArray, unit: FloatArray
+    problem: Problem, structure: Structure, rows: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Costs (B,) and gradients (B, 1 + n) in scaled parameters."""
-    state = evaluate(problem, structure, rows)
-    return state.cost, -2 * np.einsum("bmp,bm->bp", state.jacobian, state.residual) * unit
+    """Costs (B,) and gradients (B, 1 + n)."""
+    state = compress(problem, structure, rows)
+    return state.cost, -2 * np.einsum("bmp,bm->bp", state.jacobian, state.residual)
+
+
+def _units(x: FloatArray, dt: float) -> FloatArray:
+    """A sample time for the dead time, 1 for logarithms."""
+    unit = np.ones(x.size)
+    unit[0] = dt
+    return unit

@@ -19,9 +19,10 @@ from __future__ import annotations
 import numpy as np
 
 from ..arrays import BoolArray, FloatArray, IntArray
+from .compressed import compress
 from .newton import IN_ROUNDING
 from .sample_kinks import beside_a_sample, cell, leaving, other_side, snapped
-from .varpro import Bounds, Problem, Structure, evaluate
+from .varpro import Bounds, Problem, Structure
 
 _NEAR = 0.05  # variances: predicted decrease at which Newton's steps take over
 _NO_WAY = 0.03  # of the distance to a level, as predicted decrease, at which it is not reached
@@ -70,7 +71,7 @@ def polish(
         x[:, 0] = starts[:, 0]
     else:
         x[:, 0] = beside_a_sample(x[:, 0], bounds, dt)
-    state = evaluate(problem, structure, x)
+    state = compress(problem, structure, x)
     residual, jacobian, cost = state.residual, state.jacobian, state.cost
     count = len(x)
     damping, growth = np.full(count, _DAMPING), np.full(count, 2.0)
@@ -101,7 +102,7 @@ def polish(
         trial[turn] = at[turn]
         trial[turn, 0] = other_side(at[turn, 0], over[turn], dt)
         trial[kink] = at[kink]
-        moved = evaluate(problem, structure, trial)
+        moved = compress(problem, structure, trial)
         gained = cost[active] - moved.cost
         tiny = predicted <= IN_ROUNDING * cost[active]
         better = (gained > 0) | (tiny & (gained >= -IN_ROUNDING * cost[active])) | turn

@@ -132,6 +132,29 @@ class StepSequence:
                 values[row, column] = sums / count.reshape(-1, *[1] * (sums.ndim - 1))
         return static, mode, slope
 
+    def since_the_step(self, tau: FloatArray) -> FloatArray | None:
+        """Times (B, m) from the arrival of a single step to every bin, 0 before it.
+
+        None if there are several changes, samples are missing, or the step arrives within a bin.
+        """
+        if self.moves.size > 1 or self.samples is not None:
+            return None
+        since: FloatArray = self.first - (self.moves[0] + tau[:, None])
+        before = since <= _TOGETHER * self.dt
+        if (before & (since + self.lengths > _TOGETHER * self.dt)).any():
+            return None
+        since[before] = 0.0
+        return since
+
+    def means(self, rates: Any) -> tuple[Any, Any, IntArray]:
+        """Mean of exp(p t) over kinds of bins (B, J, k), the mean time, and the kind of each bin.
+
+        The time counts from the first sample of a bin, and has exp(p t) for its weight.
+        """
+        widths, kind = self._kinds
+        mean, turn = _geometric_mean(rates[:, :, None] * self.dt, widths)
+        return mean, self.dt * turn / mean, kind
+
     @cached_property
     def _kinds(self) -> tuple[IntArray, IntArray]:
         """Distinct widths, and the index of that of every bin."""

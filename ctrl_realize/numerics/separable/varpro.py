@@ -73,6 +73,11 @@ class Problem:
         return self.weighted(self.data[:, None])[:, 0]
 
     @cached_property
+    def weighted_regressors(self) -> FloatArray:
+        """Fixed regressors (m, q) in units of the noise."""
+        return self.weighted(self.regressors)
+
+    @cached_property
     def _fixed(self) -> FixedTerms:
         assert self.segments is not None
         return FixedTerms(self.segments, self.root_weight)
@@ -170,7 +175,7 @@ def evaluate(problem: Problem, structure: Structure, parameters: FloatArray) -> 
     # Columns of E: the derivatives w.r.t. the dead time and through the amplitudes.
     through = np.empty((batch, poles.shape[1], 1 + n), dtype=np.complex128)
     through[:, :, 0] = -amplitudes * poles
-    through[:, :, 1:] = _moved_amplitudes(poles, amplitudes, dresidues, numerator)[:, :, :n] @ dfree
+    through[:, :, 1:] = moved_amplitudes(poles, amplitudes, dresidues, numerator)[:, :, :n] @ dfree
     derivative = _real_product(mode, through)
     stretch = amplitudes[:, :n, None] * dfree
     level = np.einsum("bj,bjq->bq", -1.0 / free, dfree).real
@@ -239,7 +244,7 @@ def partial_fractions(
     return residues, gain, dresidues
 
 
-def _moved_amplitudes(
+def moved_amplitudes(
     poles: ComplexArray,
     amplitudes: ComplexArray,
     dresidues: ComplexArray,

@@ -9,7 +9,8 @@ from scipy.stats import invgauss
 
 from ctrl_realize.numerics.output_error.step_data import step_data, step_scales, window
 from ctrl_realize.numerics.separable.batch_search import fit_batch
-from ctrl_realize.numerics.separable.dispersion import fit_flows, flow_modes, flow_profile
+from ctrl_realize.numerics.separable.dispersion.fit import fit_flows, flow_profile
+from ctrl_realize.numerics.separable.dispersion.residence import flow_modes
 from ctrl_realize.numerics.separable.lag_chains import LagChain, fit_chains, fit_diffusion
 from ctrl_realize.numerics.separable.poles import parameters_from_poles
 from ctrl_realize.numerics.separable.profile_ends import profile_limits
@@ -87,7 +88,7 @@ def residence(mean: float, spread: float):
 @pytest.mark.parametrize("spread", [0.1, 0.45, 1.0, 3.0])
 def test_what_has_passed_is_the_distribution_of_the_residence_times(spread):
     time = 0.08 * np.geomspace(1e-3, 50, 40)
-    passed, _ = flow_modes(time, 0.08, spread, np.empty(0, dtype=complex))
+    passed = flow_modes(time, 0.08, spread, np.zeros(1)).values[:, 0]
     assert_allclose(passed, residence(0.08, spread).cdf(time), rtol=1e-9, atol=1e-14)
 
 
@@ -95,7 +96,7 @@ def test_what_has_passed_is_the_distribution_of_the_residence_times(spread):
 @pytest.mark.parametrize("time", [0.02, 0.08, 0.3])
 def test_a_mode_behind_a_flow_is_its_convolution_with_the_residence_times(pole, time):
     flow = residence(0.08, 0.45)
-    _, modes = flow_modes(np.array([time]), 0.08, 0.45, np.array([pole]))
+    modes = flow_modes(np.array([time]), 0.08, 0.45, np.array([pole])).values
     recent = [max(time - 8 / abs(pole), 1e-9)]
 
     def part(take):
@@ -110,6 +111,22 @@ def test_a_mode_behind_a_flow_is_its_convolution_with_the_residence_times(pole, 
     assert_allclose(
         modes[0, 0], part(np.real) + 1j * part(np.imag), rtol=1e-6, atol=1e-8
     )  # of the quadrature
+
+
+@pytest.mark.parametrize("pole", [0.0, -3.0, -300.0, -20 + 40j])
+@pytest.mark.parametrize("spread", [0.2, 0.9])
+def test_derivatives_of_a_mode_behind_a_flow_are_limits_of_differences(pole, spread):
+    time, step = np.geomspace(0.004, 0.8, 20), 1e-5
+
+    def moved(by_time=0.0, by_mean=0.0, by_spread=0.0, by_pole=0.0):
+        settings = 0.08 * np.exp(by_mean), spread * np.exp(by_spread), np.array([pole + by_pole])
+        return flow_modes(time + by_time, *settings).values
+
+    found = flow_modes(time, 0.08, spread, np.array([pole]))
+    for name, size in (("time", 1e-6), ("mean", step), ("spread", step), ("pole", 1e-3)):
+        slope = (moved(**{f"by_{name}": size}) - moved(**{f"by_{name}": -size})) / (2 * size)
+        close = 1e-6 * np.abs(slope).max()  # third derivatives and rounding of the differences
+        assert_allclose(getattr(found, f"by_{name}"), slope, rtol=0, atol=close)
 
 
 def flow_problem(

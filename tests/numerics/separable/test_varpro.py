@@ -5,6 +5,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from ctrl_realize.numerics.separable.batch_search import fit_batch
+from ctrl_realize.numerics.separable.compressed import compress
 from ctrl_realize.numerics.separable.local_terms import Segments
 from ctrl_realize.numerics.separable.poles import parameters_from_poles, poles_from_parameters
 from ctrl_realize.numerics.separable.responses import SampledInput, StepSequence
@@ -54,6 +55,48 @@ def test_at_the_optimum_the_jacobian_is_minus_the_derivative_of_the_residual(n, 
         scale = np.abs(derivative).max()
         # central differences of step 1e-5: 1e-10 from curvature, 1e-7 from rounding
         assert_allclose(state.jacobian[0, :, q], derivative, rtol=0, atol=2e-6 * scale)
+
+
+def drives() -> dict[str, StepSequence | SampledInput]:
+    """Inputs of 300 samples: of one step also the means over bins, and in one of them it comes."""
+    width = np.array([1] * 40 + [3, 5, 7, 4, 1, 2, 20, 60, 158])
+    first = np.cumsum(width) - width
+    move, size = np.array([3.0]), np.array([0.7])
+    return {
+        "step": StepSequence(np.arange(300.0), ONES, 1.0, move, size),
+        "bins": StepSequence(first.astype(float), width, 1.0, move, size),
+        "a bin of the onset": StepSequence(first.astype(float), width, 1.0, move + 20, size),
+        "steps": TRAIN,
+        "random": RANDOM,
+    }
+
+
+@pytest.mark.parametrize("coloured", [False, True])
+@pytest.mark.parametrize("drive", drives().values(), ids=drives())
+@pytest.mark.parametrize(("n", "r"), [(1, 1), (2, 2), (2, 1), (3, 3), (3, 1), (4, 4), (5, 2)])
+def test_compression_changes_no_products_of_residual_and_jacobian(n, r, drive, coloured):
+    x = np.tile(np.concatenate([[22.3], THETA[n]]), (3, 1))
+    x += 0.1 * np.random.default_rng(n).normal(size=x.shape)
+    if n > 1:
+        x[1, -1] = np.log(1.7)  # two lags beside pairs of conjugates, in one batch
+    rows = 300 if isinstance(drive, SampledInput) else drive.first.size
+    rng = np.random.default_rng(r)
+    walk, weight = rng.normal(size=rows).cumsum(), rng.uniform(0.5, 2.0, rows)
+    clock = np.stack([np.ones(rows), np.linspace(0, 1, rows)], axis=1)
+    whitener = np.eye(rows) - 0.8 * np.eye(rows, k=-1) if coloured else None
+    problem = Problem(walk, weight, drive, clock, KnownFactor(), whitener=whitener)
+    whole, short = (way(problem, Structure(n, r), x) for way in (evaluate, compress))
+    assert short.residual.shape[1] < 20
+    for mine, theirs in zip(*(products(one) for one in (short, whole)), strict=True):
+        assert_allclose(mine, theirs, rtol=0, atol=1e-9 * np.abs(theirs).max())
+
+
+def products(state):
+    """Squares and products of residual and Jacobian, the latter in columns of one size."""
+    size = np.sqrt(np.einsum("bmp,bmp->bp", state.jacobian, state.jacobian))
+    columns = state.jacobian / size[:, None]
+    downhill = np.einsum("bmp,bm->bp", columns, state.residual)
+    return state.cost, size, downhill, np.einsum("bmp,bmq->bpq", columns, columns)
 
 
 def test_the_response_is_the_closed_form_at_any_fraction_of_a_sample():

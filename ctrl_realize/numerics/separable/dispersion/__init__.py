@@ -1,0 +1,1 @@
+"""Axial dispersion: responses of a flow that disperses, and its fit to a step record."""
