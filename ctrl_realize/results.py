@@ -184,6 +184,8 @@ class ModelFit(Result):
         Unit of time of the records (``"s"``, ``"min"``, ...), in which results are written.
     input_unit, output_unit : str
         Of the signals; empty if they are not known.
+    actuator : ActuatorFit or None
+        Actuator that was estimated with the model, which is the linear part.
     sampling : str or None
         Sampling of the impulse response that the model was realized from.
     records : tuple of Record
@@ -291,6 +293,11 @@ class ModelFit(Result):
     def integrators(self) -> int:
         """Number of poles at zero."""
         return 0
+
+    @property
+    def actuator(self) -> Any:
+        """Actuator that was estimated with the model, an `ActuatorFit`; None if there is none."""
+        return None
 
     @property
     def time_unit(self) -> str:

@@ -57,7 +57,7 @@ def simulate_record(
 
 def _forced(model: DelayedStateSpace, u: FloatArray, dt: float) -> FloatArray:
     """Response (p, N) from steady state, through the actuator that was fitted with the model."""
-    actuator = getattr(model.fit, "actuator", None)
+    actuator = None if model.fit is None else model.fit.actuator
     if actuator is None:
         return np.atleast_2d(model.simulate(u - u[:, :1]))
     gain = float(np.real(np.ravel(model.delay_free.dcgain())[0]))

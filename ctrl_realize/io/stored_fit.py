@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, TypeVar, cast, get_args
 
@@ -12,7 +12,9 @@ import numpy as np
 
 from .._parameters import SECONDS, Parameter
 from .._wording import times_in
+from ..actuators.plain import Plain, from_plain, to_plain
 from ..errors import FileFormatError
+from ..identification.output_error.actuated.result import ActuatorFit
 from ..results import INTERVAL_LABELS, Flag, IntervalKind, ModelFit
 from .json_content import MAX_TEXT, field
 
@@ -34,7 +36,6 @@ _KEPT = (
 _MAX_ROWS = 200
 
 Value = TypeVar("Value")
-Plain = float | int | str | bool | None | tuple["Plain", ...]
 
 
 def _text(value: Plain) -> str | None:
@@ -180,6 +181,12 @@ class FitSummary(ModelFit):
         return tuple(one for one in found if one is not None)
 
     @property
+    def actuator(self) -> ActuatorFit | None:
+        """Actuator that was estimated with the model; None if there was none."""
+        stored = self._value("actuator")
+        return None if stored is None else _actuator(stored)
+
+    @property
     def time_unit(self) -> str:
         """Unit of time in which results are written."""
         unit = _text(self._value("time_unit"))
@@ -242,7 +249,9 @@ def summary_of(fit: ModelFit | None) -> FitSummary | None:
     values["fit_percent"] = _plain(getattr(fit, "fit_percent", None))
     if fit.parameters:
         values["formula"] = fit.formula
-        values["parameters"] = _plain([tuple(vars(one).values()) for one in fit.parameters])
+        values["parameters"] = _parameter_rows(fit.parameters)
+    if fit.actuator is not None:
+        values["actuator"] = _actuator_row(fit.actuator)
     with times_in(fit.time_unit):
         rows = tuple((str(label), str(value)) for label, value in fit._rows())
         title = fit._title()
@@ -254,6 +263,33 @@ def summary_of(fit: ModelFit | None) -> FitSummary | None:
         flags=fit.flags,
         choices=fit.choices,
     )
+
+
+def _parameter_rows(parameters: Iterable[Parameter]) -> Plain:
+    return _plain([tuple(vars(one).values()) for one in parameters])
+
+
+def _actuator_row(fit: ActuatorFit) -> Plain:
+    """Return the fields of an actuator in their order, without what the records cannot tell."""
+    model, rows = to_plain(fit.model), _parameter_rows(fit.parameters)
+    return _plain((model, fit.actuator_at, rows, fit.starts, fit.evidence))
+
+
+def _actuator(row: Plain) -> ActuatorFit:
+    """Accept the fields of an actuator; a model without it would be simulated as another one."""
+    match row:
+        case (model, ("input" | "stem") as place, tuple() as rows, tuple() as begun, evidence):
+            parameters = [one for one in map(_parameter, rows) if one is not None]
+            starts = [one for one in map(_number, begun) if one is not None]
+            try:
+                found = from_plain(model)
+            except (TypeError, ValueError) as error:
+                raise FileFormatError(f"'actuator' of 'fit': {error}") from error
+            for_it = _number(evidence)
+            return ActuatorFit(
+                found, place, tuple(parameters), tuple(starts), np.nan if for_it is None else for_it
+            )
+    raise FileFormatError("'actuator' of 'fit' is not as it was written; save the model again")
 
 
 def summary_to_json(summary: FitSummary | None) -> dict[str, Any] | None:
@@ -282,7 +318,7 @@ def summary_from_json(content: Any) -> FitSummary | None:
     if not isinstance(content, Mapping):
         raise FileFormatError("'fit' has the wrong type")
     values = field(content, "values", dict)
-    return FitSummary(
+    summary = FitSummary(
         kind=field(content, "kind", str),
         title=field(content, "title", str),
         rows=_pairs(content, "rows"),
@@ -290,6 +326,8 @@ def summary_from_json(content: Any) -> FitSummary | None:
         flags=tuple(Flag(code, message) for code, message in _pairs(content, "flags")),
         choices=_texts(content, "choices"),
     )
+    _ = summary.actuator  # refused here, if at all, and not where it is used
+    return summary
 
 
 def _pairs(content: Mapping[str, Any], key: str) -> tuple[tuple[str, str], ...]:

@@ -19,6 +19,7 @@ from ctrl_realize.actuators import (
     SlewRateLimit,
     Stiction,
 )
+from ctrl_realize.actuators.plain import from_plain, to_plain
 
 STEM = LuGreFriction(
     mass=1.0, spring=100.0, coulomb=100.0, static=150.0, stribeck=0.01, bristle=1e5,
@@ -55,6 +56,11 @@ def test_a_system_of_python_control_moves_as_the_array_simulation(model):
     assert_allclose(y, model.simulate(u, dt), rtol=0, atol=1e-12)
     assert system.isdtime(strict=True)
     assert system.nstates == len(model.state_names)
+
+
+def test_numbers_and_text_of_a_file_make_the_same_model():
+    for model in [one for one in MODELS if not isinstance(one, Series)]:
+        assert from_plain(to_plain(model)) == model
 
 
 @pytest.mark.parametrize("direction", [-1, 1])

@@ -262,3 +262,28 @@ def test_a_model_that_was_loaded_is_saved_as_it_was_and_keeps_its_interval(tmp_p
     assert told[0] == told[1]
     save_model(tmp_path / "b.json", again)
     assert (tmp_path / "a.json").read_bytes() == (tmp_path / "b.json").read_bytes()
+
+
+def test_an_actuator_is_stored_with_its_model(tmp_path):
+    slow = cr.actuators.SlewRateLimit(300.0)
+    valve = cr.bench.valve(actuator=slow, actuator_at="input", lvdt_hz=None)
+    record = valve.step_record(16, rng=1)
+    sys = cr.fit_output_error(record, structures=[(3, 3)], actuator="slew_rate")
+    file = tmp_path / "model.json"
+    save_model(file, sys)
+    loaded = load_model(file)
+    assert loaded.fit.actuator == sys.fit.actuator
+    assert (
+        cr.compare({"a": loaded}, record).fit_percent == cr.compare({"a": sys}, record).fit_percent
+    )
+    # a file whose actuator is not one makes no linear model of it
+    content = json.loads(file.read_text())
+    for broken in (
+        ["SlewRateLimit"], 5, [["Actuator"], "input", [], [], 1.0],
+        [["SlewRateLimit", -1, None], "input", [], [], 1.0],
+        [["SlewRateLimit", [1], None], "input", [], [], 1.0],
+    ):  # fmt: skip
+        content["fit"]["values"]["actuator"] = broken
+        file.write_text(json.dumps(content))
+        with pytest.raises(FileFormatError, match="actuator"):
+            load_model(file)
