@@ -28,7 +28,12 @@ _LABELS = {
     "zero_time": "time constant of the zeros",
     "zero_damping": "damping of the zeros",
     "slew_rate": "slew rate",
+    "slew_rate_opening": "slew rate opening",
+    "slew_rate_closing": "slew rate closing",
     "dead_band": "dead band",
+    "travel_low": "lower end of travel",
+    "travel_high": "upper end of travel",
+    "flow_at": "flow at",
 }
 
 
@@ -89,6 +94,8 @@ class Parameter:
     def label(self) -> str:
         """Name in words."""
         base, _, number = self.name.rpartition("_")
+        if base == "flow_at":
+            return f"{_LABELS[base]} {number}"
         if base in _LABELS and number.isdigit():
             alone = number == "1" and not base.startswith("l")  # one pair, but several lags
             return _LABELS[base] + ("" if alone else f" {number}")

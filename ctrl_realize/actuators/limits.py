@@ -195,12 +195,12 @@ class Saturation(StaticMap):
     Parameters
     ----------
     low, high : float
-        Lowest and highest position.
+        Lowest and highest position; infinite where there is no stop.
 
     Raises
     ------
     OptionError
-        ``low >= high``, or not finite.
+        ``low >= high``.
 
     References
     ----------
@@ -217,9 +217,17 @@ class Saturation(StaticMap):
     high: float = 100.0
 
     def __post_init__(self) -> None:
-        ordered(self.low, self.high)
+        for name, end in (("low", self.low), ("high", self.high)):
+            if end not in (-np.inf, np.inf):
+                real(end, name, "end of the travel")
+        if not self.low < self.high:
+            raise OptionError(f"low={self.low!r}, high={self.high!r}; expected low < high")
 
     def __str__(self) -> str:
+        if not np.isfinite(self.low):
+            return f"travel up to {self.high:g}"
+        if not np.isfinite(self.high):
+            return f"travel down to {self.low:g}"
         return f"travel from {self.low:g} to {self.high:g}"
 
     def _simulated(self, command: FloatArray, dt: float) -> FloatArray:

@@ -47,6 +47,8 @@ COMPOSED = {
     "their range; actuator='auto' also fits what a valve or drive does before or behind the lags",
     "gain_not_resolved": "structures that the data cannot rule out differ in gain or total delay, "
     "or the interval of the gain contains zero",
+    "actuator_not_resolved": "S, J, or another parameter of an actuator, lies between … and …, and "
+    "the records do not tell it closer; … would",
     "estimates_disagree": "delay estimates far from their median: …",
 }
 """Messages that are put together from parts."""

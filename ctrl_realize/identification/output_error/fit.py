@@ -28,7 +28,8 @@ from ...numerics.separable.varpro import KnownFactor, Structure
 from ...numerics.signals.edges import despike, difference_noise
 from ..process_structures import Structures, requested
 from ..step.steps import found_step
-from .actuated.fit import ASKED, Asked, with_actuator
+from .actuated.alternatives import ASKED, Asked
+from .actuated.fit import with_actuator
 from .any_input import fit_any_input
 from .averaging import (
     aligned_steps,
@@ -110,13 +111,16 @@ def fit_output_error(
         For several records. ``"own"``: each has its own gain, with common dynamics and dead time;
         records that do not agree with the others are named and left out. The model has the median
         gain, and ``fit.gains`` has all of them as a schedule over the operating point.
-    actuator : {"auto", "slew_rate", "dead_band", "stiction"}, optional
+    actuator : {"auto", "slew_rate", "dead_band", "stiction", "resolution", "saturation", \
+            "characteristic"}, optional
         Fit also models with this nonlinearity (``"auto"``: all that the command can tell) before or
         behind the lags. Where the evidence for one is very strong by the same criterion, the model
         that is returned is its linear part, and ``fit.actuator`` the actuator with the intervals of
         its parameters; the interval of the dead time is that of both together. Otherwise the fit
         is linear, and its interval also covers the actuators that are not ruled out. Several
-        records share actuator and linear part.
+        records share actuator and linear part. A slew rate has one value, or one for each
+        direction; stiction with S = J is a resolution; a characteristic is one of equal
+        percentages, or flows at the levels of the command.
 
     Returns
     -------
@@ -127,7 +131,8 @@ def fit_output_error(
     Raises
     ------
     NoStepError, DataError
-        No step, several channels, an output that does not move.
+        No step, several channels, an output that does not move, or a command that cannot tell the
+        actuator that was asked for.
     OrderError, OptionError, UnsuitableSystemError
         Invalid structures, options, or known dynamics.
 

@@ -31,9 +31,10 @@ from ..separable.structures import (
 )
 from ..separable.varpro import Structure
 from ..signals.noise import correlation_time, mad_sigma
-from .family import STICKING, Family, Member, Records, Task
+from .commands import knots
+from .family import Family, Member, Records, Task
 from .intervals import Ends, dead_time_ends, profiled
-from .motions import Kind, Place
+from .kinds import FORMS, Kind, Place
 from .records import ActuatedRecord
 from .search import searched, with_other_lags
 
@@ -167,11 +168,11 @@ def fit_actuated(
         squares = float(np.sum((weight * part.averaged(rival.residual[part.rows])) ** 2))
         free = rival.structure.order + rival.structure.zeros + 2
         straight.append(criterion(squares, rival.structure, free))
-    member = min(found, key=values.__getitem__)
-    task = Task(records, member.family, scales)
-    member, ends = profiled(task, member, variance)
+    chosen = _chosen(found, values)
+    task = Task(records, chosen.family, scales)
+    member, ends = profiled(task, chosen, variance)
     near = sorted(
-        (one for one in found if _plausible(one, found, values, variance)),
+        (one for one in found if _plausible(one, chosen, values, variance)),
         key=values.__getitem__,
     )
     every = [ends]
@@ -216,14 +217,16 @@ def _with_actuators(
 ) -> list[Member]:
     """Best member of every family with an actuator."""
     found: list[Member] = []
+    every = knots(records.parts)
     for kind, place in wanted:
-        if kind in STICKING:
-            # What sticks does not change how fast the rest is: one structure finds it for all.
-            first = behind[min(1, len(behind) - 1)]
-            base = searched(records, Family(first, kind, place), scales, linear)
-            own = with_other_lags(records, base, behind, scales)
+        levels = _needed(kind, every)
+        if FORMS[kind].own_lags:
+            own = [searched(records, Family(s, kind, place, levels), scales) for s in behind]
         else:
-            own = [searched(records, Family(s, kind, place), scales) for s in behind]
+            # It does not change how fast the rest is: one structure finds it for all.
+            first = behind[min(1, len(behind) - 1)]
+            base = searched(records, Family(first, kind, place, levels), scales, linear)
+            own = with_other_lags(records, base, behind, scales)
         best = min(own, key=lambda one: one.cost)
         if behind == BEHIND and best.family.structure == BEHIND[-1]:
             own += with_other_lags(records, best, [ONE_MORE], scales)[1:]
@@ -231,18 +234,35 @@ def _with_actuators(
     return found
 
 
+def _needed(kind: Kind, every: tuple[float, ...]) -> tuple[float, ...]:
+    """Levels of the commands that an actuator depends on."""
+    if not FORMS[kind].static:
+        return ()
+    return every if kind == "points" else (every[0], every[-1])
+
+
+def _chosen(found: Sequence[Member], values: Mapping[Member, float]) -> Member:
+    """Best model; one that contains a simpler one only where the evidence is very strong."""
+    tried = {one.family.kind for one in found}
+
+    def judged(one: Member) -> float:
+        general = not tried.isdisjoint(one.family.form.contains)
+        return values[one] + (PLAUSIBLE if general else 0.0)
+
+    return min(found, key=judged)
+
+
 def _plausible(
-    one: Member, found: Sequence[Member], values: Mapping[Member, float], variance: float
+    one: Member, chosen: Member, values: Mapping[Member, float], variance: float
 ) -> bool:
-    """Whether a model is not ruled out, and not the best.
+    """Whether a model is not ruled out, and not the chosen one.
 
     Lags without zeros that fit no worse are none of those that are: noise hides lags, and does not
     remove them (see `plausible` of the structures).
     """
-    best = min(found, key=values.__getitem__)
-    close = values[one] - values[best] <= PLAUSIBLE
-    fits = one.family.structure.zeros == 0 and one.cost <= best.cost + PLAUSIBLE * variance
-    return one is not best and (close or fits)
+    close = values[one] - values[chosen] <= PLAUSIBLE
+    fits = one.family.structure.zeros == 0 and one.cost <= chosen.cost + PLAUSIBLE * variance
+    return one is not chosen and (close or fits)
 
 
 def _leading(records: Records, members: Sequence[Member]) -> Member:

@@ -19,7 +19,7 @@ from ..parameters.physical import ProcessParameter, process_parameters
 from ..separable.lag_chains import lag_sum
 from ..separable.poles import poles_from_parameters
 from ..separable.static_gain import StaticGain
-from .family import VALUES, Member, Task
+from .family import Member, Task
 
 _STEP = 1e-4  # part of a coefficient, for a difference
 
@@ -78,10 +78,10 @@ def propagated(
         reached=float(coefficients[0]),
         sign_known=True,
     )
-    first = 1 + order
-    own = slice(first, first + VALUES[task.family.kind])
-    logs = np.sqrt(np.maximum(np.diag(covariance)[own], 0.0))
-    values = tuple((np.array(member.values) * logs).tolist())
+    own = np.sqrt(np.maximum(np.diag(covariance)[task.family.values], 0.0))
+    if task.family.form.logged:
+        own = np.array(member.values) * own
+    values = tuple(own.tolist())
     return Errors(static, parameters, values)
 
 
@@ -106,6 +106,9 @@ def _inverse(task: Task, point: FloatArray, steps: FloatArray) -> FloatArray:
 
     here, slopes = modelled(x), []
     for i in range(size):
+        if task.family.form.stepwise and i >= task.family.values.start:
+            slopes.append(np.zeros(here.size))
+            continue
         step = steps[i] if x[i] + steps[i] <= high[i] else -steps[i]
         moved = x.copy()
         moved[i] += step

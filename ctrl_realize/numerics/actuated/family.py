@@ -1,48 +1,65 @@
 """Families of models with an actuator, and the residual of one of their members.
 
 Gain, lead, and the terms of the records enter linearly and are eliminated (variable projection
-[1]_); what is left is improved by Levenberg-Marquardt steps [2]_ with differences for derivatives.
+[1]_); what is left is improved by `regression.marquardt` with differences for derivatives.
 
 References
 ----------
 .. [1] G. Golub and V. Pereyra, Separable nonlinear least squares: the variable projection method
    and its applications, Inverse Problems 19 (2003) R1-R26, doi:10.1088/0266-5611/19/2/201.
-.. [2] D. W. Marquardt, An algorithm for least-squares estimation of nonlinear parameters, J. SIAM
-   11 (1963) 431-441, doi:10.1137/0111030.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
 from ..arrays import BoolArray, FloatArray
+from ..regression.marquardt import Damping, damped_step, descend
 from ..separable.structures import Scales, parameter_bounds
 from ..separable.varpro import Structure
-from .motions import Acting, Kind, Place, forced_response
+from .kinds import FORMS, Acting, Form, Kind, Place, Size
+from .motions import forced_response
 from .records import ActuatedRecord
 
 _OF_DT, _OF_LOG, _OF_START = 0.05, 1e-3, 1e-2  # steps of differences
 _MOST_TURNS = 30
 _LONGEST = 1.0  # of a logarithm, in one step
-_MOST_FAILURES = 5
+_DAMPING = Damping(first=1e-2, rise=8.0, fall=5.0, least=1e-9, tries=6)
 _FREELY = 1e-2  # damping up to which a short step tells that the bottom is reached
-
-VALUES: dict[Kind, int] = {"none": 0, "slew_rate": 1, "dead_band": 1, "kano": 2, "choudhury": 2}
-"""Number of parameters of each kind of actuator."""
-STICKING: tuple[Kind, ...] = ("dead_band", "kano", "choudhury")
 
 
 @dataclass(frozen=True)
 class Family:
-    """Order and zeros of the linear part, kind of actuator, and its place."""
+    """Order and zeros of the linear part, kind of actuator, its place, and levels it depends on."""
 
     structure: Structure
     kind: Kind = "none"
     place: Place = "input"
+    levels: tuple[float, ...] = ()
+
+    @property
+    def form(self) -> Form:
+        """What is to be known about the kind of actuator."""
+        return FORMS[self.kind]
+
+    @property
+    def values(self) -> slice:
+        """Where x has the parameters of the actuator."""
+        first = 1 + self.structure.order
+        return slice(first, first + (self.form.count or max(len(self.levels) - 2, 0)))
+
+    @property
+    def jump(self) -> int | None:
+        """Where x has a slip jump."""
+        return None if self.form.jump is None else self.values.start + self.form.jump
+
+    def natural(self, entries: FloatArray) -> FloatArray:
+        """Parameters of the actuator from their entries in x."""
+        return np.exp(entries) if self.form.logged else entries
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,23 +125,32 @@ class Member:
     @property
     def values(self) -> tuple[float, ...]:
         """Parameters of the actuator."""
-        first = 1 + self.family.structure.order
-        return tuple(np.exp(self.x[first : first + VALUES[self.family.kind]]).tolist())
+        return tuple(self.family.natural(self.x[self.family.values]).tolist())
 
     @property
     def starts(self) -> FloatArray:
         """Place within play or friction at the beginning of each record; empty if there is none."""
-        return self.x[1 + self.family.structure.order + VALUES[self.family.kind] :]
+        return self.x[self.family.values.stop :]
 
     @property
     def acting(self) -> Acting:
         """The actuator."""
-        return Acting(self.family.kind, self.family.place, self.values)
+        return Acting(self.family.kind, self.family.place, self.values, self.family.levels)
 
     @property
     def parameters(self) -> int:
         """Number of parameters, gain and zeros included."""
         return self.x.size + 1 + self.family.structure.zeros
+
+
+@dataclass(frozen=True, eq=False)
+class _Point:
+    """Parameters on the way down, and the damping of the step that led to them."""
+
+    x: FloatArray
+    residual: FloatArray
+    cost: float
+    damping: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -139,27 +165,29 @@ class Task:
     def bounds(self) -> tuple[FloatArray, FloatArray]:
         """Bounds of x."""
         linear = parameter_bounds(self.family.structure, self.scales)
-        reach, dt = self.records.range, self.scales.dt
-        low, high = [linear.low], [linear.high]
-        if self.family.kind == "slew_rate":
-            low.append(np.log([0.2 * reach / self.scales.length]))
-            high.append(np.log([2.0 * reach / dt]))
-        elif self.family.kind != "none":
-            count = VALUES[self.family.kind]
-            low.append(np.log(np.full(count, 1e-4 * reach)))
-            high.append(np.log(np.full(count, 1.5 * reach)))
-            low.append(np.full(len(self.records.parts), -1.0))
-            high.append(np.full(len(self.records.parts), 1.0))
-        return np.concatenate(low), np.concatenate(high)
+        values = self.family.values
+        count = values.stop - values.start
+        least, most = self.family.form.bounds(self.size)
+        starts = len(self.records.parts) if self.family.form.starts else 0
+        return (
+            np.concatenate([linear.low, np.full(count, least), np.full(starts, -1.0)]),
+            np.concatenate([linear.high, np.full(count, most), np.full(starts, 1.0)]),
+        )
+
+    @property
+    def size(self) -> Size:
+        """What the size of parameters is measured by."""
+        return Size(
+            self.records.range, self.scales.rise, self.scales.length, self.scales.dt,
+            self.family.levels,
+        )  # fmt: skip
 
     @cached_property
     def steps(self) -> FloatArray:
         """Steps of differences."""
-        order, values = self.family.structure.order, VALUES[self.family.kind]
-        low = self.bounds[0]
-        steps = np.full(low.size, _OF_START)
+        steps = np.full(self.bounds[0].size, _OF_START)
         steps[0] = _OF_DT * self.scales.dt
-        steps[1 : 1 + order + values] = _OF_LOG
+        steps[1 : self.family.values.stop] = _OF_LOG
         return steps
 
     def columns(self, x: FloatArray) -> list[FloatArray]:
@@ -190,9 +218,9 @@ class Task:
         """
         found = x.copy()
         found[index] = value
-        first = 1 + self.family.structure.order
-        if VALUES[self.family.kind] == 2 and index in (first, first + 1):
-            other = 2 * first + 1 - index
+        first, jump = self.family.values.start, self.family.jump
+        if jump == first + 1 and index in (first, jump):
+            other = first + jump - index
             least = float(np.exp(self.bounds[0][other]))
             along = np.exp(x[other]) + np.exp(value) - np.exp(x[index])
             found[other] = np.log(max(along, least))
@@ -222,41 +250,41 @@ class Task:
         turns: int = _MOST_TURNS,
         tolerance: float = 1e-5,
     ) -> Member:
-        """Follow a start to its minimum; entries of x that are `fixed` stay."""
+        """Follow a start down `turns` steps at most; entries of x that are `fixed` stay."""
         low, high = self.bounds
-        x = np.clip(x, low, high)
         free = np.ones(x.size, dtype=np.bool_)
         free[list(fixed)] = False
-        residual = self.residual(x)[0]
-        cost, damping, failures = float(residual @ residual), 1e-2, 0
-        jacobian = self.slopes(x, residual, free)
-        for _ in range(turns):
-            downhill = jacobian.T @ residual
-            held = (x[free] <= low[free]) & (downhill > 0) | (x[free] >= high[free]) & (
-                downhill < 0
-            )
-            normal = jacobian.T @ jacobian
-            normal[held], normal[:, held] = 0.0, 0.0
-            scale = np.maximum(np.diag(normal), 1e-12 * max(np.diag(normal).max(), 1e-300))
-            scale[held] = 1.0
-            step = np.linalg.solve(
-                normal + np.diag(damping * scale + held), np.where(held, 0.0, -downhill)
-            )
-            longest = np.where(np.flatnonzero(free) == 0, self.scales.rise, _LONGEST)
-            step /= max(float(np.abs(step / longest).max()), 1.0)
-            trial = x.copy()
-            trial[free] = np.clip(x[free] + step, low[free], high[free])
-            left = self.residual(trial)[0]
-            new = float(left @ left)
-            if new < cost:
-                done = cost - new < tolerance * cost and damping <= _FREELY
-                x, residual, cost = trial, left, new
-                damping, failures = max(0.2 * damping, 1e-9), 0
-                if done:
-                    break
-                jacobian = self.slopes(x, residual, free)
-            else:
-                damping, failures = 8 * damping, failures + 1
-                if failures > _MOST_FAILURES:
-                    break
-        return Member(self.family, x, cost)
+        if self.family.form.stepwise:
+            free[self.family.values] = False
+        low, high = low[free], high[free]
+        longest = np.where(np.flatnonzero(free) == 0, self.scales.rise, _LONGEST)
+        tried = 0
+
+        def at(place: FloatArray, damping: float) -> _Point:
+            residual = self.residual(place)[0]
+            return _Point(place, residual, float(residual @ residual), damping)
+
+        def linearised(here: _Point) -> Callable[[float], _Point]:
+            jacobian, inside = self.slopes(here.x, here.residual, free), here.x[free]
+            downhill = jacobian.T @ here.residual
+            jacobian[:, (inside <= low) & (downhill > 0) | (inside >= high) & (downhill < 0)] = 0.0
+            gram, slope = jacobian.T @ jacobian, jacobian.T @ here.residual
+
+            def ahead(damping: float) -> _Point:
+                nonlocal tried
+                tried += 1
+                step = damped_step(gram, -slope, damping)
+                step /= max(float(np.abs(step / longest).max()), 1.0)
+                place = here.x.copy()
+                place[free] = np.clip(inside + step, low, high)
+                return at(place, damping)
+
+            return ahead
+
+        def finished(gain: float, here: _Point) -> bool:
+            little = gain < tolerance * (here.cost + gain) and here.damping <= _FREELY
+            return little or tried >= turns
+
+        start = at(np.clip(x, *self.bounds), _DAMPING.first)
+        best, _ = descend(start, linearised, finished, _DAMPING, turns)
+        return Member(self.family, best.x, best.cost)

@@ -17,7 +17,7 @@ import numpy as np
 
 from ..arrays import FloatArray
 from ..constants import CHI2_95
-from .family import VALUES, Member, Task
+from .family import Member, Task
 
 _EDGE = float(np.sqrt(CHI2_95))
 _MOST_WIDENED, _MOST_NARROWED = 8, 7  # steps of an end
@@ -56,29 +56,28 @@ def profiled(task: Task, member: Member, variance: float) -> tuple[Member, tuple
     ends : tuple of Ends
         Of the dead time in s, and of every value of the actuator.
     """
-    order = task.family.structure.order
-    wanted = [0, *range(1 + order, 1 + order + VALUES[task.family.kind])]
+    family = task.family
+    wanted = [0, *range(family.values.start, family.values.stop)]
     for _ in range(_MOST_ROUNDS):
         widths = _errors(task, member, variance)
         ends, best = [], member
         for index in wanted:
             found, lowest = _interval(task, member, index, widths[index], variance)
             best = min(best, lowest, key=lambda one: one.cost)
-            ends.append(found if index == 0 else Ends(*np.exp(found).tolist()))
+            ends.append(found if index == 0 else Ends(*family.natural(np.array(found)).tolist()))
         if member.cost - best.cost <= _LOWER * variance:
             break
         member = task.improved(best.x)
-    if VALUES[task.family.kind] == 2:
-        member = _in_the_middle(task, member, ends[-1], variance)
+    if family.jump is not None:
+        member = _in_the_middle(task, member, family.jump, ends[-1], variance)
     return member, tuple(ends)
 
 
-def _in_the_middle(task: Task, member: Member, ends: Ends, variance: float) -> Member:
+def _in_the_middle(task: Task, member: Member, index: int, ends: Ends, variance: float) -> Member:
     """Put a slip jump in the middle of its interval, if the misfit is level there.
 
     Between two steps of the command, of which one moves the stem, all are as good.
     """
-    index = 2 + task.family.structure.order
     x = task.moved(member.x, index, float(np.log((ends.low + ends.high) / 2)))
     middle = task.improved(x, fixed=[index], turns=_TURNS)
     return middle if middle.cost <= member.cost + _LEVEL * variance else member
@@ -93,11 +92,14 @@ def dead_time_ends(task: Task, member: Member, variance: float) -> Ends:
 def _errors(task: Task, member: Member, variance: float) -> FloatArray:
     """Standard errors of x from the curvature; infinite where there is none."""
     free = np.ones(member.x.size, dtype=np.bool_)
+    if task.family.form.stepwise:
+        free[task.family.values] = False
     jacobian = task.slopes(member.x, task.residual(member.x)[0], free)
-    size = np.sqrt((jacobian**2).sum(axis=0))
+    size = np.zeros(free.size)
+    size[free] = np.sqrt((jacobian**2).sum(axis=0))
     told = size > 0
     errors = np.full(size.size, np.inf)
-    inverse = np.linalg.pinv((jacobian[:, told] / size[told]), rcond=1e-10)
+    inverse = np.linalg.pinv((jacobian[:, told[free]] / size[told]), rcond=1e-10)
     errors[told] = np.sqrt(variance * (inverse**2).sum(axis=1)) / size[told]
     return errors
 

@@ -16,37 +16,18 @@ References
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, Literal, NamedTuple, TypeAlias
+from typing import Any
 
 import numpy as np
 
-from ..actuators.friction import backlash, choudhury, kano
 from ..arrays import ComplexArray, FloatArray
 from ..separable.poles import poles_from_parameters
 from ..separable.responses import SampledInput
+from .kinds import Acting
 from .records import ActuatedRecord
-
-Kind: TypeAlias = Literal["none", "slew_rate", "dead_band", "kano", "choudhury"]
-Place: TypeAlias = Literal["input", "stem"]
 
 _AT_ONCE = 1e-9  # samples by which a move and a sample may be apart and be at one time
 _DECAYED = -60.0  # exponent of what has decayed: 1e-26
-
-
-class Acting(NamedTuple):
-    """An actuator: its kind, its place, and its parameters.
-
-    `values` are the slew rate per second; the dead band; or S and J.
-    """
-
-    kind: Kind
-    place: Place
-    values: tuple[float, ...] = ()
-
-    @property
-    def sticks(self) -> bool:
-        """Whether the place within play or friction at the beginning matters."""
-        return self.kind not in ("none", "slew_rate")
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,59 +66,57 @@ def forced_response(
         demand, slope = _summed(events, record.time, dead_time, poles)
     else:
         demand, slope = _filtered(record, record.command, dead_time, poles)
+    if acting.form.static:
+        demand = demand + record.command[0]  # where the stem is, not how far it went
     return _moved(acting, demand, record.time, start), slope
 
 
 def _moved(acting: Acting, demand: FloatArray, time: FloatArray, start: float) -> FloatArray:
     """Position for a demand (M,) at times that need not be equally spaced."""
-    if acting.kind == "slew_rate":
-        return _slewed(demand, time, acting.values[0])
-    return _stuck(acting, demand, start)
+    position = acting.form.position
+    if position is None:
+        return _slewed(demand, time, *_rates(acting))
+    return position(acting, demand, start)
 
 
-def _stuck(acting: Acting, command: FloatArray, start: float) -> FloatArray:
-    if acting.kind == "none":
-        return command
-    if acting.kind == "dead_band":
-        return backlash(command, acting.values[0], start)
-    stick, jump = acting.values
-    if acting.kind == "kano":
-        return kano(command, stick, jump, start)
-    return choudhury(command, stick, jump, start)
+def _rates(acting: Acting) -> tuple[float, float]:
+    """Highest rates upwards and downwards."""
+    return acting.values[0], acting.values[-1]
 
 
-def _slewed(demand: FloatArray, time: FloatArray, rate: float) -> FloatArray:
+def _slewed(demand: FloatArray, time: FloatArray, up: float, down: float) -> FloatArray:
     """Follow a demand at no more than a rate. Exact while one of them alone decides."""
-    reach = (rate * np.diff(time, prepend=time[0])).tolist()
+    since = np.diff(time, prepend=time[0]).tolist()
     current, out = float(demand[0]), []
-    for wanted, most in zip(demand.tolist(), reach, strict=True):
-        away = wanted - current
-        current = current + most if away > most else current - most if away < -most else wanted
+    for wanted, dt in zip(demand.tolist(), since, strict=True):
+        away, rise, fall = wanted - current, up * dt, down * dt
+        current = current + rise if away > rise else current - fall if away < -fall else wanted
         out.append(current)
     return np.array(out)
 
 
 def _positions(record: ActuatedRecord, acting: Acting, start: float) -> _Events:
     """Position for a command that is a list of moves."""
+    form = acting.form
+    if form.position is None:
+        return _ramps(record, *_rates(acting))
     held, index = record.held
     times = record.dt * index.astype(np.float64)
-    if acting.kind == "slew_rate":
-        return _ramps(record, acting.values[0])
-    position = _stuck(acting, held, start)
+    position = form.position(acting, held, start)
     jumps = np.diff(position, prepend=position[0])
     moving = jumps != 0
     return _Events(times[moving], jumps[moving], np.zeros(int(moving.sum())))
 
 
-def _ramps(record: ActuatedRecord, rate: float) -> _Events:
+def _ramps(record: ActuatedRecord, up: float, down: float) -> _Events:
     """Ramps from level to level; a new one may begin before the last has ended."""
     times = (record.dt * record.moves.astype(np.float64)).tolist()
     levels = record.command[record.moves].tolist()
     current, found = float(record.command[0]), []
     for i, (at, level) in enumerate(zip(times, levels, strict=True)):
         following = times[i + 1] if i + 1 < len(times) else np.inf
-        slope = float(np.copysign(rate, level - current))
-        end = min(at + abs(level - current) / rate, following)
+        slope = up if level >= current else -down
+        end = min(at + (level - current) / slope, following)
         found += [(at, slope), (end, -slope)]
         current = level if end < following else current + slope * (end - at)
     moments, slopes = np.array(found, dtype=np.float64).reshape(-1, 2).T
@@ -146,12 +125,14 @@ def _ramps(record: ActuatedRecord, rate: float) -> _Events:
 
 def _sampled(record: ActuatedRecord, acting: Acting, start: float) -> FloatArray:
     """Position for any command: its mean over every sample, over which it is held."""
-    if acting.kind != "slew_rate":
-        return _stuck(acting, record.command, start)
-    most = acting.values[0] * record.dt
+    position = acting.form.position
+    if position is not None:
+        return position(acting, record.command, start)
+    up, down = (rate * record.dt for rate in _rates(acting))
     current, out = float(record.command[0]), []
     for wanted in record.command.tolist():
         away = wanted - current
+        most = up if away > 0 else down
         if abs(away) > most:
             move = most if away > 0 else -most
             out.append(current + move / 2)

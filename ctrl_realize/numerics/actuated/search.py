@@ -20,7 +20,7 @@ from ..arrays import FloatArray
 from ..separable.poles import parameters_from_poles, poles_from_parameters
 from ..separable.structures import Candidate, Scales, neighbour_starts, pattern_starts
 from ..separable.varpro import Structure
-from .family import STICKING, VALUES, Family, Member, Records, Task
+from .family import Family, Member, Records, Task
 
 _MOST_STARTS = 16
 _FOLLOWED = 2  # starts that are followed to the bottom: time
@@ -29,8 +29,6 @@ _ACTUATORS = 3  # of a grid, that are tried with each linear part
 _QUICK = 0.2
 _SHORTEST, _LONG, _RISES = 3.0, 20.0, 5  # samples, parts of a record: lags behind what sticks
 _QUICKLY = 3  # iterations beside a point that was followed to the bottom
-_RATES = np.geomspace(0.1, 10.0, 9)  # ranges of the command in the visible rise
-_WIDTHS = np.geomspace(3e-3, 0.6, 10)  # parts of the range of the command
 _FINER = np.geomspace(0.02, 0.8, 26)
 _FOLLOWED_FINER = 4
 _AROUND = np.linspace(-0.24, 0.24, 17)  # of a logarithm, of S and of J
@@ -60,18 +58,20 @@ def searched(
     costs = [task.cost(x) for x in best]
     best = [best[i] for i in np.argsort(costs)[:_MOST_STARTS]]
     rough = sorted((task.improved(x, turns=_ROUGH) for x in best), key=_cost)
-    if VALUES[family.kind] == 2:
+    slips = family.form.jump == 1  # behind the stick band
+    if slips:
         finer = [x for one in rough[:_FOLLOWED] for x in _finer(task, one)]
         rough = sorted([*rough, *(task.improved(x, turns=_ROUGH) for x in finer)], key=_cost)
     found = min((task.improved(one.x) for one in rough[:_FOLLOWED]), key=_cost)
-    return _jumped(task, _other_slips(task, found)) if VALUES[family.kind] == 2 else found
+    found = _other_slips(task, found) if slips else found
+    return found if family.jump is None else _jumped(task, found, family.jump)
 
 
 def _best_actuators(task: Task, linear: FloatArray) -> list[FloatArray]:
     """Starts with these dead time and poles, and the best actuators of a grid."""
     starts = [np.clip(np.concatenate([linear, more]), *task.bounds) for more in _actuators(task)]
     costs = [task.cost(x) for x in starts]
-    few = _ACTUATORS if task.family.kind in STICKING else 1
+    few = 1 if task.family.form.own_lags else _ACTUATORS
     return [starts[i] for i in np.argsort(costs)[:few]]
 
 
@@ -123,7 +123,7 @@ def with_other_lags(
                 starts = [np.concatenate([found.x[:1], parameters_from_poles(slowest)])]
             else:
                 starts = pattern_starts(structure, scales)
-        rest = found.x[1 + found.family.structure.order :]
+        rest = found.x[found.family.values.start :]
         tried = [task.improved(np.concatenate([start, rest])) for start in starts[:_FOLLOWED]]
         members[structure] = min(tried, key=_cost)
     return list(members.values())
@@ -138,9 +138,11 @@ def _linear_starts(family: Family, scales: Scales, beside: Sequence[Member]) -> 
         return every
     # The lags of the response are longer than those of the plant.
     quick = pattern_starts(plain, replace(scales, rise=_QUICK * scales.rise))
-    if family.kind == "slew_rate":
+    if family.form.limits_rate:
         return every + quick
     same = [one.x[: 1 + order] for one in beside if one.family.structure == family.structure]
+    if family.form.static:
+        return same + every
     # What sticks makes linear models find lags and dead times of any length.
     rises = np.geomspace(_SHORTEST * scales.dt, scales.length / _LONG, _RISES)
     return same + [
@@ -150,27 +152,14 @@ def _linear_starts(family: Family, scales: Scales, beside: Sequence[Member]) -> 
 
 
 def _actuators(task: Task) -> list[FloatArray]:
-    """Logarithms of values, and starts, that are tried."""
-    kind, reach = task.family.kind, task.records.range
-    if kind == "none":
-        return [np.empty(0)]
-    if kind == "slew_rate":
-        return [np.log([ratio * reach / task.scales.rise]) for ratio in _RATES]
-    count = len(task.records.parts)
-    at = [np.full(count, place) for place in _PLACES]
-    if kind == "dead_band":
-        return [np.concatenate([np.log([w * reach]), place]) for w in _WIDTHS for place in at]
-    return [
-        np.concatenate([np.log([stick * reach, jump * reach]), place])
-        for i, stick in enumerate(_WIDTHS)
-        for jump in _WIDTHS[: i + 1]
-        for place in at
-    ]
+    """Entries of values, and starts, that are tried."""
+    form, count = task.family.form, len(task.records.parts)
+    at = [np.full(count, place) for place in _PLACES] if form.starts else [np.empty(0)]
+    return [np.concatenate([entries, place]) for entries in form.grid(task.size) for place in at]
 
 
-def _jumped(task: Task, found: Member) -> Member:
-    """Search the slip jump, everything else following it."""
-    at = 2 + task.family.structure.order  # logarithm of J in x
+def _jumped(task: Task, found: Member, at: int) -> Member:
+    """Search the slip jump, whose logarithm x has there, everything else following it."""
     best = [found]
 
     def cost(jump: float) -> float:

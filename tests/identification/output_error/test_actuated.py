@@ -7,7 +7,14 @@ import numpy as np
 import pytest
 
 import ctrl_realize as cr
-from ctrl_realize.actuators import Backlash, KanoStiction, SlewRateLimit
+from ctrl_realize.actuators import (
+    Backlash,
+    Characteristic,
+    KanoStiction,
+    Resolution,
+    Saturation,
+    SlewRateLimit,
+)
 
 DT, DEAD_TIME = 0.1, 0.73
 PLANT = cr.delayed_ss(2 * ct.tf([1], [0.5, 1.5, 1]), dead_time=DEAD_TIME, dt=DT)
@@ -92,19 +99,86 @@ def test_a_slip_of_another_step_is_no_outlier_and_spikes_are():
 
 def test_a_linear_valve_gets_no_actuator_and_its_interval_covers_those_not_ruled_out():
     record = through(SlewRateLimit(1e6), staircase(4, 4, -4, -4, hold=90), 2)
-    linear = cr.fit_output_error(record).fit
-    fit = cr.fit_output_error(record, actuator="auto").fit
+    linear = cr.fit_output_error(record, structures=[(2, 2)]).fit
+    fit = cr.fit_output_error(record, actuator="auto", structures=[(2, 2)]).fit
     assert fit.actuator is None
     assert fit.dead_time == linear.dead_time
     assert fit.interval[0] <= linear.interval[0] <= linear.interval[1] <= fit.interval[1]
     assert any("slew-rate limit" in choice for choice in fit.choices)
 
 
-def test_one_step_is_told_not_to_tell_a_dead_band():
-    record = through(Backlash(2.0), staircase(10, hold=90), 2)
-    fit = cr.fit_output_error(record, actuator="dead_band", structures=[(2, 2)]).fit
-    assert fit.actuator is None
-    assert any("staircase" in choice for choice in fit.choices)
+LEVELS = staircase(10, 10, 10, 10, -20, -10, -20, -20, 10, hold=80)  # 20 to 90
+SMALL = staircase(*[0.5] * 10, *[-0.5] * 14, *[0.5] * 8, hold=40)
+FLOWS = {f"flow_at_{u}": (u**0.5 - 20**0.5) / (90**0.5 - 20**0.5) for u in range(30, 90, 10)}
+OTHERS = [
+    ("slew_rate", SlewRateLimit(12.0, 20.0), staircase(30, -30, 20, -30, hold=90),
+     {"slew_rate_opening": (12.0, 1.2), "slew_rate_closing": (20.0, 2.0)}),
+    ("slew_rate", SlewRateLimit(12.0), staircase(30, -30, 20, -30, hold=90),
+     {"slew_rate": (12.0, 1.2)}),
+    ("saturation", Saturation(27.0, 84.0), LEVELS,
+     {"travel_low": (27.0, 0.5), "travel_high": (84.0, 0.5)}),
+    ("saturation", Saturation(-100.0, 76.0), LEVELS, {"travel_high": (76.0, 0.5)}),
+    ("auto", Characteristic("equal-percentage", rangeability=30), LEVELS,
+     {"rangeability": (30.0, 1.5)}),
+    ("characteristic", Characteristic("quick-opening"), LEVELS,
+     {name: (flow, 0.03) for name, flow in FLOWS.items()}),
+    ("stiction", KanoStiction(1.7, 1.7), SMALL, {"resolution": (1.7, 0.6)}),
+    ("resolution", Resolution(1.3), SMALL, {"resolution": (1.3, 0.3)}),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("asked", "actuator", "command", "truth"), OTHERS)
+def test_what_a_valve_does_is_named_and_told_with_intervals(asked, actuator, command, truth):
+    record = through(actuator, command, 2)
+    fit = cr.fit_output_error(record, actuator=asked, structures=[(2, 2)]).fit
+    found = fit.actuator
+    assert {one.name for one in found.parameters} == truth.keys()
+    for name, (value, width) in truth.items():
+        one = found[name]
+        assert one.low <= value <= one.high
+        assert one.high - one.low < width
+        assert one.label in found.in_words()
+    assert fit.interval[0] <= DEAD_TIME <= fit.interval[1]
+    moved, true = (one.simulate(command, DT) for one in (found.model, actuator))
+    moved, true = ((one - one[0]) / np.ptp(one) for one in (moved, true))
+    assert np.std(moved - true) < 0.03
+
+
+def test_records_at_several_positions_tell_a_characteristic_together():
+    plug = Characteristic("equal-percentage", rangeability=30)
+    records = [
+        through(plug, np.repeat([low, low + 10.0, low], 80), seed)
+        for seed, low in enumerate([20.0, 45.0, 70.0])
+    ]
+    fit = cr.fit_output_error(records, actuator="characteristic", structures=[(2, 2)]).fit
+    found = fit.actuator["rangeability"]
+    assert found.low <= 30.0 <= found.high
+    assert found.high - found.low < 2
+    assert fit.interval[0] <= DEAD_TIME <= fit.interval[1]
+
+
+@pytest.mark.parametrize(
+    ("asked", "test"),
+    [
+        ("dead_band", "staircase up and down"),
+        ("saturation", "three levels"),
+        ("characteristic", "several positions"),
+        ("resolution", "small steps"),
+    ],
+)
+def test_one_step_is_told_not_to_tell_it(asked, test):
+    record = through(Backlash(2.0), staircase(10, hold=60), 2)
+    with pytest.raises(cr.errors.DataError, match=test):
+        cr.fit_output_error(record, actuator=asked, structures=[(2, 2)])
+
+
+def test_an_end_that_the_records_do_not_tell_is_flagged():
+    """A stem moves by every step that is higher than J, which then may be any below."""
+    record = through(KanoStiction(1.5, 0.4), staircase(5, 5, -5, -5, 5, 5, hold=80), 3)
+    fit = cr.fit_output_error(record, actuator="stiction", structures=[(2, 2)]).fit
+    assert fit.actuator["J"].low < 0.1
+    flagged = {flag.code: str(flag) for flag in fit.flags}
+    assert "small steps" in flagged["actuator_not_resolved"]
 
 
 def test_an_actuator_is_not_fitted_beside_known_dynamics():

@@ -4,17 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Literal
 
 import numpy as np
 
 from ...._parameters import Parameter
-from ....actuators import Actuator, Backlash, KanoStiction, SlewRateLimit, Stiction
 from ....data import Record
-from ....errors import NoStepError
+from ....errors import DataError, NoStepError
 from ....numerics.actuated.choice import ActuatedFit, Rival, fit_actuated
 from ....numerics.actuated.errors import Errors, propagated
-from ....numerics.actuated.motions import Kind, Place
 from ....numerics.actuated.records import MOST_MOVES, ActuatedRecord, actuated_record
 from ....numerics.arrays import FloatArray, IntArray
 from ....numerics.output_error.any_input.fit import WHITE
@@ -29,17 +26,18 @@ from ....numerics.signals.noise import mad_sigma
 from ...step.steps import found_step
 from ..flags import model_flags
 from ..result import OutputErrorFit
+from .alternatives import ALTERNATIVES, SHOWN, Found
 from .result import ActuatorFit
-from .words import missing_test, not_needed, of_the_record, structured, unresolved
+from .words import (
+    cannot_tell,
+    missing_test,
+    not_needed,
+    not_told,
+    of_the_record,
+    structured,
+    unresolved,
+)
 
-Asked = Literal["auto", "slew_rate", "dead_band", "stiction"]
-ASKED: tuple[str, ...] = ("auto", "slew_rate", "dead_band", "stiction")
-
-_KINDS: dict[str, tuple[tuple[Kind, Place], ...]] = {
-    "slew_rate": (("slew_rate", "input"), ("slew_rate", "stem")),
-    "dead_band": (("dead_band", "input"), ("dead_band", "stem")),
-    "stiction": (("kano", "input"), ("choudhury", "input")),
-}
 _MOST_EDGES = 24  # of a command with noise, whose levels are then found
 
 
@@ -52,10 +50,14 @@ def with_actuator(
     both. `structures` are those that were asked for.
     """
     parts = _parts(result)
-    names = tuple(_KINDS) if asked == "auto" else (asked,)
-    told = [name for name in names if name == "slew_rate" or _reverses(parts)]
+    names = tuple(ALTERNATIVES) if asked == "auto" else (asked,)
+    tried = {name: ALTERNATIVES[name].wanted(parts) for name in names}
+    told = [name for name in names if tried[name]]
+    if asked != "auto" and not told:
+        raise DataError(cannot_tell(asked))
     skipped = tuple(missing_test(name) for name in names if name not in told)
-    wanted = [one for name in told for one in _KINDS[name]]
+    # A kind may belong to two of those that were asked for.
+    wanted = list(dict.fromkeys(one for name in told for one in tried[name]))
     scales = _scales(result)
     found = fit_actuated(
         parts, scales, wanted, rivals=_rivals(result, parts), structures=structures
@@ -129,13 +131,6 @@ def _edges(record: Record) -> list[tuple[int, int]]:
     return [(edge.index, edge.samples) for edge in edges] if len(edges) <= _MOST_EDGES else []
 
 
-def _reverses(parts: Sequence[ActuatedRecord]) -> bool:
-    """Whether commands move on in one direction and turn: less tells no dead band from the gain."""
-    moves = [np.diff(part.command[np.concatenate([[0], part.moves])]) for part in parts]
-    turned = any(np.any(own[1:] * own[:-1] < 0) for own in moves)
-    return turned and sum(own.size for own in moves) > 2
-
-
 def _scales(result: OutputErrorFit) -> Scales:
     dt = result.dt
     onset = result.onset if np.isfinite(result.onset) else result.dead_time
@@ -189,20 +184,22 @@ def _replaced(
         data = bare_data(measured, command, result.dt, found.sigma, span)
         time = result.dt * np.arange(measured.size, dtype=np.float64)
     estimate = _estimate(result, found, errors, (measured, fitted))
-    actuator = _actuator_fit(result, found, errors, parts)
+    actuator = _actuator_fit(result, found, errors)
     replaced = replace(
         result,
         estimate=estimate,
         data=data,
         time=time,
         repeatability=None,
-        choices=(*skipped, *actuator.unresolved),
+        choices=skipped,
         flags=(),
         actuator=actuator,
     )
     flags = [flag for flag in result.flags if of_the_record(flag.code)]
     told = model_flags(estimate, result.dt, scales.length, None)
     flags += [flag for flag in told if flag is not None]
+    if actuator.unresolved:
+        flags.append(not_told(actuator.unresolved))
     if not estimate.adequate:
         flags.append(structured(replaced.normalized_rms))
     return replace(replaced, flags=tuple(flags))
@@ -268,42 +265,26 @@ def _estimate(
     )
 
 
-def _actuator_fit(
-    result: OutputErrorFit, found: ActuatedFit, errors: Errors, parts: Sequence[ActuatedRecord]
-) -> ActuatorFit:
-    member = found.member
-    unit = result.input_unit
-    names: dict[Kind, tuple[str, ...]] = {
-        "slew_rate": ("slew_rate",),
-        "dead_band": ("dead_band",),
-    }
+def _actuator_fit(result: OutputErrorFit, found: ActuatedFit, errors: Errors) -> ActuatorFit:
+    member, family = found.member, found.member.family
+    start = float(member.starts[0]) if member.starts.size else 0.0
+    shown = SHOWN[family.kind]
+    told = Found(member.values, start, family.levels, result.input_unit)
+    timed = shown.unit == "u/s"
+    unit = shown.unit and told.unit and told.unit + shown.unit[1:]
     parameters = []
-    for name, value, std, (low, high) in zip(
-        names.get(member.family.kind, ("S", "J")),
-        member.values,
-        errors.value_std,
-        found.value_ends,
-        strict=True,
+    for name, value, std, ends in zip(
+        shown.names(told), member.values, errors.value_std, found.value_ends, strict=True
     ):
-        timed = name == "slew_rate"
-        shown = f"{unit}/s" if unit and timed else unit
-        parameters.append(Parameter(name, value, std, low, high, False, shown, -1 if timed else 0))
+        number, low, high = (shown.number(told, one) for one in (value, *ends))
+        # Their scale may differ, by which the error does as well.
+        away = shown.number(told, value + std) - number
+        parameters.append(Parameter(name, number, away, low, high, False, unit, -1 if timed else 0))
     return ActuatorFit(
-        model=_model(member.family.kind, member.values, member.starts),
-        actuator_at=member.family.place,
+        model=shown.model(told),
+        actuator_at=family.place,
         parameters=tuple(parameters),
         starts=tuple(member.starts.tolist()),
         evidence=found.evidence,
-        unresolved=unresolved(parameters),
+        unresolved=unresolved(parameters, family, found.value_ends),
     )
-
-
-def _model(kind: Kind, values: tuple[float, ...], starts: FloatArray) -> Actuator:
-    """The actuator, at the place of the first record."""
-    start = float(starts[0]) if starts.size else 0.0
-    if kind == "slew_rate":
-        return SlewRateLimit(values[0])
-    if kind == "dead_band":
-        return Backlash(values[0], start)
-    model = KanoStiction if kind == "kano" else Stiction
-    return model(values[0], values[1], start)

@@ -6,7 +6,10 @@ from collections.abc import Sequence
 
 from ...._parameters import Parameter
 from ...._wording import plainly
+from ....numerics.actuated.family import Family
+from ....numerics.actuated.intervals import Ends
 from ....results import Flag
+from .alternatives import ALTERNATIVES, SHOWN
 
 _OF_THE_RECORD = frozenset(
     {
@@ -28,8 +31,6 @@ _OF_THE_RECORD = frozenset(
 """Flags about a record, whatever the model is."""
 _WELL = 0.25  # relative half width of an interval up to which a parameter is told
 
-_WORDS = {"slew_rate": "a slew-rate limit", "dead_band": "a dead band", "stiction": "stiction"}
-
 
 def of_the_record(code: str) -> bool:
     """Whether a flag of a linear fit remains, if a model with an actuator takes its place."""
@@ -38,35 +39,48 @@ def of_the_record(code: str) -> bool:
 
 def missing_test(name: str) -> str:
     """Say which test would tell what the command cannot."""
+    one = ALTERNATIVES[name]
+    return f"{one.words} was not tried: it takes {one.expected}, and {one.test} tells it"
+
+
+def cannot_tell(name: str) -> str:
+    """Say why an actuator that was asked for is not fitted."""
+    one = ALTERNATIVES[name]
     return (
-        f"{_WORDS[name]} was not tried: the command does not turn, so that it cannot be told from "
-        "gain and dead time; a staircase up and down tells it"
+        f"actuator={name!r}: expected {one.expected}, got records that cannot tell {one.words} "
+        f"from gain and dead time; try {one.test} or actuator='auto'"
     )
 
 
 def not_needed(names: Sequence[str], evidence: float) -> str:
     """Say that a linear model is enough."""
-    tried = " or ".join(_WORDS[name] for name in names)
+    tried = " or ".join(ALTERNATIVES[name].words for name in names)
     return (
         f"linear: the evidence for {tried} is not very strong (information criterion "
         f"{plainly(abs(evidence), 3)} {'lower' if evidence > 0 else 'higher'} with it)"
     )
 
 
-def unresolved(parameters: Sequence[Parameter]) -> tuple[str, ...]:
+def unresolved(
+    parameters: Sequence[Parameter], family: Family, ends: Sequence[Ends]
+) -> tuple[str, ...]:
     """List the parameters that the records tell badly, with the test that would do better."""
-    tests = {
-        "slew_rate": "a larger step",
-        "dead_band": "more reversals, each after two moves in one direction",
-        "S": "reversals in small steps or by a slow ramp",
-        "J": "small steps or a slow ramp, in which the stem is seen to jump",
-    }
-    return tuple(
-        f"{one.label} lies between {one.low:.3g} and {one.high:.3g}, and the records do not tell "
-        f"it closer; {tests[one.name]} would"
-        for one in parameters
-        if not one.high - one.low <= 2 * _WELL * one.value
-    )
+    better = SHOWN[family.kind].better
+    found = []
+    for one, (low, high) in zip(parameters, ends, strict=True):
+        # Parts of the range are measured by it, anything else by itself.
+        size = (low + high) / 2 if family.form.logged else 1 / 2
+        if not high - low <= 2 * _WELL * size:
+            found.append(
+                f"{one.label} lies between {one.low:.3g} and {one.high:.3g}, and the records do "
+                f"not tell it closer; {better} would"
+            )
+    return tuple(found)
+
+
+def not_told(sentences: Sequence[str]) -> Flag:
+    """Report parameters of an actuator that the records tell badly."""
+    return Flag("actuator_not_resolved", "; ".join(sentences))
 
 
 def structured(misfit: float) -> Flag:
