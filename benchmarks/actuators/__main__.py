@@ -58,9 +58,10 @@ def tried(case, seed: int) -> Row:  # type: ignore[no-untyped-def]
             found = fit.actuator[name]
         except (KeyError, TypeError):
             continue
-        row[name] = found.value / truth - 1
+        size = trial.sizes.get(name, truth)
+        row[name] = (found.value - truth) / size
         row[f"{name} held"] = bool(found.low <= truth <= found.high)
-        row[f"{name} width"] = (found.high - found.low) / truth
+        row[f"{name} width"] = (found.high - found.low) / size
     return row
 
 

@@ -8,12 +8,13 @@ from dataclasses import dataclass, field
 import numpy as np
 
 import ctrl_realize as cr
+from ctrl_realize.actuators import Characteristic
 from ctrl_realize.numerics.actuators.friction import backlash, kano
-from ctrl_realize.numerics.actuators.limits import slew_limited
+from ctrl_realize.numerics.actuators.limits import resolved, saturated, slew_limited
 
 from ..honesty.worlds import DT as HONESTY_DT
 from ..honesty.worlds import NOISES, step_case
-from ..worlds.simulation import Case, H, drawn, held, noisy, record, sampled, step
+from ..worlds.simulation import DT, Case, H, Plant, drawn, held, noisy, record, sampled, step
 from ..worlds.steps import fills_faster_than_it_empties, play, slewing, sticking
 
 Rng = np.random.Generator
@@ -23,13 +24,17 @@ LAGS = ((1, 1), (2, 2), (3, 3))
 
 @dataclass(frozen=True, eq=False)
 class Trial:
-    """Records, the actuator to ask for, and what is true; NaN or nothing where it is not judged."""
+    """Records, the actuator to ask for, and what is true; NaN or nothing where it is not judged.
+
+    Errors of `values` are parts of themselves, or of `sizes` where there is one.
+    """
 
     records: cr.Record | tuple[cr.Record, ...]
     actuator: str
     dead_time: float
     values: dict[str, float] = field(default_factory=dict)
     structures: tuple[tuple[int, int], ...] | None = None
+    sizes: dict[str, float] = field(default_factory=dict)
 
 
 def staircase(moves: list[float], hold: int) -> np.ndarray:
@@ -56,16 +61,113 @@ def dead_band(rng: Rng) -> Trial:
 def stiction(rng: Rng) -> Trial:
     """Three steps of 1.5, a staircase of 60 steps of 0.08; J of 0.4 to 0.7, S 0.2 to 0.5 more."""
     plant = drawn(rng, ((0.03, 0.06), (0.06, 0.1)))
+    jump = float(rng.uniform(0.4, 0.7))
+    stick = jump + float(rng.uniform(0.2, 0.5))
+    made = small_steps(rng, lambda u: kano(u, stick, jump, 1.0), plant)
+    return Trial(made, "stiction", plant.dead_time, {"S": stick, "J": jump}, LAGS)
+
+
+def small_steps(rng: Rng, moved: Callable[[np.ndarray], np.ndarray], plant: Plant) -> cr.Record:
     # In small steps alone, a dead time is that of a slip at the next step: large ones tell it.
     large = staircase([1.5, -1.5, 1.5], 100)
     u = np.concatenate([large, 1.5 + staircase([0.08] * 12 + [-0.08] * 24 + [0.08] * 24, 20)])
-    jump = float(rng.uniform(0.4, 0.7))
-    stick = jump + float(rng.uniform(0.2, 0.5))
     # Held on the fine grid, a command pauses within every sample, as it does between steps.
-    y = sampled(plant.respond(kano(held(u), stick, jump, 1.0)))
+    y = sampled(plant.respond(moved(held(u))))
+    return record(u, noisy(rng, y))
+
+
+def up_and_down(rng: Rng, plant: Plant, up: float, down: float) -> cr.Record:
+    u = staircase([1.0, -1.0, 0.6, -0.6], 200)
+    y = sampled(plant.respond(slew_limited(held(u), up, down, H)))
+    return record(u, noisy(rng, y))
+
+
+def slew_rates(rng: Rng) -> Trial:
+    """Two steps up and down; opening takes 0.3 to 1 s, closing 1.5 to 3 times as long"""
+    plant = drawn(rng)
+    up = 1 / float(rng.uniform(0.3, 1.0))
+    down = up / float(rng.uniform(1.5, 3.0))
+    truth = {"slew_rate_opening": up, "slew_rate_closing": down}
+    return Trial(up_and_down(rng, plant, up, down), "slew_rate", plant.dead_time, truth, LAGS)
+
+
+def one_slew_rate(rng: Rng) -> Trial:
+    """Two steps up and down, one rate for both directions: 0.3 to 1 s"""
+    plant = drawn(rng)
+    rate = 1 / float(rng.uniform(0.3, 1.0))
     return Trial(
-        record(u, noisy(rng, y)), "stiction", plant.dead_time, {"S": stick, "J": jump}, LAGS
+        up_and_down(rng, plant, rate, rate), "slew_rate", plant.dead_time, {"slew_rate": rate}, LAGS
     )
+
+
+POSITIONS = staircase([10.0, 10.0, 10.0, 10.0, -20.0, -10.0, -20.0, -20.0, 10.0], 120)
+"""Nine moves through 20 to 90 % of the travel, from 50 %."""
+
+
+def positions(rng: Rng, moved: Callable[[np.ndarray], np.ndarray], plant: Plant) -> cr.Record:
+    u = 50.0 + POSITIONS
+    y = sampled(plant.respond(moved(held(u))))
+    return cr.Record(DT * np.arange(u.size), u, noisy(rng, y), units={"u": "%"})
+
+
+def end_of_travel(rng: Rng) -> Trial:
+    """Staircase of nine moves, 20 to 90 %; the travel ends 3 to 15 % before the highest command"""
+    plant, cut = drawn(rng), float(rng.uniform(3.0, 15.0))
+    made = positions(rng, lambda u: saturated(u, high=90.0 - cut), plant)
+    truth, sizes = {"travel_high": 90.0 - cut}, {"travel_high": cut}
+    return Trial(made, "saturation", plant.dead_time, truth, LAGS, sizes)
+
+
+def both_ends(rng: Rng) -> Trial:
+    """The same, with both ends within the commands by 3 to 15 %"""
+    plant, (below, above) = drawn(rng), rng.uniform(3.0, 15.0, 2).tolist()
+    made = positions(rng, lambda u: saturated(u, 20.0 + below, 90.0 - above), plant)
+    truth = {"travel_low": 20.0 + below, "travel_high": 90.0 - above}
+    sizes = {"travel_low": below, "travel_high": above}
+    return Trial(made, "saturation", plant.dead_time, truth, LAGS, sizes)
+
+
+def equal_percentage(rng: Rng) -> Trial:
+    """The same staircase through equal percentages of rangeability 5 to 50"""
+    plant, ratio = drawn(rng), float(np.exp(rng.uniform(np.log(5), np.log(50))))
+    plug = Characteristic("equal-percentage", rangeability=ratio)
+    made = positions(rng, plug.simulate, plant)
+    return Trial(made, "characteristic", plant.dead_time, {"rangeability": ratio}, LAGS)
+
+
+def quick_opening(rng: Rng) -> Trial:
+    """The same staircase through a travel to the power of 0.4 to 0.6: flows at its levels"""
+    plant, power = drawn(rng), float(rng.uniform(0.4, 0.6))
+    made = positions(rng, lambda u: u**power, plant)
+    low, high = 20.0**power, 90.0**power
+    truth = {f"flow_at_{u}": (u**power - low) / (high - low) for u in (30, 60, 80)}
+    return Trial(made, "characteristic", plant.dead_time, truth, LAGS)
+
+
+def resolution(rng: Rng) -> Trial:
+    """The record of stiction, with S = J of 0.4 to 0.7"""
+    plant, step = drawn(rng, ((0.03, 0.06), (0.06, 0.1))), float(rng.uniform(0.4, 0.7))
+    made = small_steps(rng, lambda u: kano(u, step, step, 1.0), plant)
+    return Trial(made, "stiction", plant.dead_time, {"resolution": step}, LAGS)
+
+
+def whole_steps(rng: Rng) -> Trial:
+    """The same, a stem that moves in whole steps of 0.2 to 0.5"""
+    plant, step = drawn(rng, ((0.03, 0.06), (0.06, 0.1))), float(rng.uniform(0.2, 0.5))
+    made = small_steps(rng, lambda u: resolved(u, step), plant)
+    return Trial(made, "resolution", plant.dead_time, {"resolution": step}, LAGS)
+
+
+def linear_positions(rng: Rng) -> Trial:
+    """Two lags, the staircase of the ends of the travel, and all that it can tell"""
+    plant = drawn(rng)
+    return Trial(positions(rng, lambda u: u, plant), "auto", plant.dead_time, {}, LAGS)
+
+
+def linear_small_steps(rng: Rng) -> Trial:
+    """Two lags, the staircase of the stiction, asked for stiction"""
+    plant = drawn(rng, ((0.03, 0.06), (0.06, 0.1)))
+    return Trial(small_steps(rng, lambda u: u, plant), "stiction", plant.dead_time, {}, LAGS)
 
 
 def linear_step(rng: Rng) -> Trial:
@@ -103,8 +205,21 @@ def of_honesty(name: str) -> Callable[[Rng], Trial]:
     return made
 
 
-ESTIMATED = (slew_rate, dead_band, stiction)
-LINEAR = (linear_step, linear_staircase)
+ESTIMATED = {
+    slew_rate: ("slew_rate",),
+    one_slew_rate: ("slew_rate",),
+    slew_rates: ("slew_rate_opening", "slew_rate_closing"),
+    dead_band: ("dead_band",),
+    stiction: ("S", "J"),
+    resolution: ("resolution",),
+    whole_steps: ("resolution",),
+    end_of_travel: ("travel_high",),
+    both_ends: ("travel_low", "travel_high"),
+    equal_percentage: ("rangeability",),
+    quick_opening: ("flow_at_30", "flow_at_60", "flow_at_80"),
+}
+"""Names of the parameters that are judged."""
+LINEAR = (linear_step, linear_staircase, linear_positions, linear_small_steps)
 WORLDS = (
     of_world(slewing, "auto"),
     of_honesty("slew limit"),
