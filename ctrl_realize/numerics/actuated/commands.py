@@ -1,4 +1,4 @@
-"""What the commands of records can tell about an actuator."""
+"""What the commands of records can tell about an actuator: conditions of our own."""
 
 from __future__ import annotations
 
