@@ -41,6 +41,9 @@ class ActuatorKind(str, Enum):  # noqa: UP042
     slew_rate = "slew_rate"
     dead_band = "dead_band"
     stiction = "stiction"
+    resolution = "resolution"
+    saturation = "saturation"
+    characteristic = "characteristic"
 
 
 class Missing(str, Enum):  # noqa: UP042
