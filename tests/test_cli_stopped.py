@@ -174,7 +174,11 @@ def test_a_record_whose_process_is_killed_is_a_row_with_the_reason_and_all_other
     assert [row.error is None for row in campaign.rows] == [True, False, True, True]
     assert "was killed by the system (SIGKILL(-9)" in campaign.rows[1].error
     alone = cr.identify_campaign([record(k) for k in (0, 2, 3)], **OPTIONS)
-    np.testing.assert_array_equal(campaign.delays, alone.delays)
+    # in other processes the bits are the same
+    for one, other in zip(campaign.good, alone.good, strict=True):
+        np.testing.assert_array_equal(one.system.A, other.system.A)
+        np.testing.assert_array_equal(one.system.C, other.system.C)
+        assert one.system.delay == other.system.delay
     assert "failed_records" in {flag.code for flag in campaign.flags}
 
 

@@ -37,13 +37,6 @@ def campaign(records) -> cr.Campaign:
     return cr.identify_campaign(records, method="paper")
 
 
-def test_serial_and_parallel_give_the_same_bits(campaign, records):
-    parallel = cr.identify_campaign(records, method="paper", n_jobs=2)
-    for one, other in zip(campaign.rows, parallel.rows, strict=True):
-        assert_array_equal(one.system.A, other.system.A)
-        assert_array_equal(one.system.C, other.system.C)
-
-
 def test_statistics_are_those_of_the_trimmed_delays(campaign):
     summary = campaign.statistics(trim=2)
     kept = np.sort(campaign.delays)[2:-2]
