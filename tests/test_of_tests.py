@@ -3,6 +3,7 @@
 import ast
 import importlib.util
 import sys
+from functools import cache
 from pathlib import Path
 
 import ctrl_realize as cr
@@ -20,9 +21,10 @@ FAULTS = {
 """Public names that are replaced: faults that cannot be had otherwise."""
 
 
+@cache
 def trees():
-    for path in sorted(TESTS.rglob("*.py")):
-        yield path.relative_to(TESTS), ast.parse(path.read_text(encoding="utf-8"))
+    paths = sorted(TESTS.rglob("*.py"))
+    return [(path.relative_to(TESTS), ast.parse(path.read_text("utf-8"))) for path in paths]
 
 
 def private(name):

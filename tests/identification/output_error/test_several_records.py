@@ -249,19 +249,6 @@ def test_records_of_one_plant_are_not_told_apart():
     assert not set().union(*alarms) & {"gains_differ", "lags_differ", "records_differ"}
 
 
-@pytest.mark.parametrize(
-    ("name", "values", "code"),
-    [
-        ("gain", (1.0, 1.05, 1.1), "gains_differ"),
-        ("lag", (1.0, 1.2, 1.4), "lags_differ"),
-        ("delay", (0.5, 0.55, 0.6), "records_differ"),
-    ],
-)
-def test_what_differs_is_named(name, values, code):
-    records = [step(1.0 + i, i, **{name: value}) for i, value in enumerate(values)]
-    assert code in told(records)
-
-
 def driven(seed, gain=1.0, lag=1.0, delay=0.5, noise=0.02):
     rng = np.random.default_rng(seed)
     u = np.repeat(rng.choice([-1.0, 1.0], 80), 5)
@@ -318,7 +305,7 @@ CAMPAIGNS = {
         {"records_differ"},
         {"gains_differ"},
     ),
-    "lags": ([step(2.0, k, lag=1.0 + 0.3 * k) for k in range(3)], {"lags_differ"}, set()),
+    "lags": ([step(2.0, k, lag=1.0 + 0.2 * k) for k in range(3)], {"lags_differ"}, set()),
 }
 
 
@@ -327,12 +314,15 @@ def test_a_campaign_tells_what_differs_from_record_to_record(name):
     records, due, not_due = CAMPAIGNS[name]
     campaign = cr.identify_campaign(records, structures=[(1, 1)])
     flags = {flag.code for flag in campaign.flags}
-    assert due <= flags
+    assert due <= flags & told(records)  # a fit of all says so, too
     assert not flags & not_due if due else not flags
     if name == "dead times":  # not taken for gains or lags
         small = [step(1.0 + k, k, delay=0.5 + 0.05 * k) for k in range(3)]
-        assert not told(small) & {"gains_differ", "lags_differ"}
+        found = told(small)
+        assert "records_differ" in found
+        assert not found & {"gains_differ", "lags_differ"}
     if name == "gains":
+        assert "gains_differ" in told([step(1.0 + k, k, 1.0 + 0.05 * k) for k in range(3)])
         assert due <= {f.code for f in cr.identify_campaign(records, method="scan").flags}
         assert campaign_verdict(campaign).level == "poor"
         np.testing.assert_allclose(campaign.table()["gain"], [1.0, 0.5, 0.25], rtol=0.05)
