@@ -47,6 +47,7 @@ _FINE_WIDTHS = np.geomspace(5e-3, 0.8, 36)
 _ENDS = (0.4, 0.6, 0.75, 0.9, 0.97)  # of the travel, as parts of the range of the commands
 _BENDS = (0.3, 1.0, 2.0, 3.5)  # logarithms of a ratio of slopes
 _STRAIGHT, _BENT = 1e-3, 7.0
+_OF_STICTION: tuple[Kind, ...] = ("dead_band", "resolution")  # without a slip jump, and J = S
 
 
 class Size(NamedTuple):
@@ -234,11 +235,11 @@ FORMS: dict[Kind, Form] = {
         1, _whole_steps, lambda size: _column(_FINE_WIDTHS * size.reach), _of_widths, jump=0
     ),
     "kano": Form(
-        2, _kano, _sticks_and_jumps, _of_widths, starts=True, jump=1, contains=("resolution",)
+        2, _kano, _sticks_and_jumps, _of_widths, starts=True, jump=1, contains=_OF_STICTION
     ),
     "choudhury": Form(
         2, _choudhury, _sticks_and_jumps, _of_widths, starts=True, jump=1,
-        contains=("resolution",),
+        contains=_OF_STICTION,
     ),
     "top": Form(1, _below, lambda _: np.array(_ENDS)[:, None], _of_parts, logged=False),
     "bottom": Form(1, _above, lambda _: 1 - np.array(_ENDS)[:, None], _of_parts, logged=False),

@@ -29,6 +29,7 @@ Told = Callable[[Sequence[ActuatedRecord]], bool]
 _EVERYWHERE: tuple[Place, ...] = ("input", "stem")
 _BEFORE: tuple[Place, ...] = ("input",)
 _PERCENT = (0.0, 100.0)
+_COVERED = 20.0  # of it at least: a curve over less tells nothing of the whole travel
 
 
 class Alternative(NamedTuple):
@@ -56,10 +57,13 @@ class Found(NamedTuple):
 
     @property
     def travel(self) -> tuple[float, float]:
-        """Closed and open position: of a command in % 0 and 100, else its range in the records."""
+        """Closed and open position.
+
+        0 and 100 of commands in % that cover a fifth of it, else their range in the records.
+        """
         low, high = self.levels[0], self.levels[-1]
-        inside = _PERCENT[0] <= low and high <= _PERCENT[1]
-        return _PERCENT if self.unit == "%" and inside else (low, high)
+        covered = _PERCENT[0] <= low <= high - _COVERED and high <= _PERCENT[1]
+        return _PERCENT if self.unit == "%" and covered else (low, high)
 
     def at(self, part: float) -> float:
         """Command at a part of the range of the commands."""

@@ -30,7 +30,7 @@ from .alternatives import ALTERNATIVES, SHOWN, Found
 from .result import ActuatorFit
 from .words import (
     cannot_tell,
-    missing_test,
+    missing_tests,
     not_needed,
     not_told,
     of_the_record,
@@ -48,6 +48,11 @@ def with_actuator(
 
     Where it is not, and an actuator is not ruled out either, the interval of the dead time covers
     both. `structures` are those that were asked for.
+
+    Raises
+    ------
+    DataError
+        The commands cannot tell the actuator that was asked for.
     """
     parts = _parts(result)
     names = tuple(ALTERNATIVES) if asked == "auto" else (asked,)
@@ -55,7 +60,8 @@ def with_actuator(
     told = [name for name in names if tried[name]]
     if asked != "auto" and not told:
         raise DataError(cannot_tell(asked))
-    skipped = tuple(missing_test(name) for name in names if name not in told)
+    untold = [name for name in names if name not in told]
+    skipped = (missing_tests(untold),) if untold else ()
     # A kind may belong to two of those that were asked for.
     wanted = list(dict.fromkeys(one for name in told for one in tried[name]))
     scales = _scales(result)

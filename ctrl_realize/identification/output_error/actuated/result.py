@@ -32,10 +32,14 @@ class ActuatorFit:
         with it.
     parameters : tuple of Parameter
         Estimates with standard errors and 95 % intervals (profile likelihood): ``"slew_rate"`` per
-        second, ``"dead_band"``, or ``"S"`` and ``"J"``.
+        second, or ``"slew_rate_opening"`` and ``"slew_rate_closing"``; ``"dead_band"``;
+        ``"resolution"``; ``"S"`` and ``"J"``; ``"travel_low"``, ``"travel_high"`` or both;
+        ``"rangeability"`` over 0 to 100 % (over the range of the commands if they have another
+        unit, or cover less than a fifth); or, from 0 at the lowest to 1 at the highest command,
+        ``"flow_at_40"``, ... at those between.
     starts : tuple of float
         Place within play or friction at the beginning of each record, from -1 (came from above) to
-        1 (from below); empty for a slew rate.
+        1 (from below); empty where it does not matter.
     evidence : float
         Information criterion of the best linear model minus that of this one.
     unresolved : tuple of str

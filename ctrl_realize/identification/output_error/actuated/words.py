@@ -37,10 +37,11 @@ def of_the_record(code: str) -> bool:
     return code in _OF_THE_RECORD
 
 
-def missing_test(name: str) -> str:
-    """Say which test would tell what the command cannot."""
-    one = ALTERNATIVES[name]
-    return f"{one.words} was not tried: it takes {one.expected}, and {one.test} tells it"
+def missing_tests(names: Sequence[str]) -> str:
+    """Say which tests would tell what the command cannot."""
+    every = [ALTERNATIVES[name] for name in names]
+    tests = "; ".join(f"{one.words} ({one.test.rstrip(',')})" for one in every)
+    return f"not tried, since the command cannot tell them, with the test that would: {tests}"
 
 
 def cannot_tell(name: str) -> str:
