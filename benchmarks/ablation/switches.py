@@ -226,6 +226,10 @@ SWITCHES = (
         (f"{FITS}.selection:fit_flows",),
     ),
     Switch(
+        "friction behind lags",
+        {f"{FITS}.interval:latest_slip": giving(None)},
+    ),
+    Switch(
         "open beginning behind a zero",
         {f"{FITS}.interval:_opened": lambda _: lambda low, high, *_rest: (low, high)},
     ),

@@ -121,7 +121,7 @@ def wrong_step(name: str, time: np.ndarray) -> np.ndarray:
     if name == "slew limit":
         return slew_limited(unit_step("R3", time), 4.0, 4.0, DT)
     if name == "static friction":
-        return _stick_and_slip(unit_step("R2", time))
+        return _stick_and_slip(time)
     bent = unit_step("R3", time)
     return (bent + 0.15 * bent**2) / 1.15
 
@@ -153,15 +153,22 @@ def _pull_loose() -> float:
     return float(time[np.argmax(unit_step("R2", time * DT) > STATIC)])
 
 
-def _stick_and_slip(demand: np.ndarray) -> np.ndarray:
-    """Follow a demand that has to pull a stem loose; behind it a sensor lag of 30 Hz."""
-    stem, moving = np.zeros_like(demand), False
-    for k in range(1, demand.size):
-        pull = demand[k] - stem[k - 1]
-        moving = abs(pull) > (SLIDING if moving else STATIC)
-        stem[k] = demand[k] - np.sign(pull) * SLIDING if moving else stem[k - 1]
-    pole = float(np.exp(-2 * np.pi * 30 * DT))
-    return lfilter([1 - pole], [1, -pole], stem) / (1 - SLIDING)
+def _stick_and_slip(time: np.ndarray) -> np.ndarray:
+    """Unit step behind a stem that R2's demand pulls loose; behind it a sensor lag of 30 Hz.
+
+    From then on the stem follows the demand, which rises all the time, at a constant distance: a
+    step and two modes that begin late, whose responses through the lag are known exactly.
+    """
+    loose, sensor = DT * _pull_loose(), 2 * np.pi * 30
+    since = np.clip(time - loose, 0, None)
+    fast = np.exp(-sensor * since)
+    poles = PLANTS["R2"].poles().real
+    a, b = poles
+    y = (1 - SLIDING) * (1 - fast)
+    for pole, residue in ((a, b / (a - b)), (b, a / (b - a))):
+        size = residue * np.exp(pole * loose) * sensor / (sensor + pole)
+        y += size * (np.exp(pole * since) - fast)
+    return y / (1 - SLIDING)
 
 
 @dataclass(frozen=True, eq=False)

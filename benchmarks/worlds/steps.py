@@ -77,24 +77,33 @@ def sticking(rng: Rng) -> Case:
     """A positioner's demand has to pull the stem loose: 3 to 8 % of the step, half in motion."""
     plant, u = drawn(rng), step()
     static = float(rng.uniform(0.03, 0.08))
-    demand = through(held(u), plant.lags[0])
-    stem, moving = np.zeros_like(demand), False
-    for k in range(1, demand.size):
-        pull = demand[k] - stem[k - 1]
-        moving = abs(pull) > static * (0.5 if moving else 1.0)
-        stem[k] = demand[k] - np.sign(pull) * static / 2 if moving else stem[k - 1]
+    stem = pulled_loose(through(held(u), plant.lags[0]), static)
     y = sampled(through(late(plant.gain * stem, plant.dead_time), plant.lags[1]))
     loose = -plant.lags[0] * np.log(1 - static)
     return plant.case(record(u, noisy(rng, y)), dead_time=plant.dead_time + loose, gain=plant.gain)
 
 
+def pulled_loose(demand: np.ndarray, static: float) -> np.ndarray:
+    """Follow a demand at half the distance `static` at which it sets a stem in motion."""
+    stem, moving = np.zeros_like(demand), False
+    for k in range(1, demand.size):
+        pull = demand[k] - stem[k - 1]
+        moving = abs(pull) > static * (0.5 if moving else 1.0)
+        stem[k] = demand[k] - np.sign(pull) * static / 2 if moving else stem[k - 1]
+    return stem
+
+
 def play(rng: Rng) -> Case:
-    """A gear with a play of 2 to 6 % of the step between the actuator's lag and the plant."""
+    """A gear with a play of 2 to 6 % of the step between the actuator's lag and the plant.
+
+    The gear is in the middle of it, and the dead time lasts until it takes the plant along.
+    """
     plant, u = drawn(rng), step()
     width = float(rng.uniform(0.02, 0.06))
     stem = backlash(through(held(u), plant.lags[0]), width)
     y = sampled(through(late(plant.gain * stem, plant.dead_time), plant.lags[1]))
-    return plant.case(record(u, noisy(rng, y)))
+    taken = -plant.lags[0] * np.log(1 - width / 2)
+    return plant.case(record(u, noisy(rng, y)), dead_time=plant.dead_time + taken)
 
 
 def recycle(rng: Rng) -> Case:

@@ -149,8 +149,11 @@ def fit_output_error(
     the structures by the same criterion, so that many lags are not taken for dead time. A diffusion
     model widens the interval if it fits as well. If the best structure has a zero, which can
     imitate a smooth onset, the interval extends to one sample after the visible onset, and to three
-    times the distance between dead time and onset before the dead time. One lag more than chosen is
-    never ruled out. For step records an axial-dispersion model (inverse Gaussian residence times,
+    times the distance between dead time and onset before the dead time. A stem behind the lags
+    that sticks, and begins with a jump, is such a beginning as well: if the best structure has no
+    zero, the interval reaches to the latest time at which a jump is not ruled out; a dead time that
+    ends with friction lasts until the stem comes loose. One lag more than chosen is never ruled
+    out. For step records an axial-dispersion model (inverse Gaussian residence times,
     with or without a lag in series) is fitted as well: it widens the interval if it is not ruled
     out, and if it is clearly better than all lags, its dead time is used.
 

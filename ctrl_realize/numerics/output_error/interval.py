@@ -36,6 +36,7 @@ from ..separable.profile_ends import profile_limits
 from ..separable.structures import LEAST_CHARGE, PLAUSIBLE, Scales, charged, plausible
 from ..separable.varpro import Structure
 from ..separable.window import WindowFit
+from .friction import latest_slip
 from .margins import CloseDecision, close_choices, close_exclusions
 from .profiles import Profile, curves, laid_profiles, lower_minima, solved_profiles
 from .result import DelayInterval, OtherModel, OutputErrorEstimate, StructureFit, assembled
@@ -57,13 +58,15 @@ def likelihood_fit(
     chains: Sequence[LagChain] = (),
     flows: Sequence[DispersedFlow] = (),
     onset: float | None = None,
+    may_stick: bool = False,
     relaxing: bool = False,
     better: StructureFit | None = None,
     near: tuple[CloseDecision, ...] = (),
 ) -> OutputErrorEstimate:
     """Determine dead time and interval from the likelihood.
 
-    `onset` is the time of the visible onset; without it the structures are used alone. `relaxing`
+    `onset` is the time of the visible onset; without it the structures are used alone. With
+    `may_stick` the interval reaches to where a stem behind the lags may come loose. `relaxing`
     and `better` are those of the result, `near` are close decisions made before.
     """
     tanks = [chain for chain in chains if not chain.hidden]
@@ -83,6 +86,8 @@ def likelihood_fit(
     open_start = onset is not None and choice.flow is None and chosen.structure.zeros > 0
     if onset is not None and open_start:
         low, high = _opened(low, high, chosen.dead_time, onset, scales)
+    if may_stick and choice.chain is None and choice.flow is None and not chosen.structure.zeros:
+        high = max(high, latest_slip(whole, chosen) or high)
     first, last = profile_limits(*own)
     interval = DelayInterval(low, high, (last - first) / (2 * Z_95))
     found = assembled(

@@ -15,6 +15,8 @@ The rule:
    clearly better than any lags, and rounding is not coarse, its dead time is used. A zero can
    imitate a smooth onset: if the best structure has one, the interval extends to a sample after the
    visible onset, and to three times the distance between dead time and onset before the dead time.
+   If it has none, the interval extends to the end of the likelihood of a stem behind the lags that
+   sticks and then jumps, unless that is ruled out or rounding is coarse.
    Where the noise is much less than a step of the converter, dead time and model are those of the
    likelihood of rounded data.
    Where the residual is correlated or coarsely rounded, the likelihood may be flat down to the
@@ -186,6 +188,7 @@ def fit_step_record(
             chains=chains,
             flows=_flows(data, whole, chains),
             onset=data.motion.onset * data.dt,
+            may_stick=not data.coarse,  # what is rounded begins with a jump
             relaxing=data.relaxing,
             near=near,
         )
