@@ -194,6 +194,7 @@ SWITCHES = (
         {
             f"{SEPARABLE}.structures:LEAST_CHARGE": value(0.0),
             f"{FITS}.interval:LEAST_CHARGE": value(0.0),
+            f"{FITS}.friction:LEAST_CHARGE": value(0.0),
         },
         (f"{SEPARABLE}.structures:charged", f"{FITS}.interval:charged"),
     ),
@@ -222,7 +223,7 @@ SWITCHES = (
     Switch("flows that disperse", {f"{FITS}.selection:fit_flows": giving([])}),
     Switch(
         "charge for a flow",
-        {f"{SEPARABLE}.dispersion:_CHARGE": value(0.0)},
+        {f"{SEPARABLE}.dispersion.fit:_CHARGE": value(0.0)},
         (f"{FITS}.selection:fit_flows",),
     ),
     Switch(
