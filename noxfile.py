@@ -30,7 +30,7 @@ def lint(session: nox.Session) -> None:
 
 @nox.session
 def tests(session: nox.Session) -> None:
-    """Lint, then all tests and examples."""
+    """Lint, then all tests, examples and notebooks."""
     script(session, "dev", "test")
 
 

@@ -1,9 +1,4 @@
-"""Notebooks run from top to bottom, and their last cells assert what they claim.
-
-The build of the site runs all of them, in kernels, whenever anything changes: it needs their
-outputs. Here one of them runs in a kernel, and all in this process where that is asked for
-(``-m notebook``), as it is on other systems and with other versions, where no site is built.
-"""
+"""Notebooks run from top to bottom, and their last cells assert what they claim."""
 
 import ast
 import json
@@ -52,9 +47,9 @@ def run(source: str, scope: dict) -> None:
     plt.close("all")
 
 
-@pytest.mark.notebook
 @pytest.mark.parametrize("path", NOTEBOOKS[1:], ids=lambda path: path.stem)
 def test_notebook_runs_and_its_numbers_hold(path: Path, monkeypatch: pytest.MonkeyPatch):
+    """In this process; the first one runs in a kernel below, and all do where they are stored."""
     monkeypatch.chdir(path.parent)
     # without sliders, what they would move is drawn once, and an error in it is one here
     monkeypatch.setitem(sys.modules, "ipywidgets", None)

@@ -2,9 +2,9 @@
 """Set up the project and run one of its tasks; needs nothing but Python 3.11 or newer.
 
     python3 tools/dev.py demo     the simulated valve, end to end, with report, in demo-output/
-    python3 tools/dev.py test     lint, type check, spelling, tests and doctests
+    python3 tools/dev.py test     lint, type check, spelling, tests, doctests and notebooks
     python3 tools/dev.py lint     lint, type check and spelling only
-    python3 tools/dev.py docs     build the documentation into docs/_build/html; runs the notebooks
+    python3 tools/dev.py docs     build the documentation into docs/_build/html
     python3 tools/dev.py setup    make .venv and install, nothing else
 
 Everything is installed into .venv in the project's folder. Further arguments go to the task:

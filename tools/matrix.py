@@ -31,8 +31,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
-QUICK = ("-m", "not slow and not notebook", "--ignore", "tests/fuzz")
-WHOLE = ("-m", "notebook or not notebook")  # the suite leaves notebooks to the build of the site
+QUICK = ("-m", "not slow", "--ignore", "tests/fuzz", "--ignore", "tests/test_notebooks.py")
 OLDEST = ROOT / "tools" / "oldest.txt"
 RUNNERS = ["pytest>=8.2", "pytest-xdist", "hypothesis", "mpmath", "nbclient", "ipykernel"]
 GENERATED = shutil.ignore_patterns(
@@ -322,7 +321,7 @@ def main() -> None:
         return
     options = (
         *("-n", asked.workers),
-        *(QUICK if asked.quick else WHOLE),
+        *(QUICK if asked.quick else ()),
         *(asked.tests or ("tests", "--pyargs", "ctrl_realize")),
     )
     outcomes: dict[str, Outcome] = {}

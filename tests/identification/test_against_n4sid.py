@@ -53,12 +53,18 @@ def test_realization_predicts_as_well_as_a_subspace_method(plant, length, order,
 
 
 @pytest.mark.parametrize(
-    ("plant", "orders"),
-    [("hairdryer", (3, 4)), ("exchanger", (2, 3)), ("robot_arm", (6, 12))],
+    ("plant", "orders", "gain", "ours"),
+    [
+        ("hairdryer", (3, 4), 0.0, None),
+        ("exchanger", (2, 3), 0.0, None),
+        ("robot_arm", (6, 12), 0.0, None),
+        # 78.0 % beside 72.7 %; by default an order of 20 with 83.0 %, which takes 20 s
+        ("cd_player_mimo", (6, 12, 20), 5.0, [6]),
+    ],
 )
-def test_a_fit_with_defaults_predicts_no_worse_than_a_subspace_method(plant, orders):
+def test_a_fit_with_defaults_predicts_no_worse_than_a_subspace_method(plant, orders, gain, ours):
     first, second = measured.halves(f"{plant}/record")
-    found = cr.fit_state_space(first)
+    found = cr.fit_state_space(first, ours)
     fit = cr.validation.analyse_residuals(found, second).fit_percent.mean()
     theirs = []
     for order in orders:
@@ -69,7 +75,7 @@ def test_a_fit_with_defaults_predicts_no_worse_than_a_subspace_method(plant, ord
             if np.abs(model.poles()).max() < 1:
                 theirs.append(cr.validation.analyse_residuals(model, second).fit_percent.mean())
     # One percent: halves of a record differ by more, and theirs are the best in hindsight.
-    assert fit > max(theirs, default=0.0) - 1.0
+    assert fit > max(theirs, default=0.0) + gain - 1.0
 
 
 def test_the_robot_arm_needs_no_choice_of_method_or_length():

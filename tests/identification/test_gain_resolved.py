@@ -8,6 +8,7 @@ import pytest
 import ctrl_realize as cr
 from ctrl_realize import report
 from ctrl_realize.errors import UnresolvedWarning, UnsuitableSystemError
+from tests import measured
 
 GAIN, LAG, DELAY, REST = 5.0, 12.0, 4.0, 150.0
 
@@ -150,7 +151,7 @@ def test_a_tank_that_fills_after_a_long_rest_is_not_called_unstable():
 
 
 def test_a_gain_is_told_beside_an_output_that_wanders():
-    fit = cr.identify(wandering(3), structures=[(1, 1), (2, 2), (2, 1)]).fit
+    fit = cr.identify(wandering(3)).fit
     assert fit.gain == pytest.approx(-3.0, abs=0.5)
     assert fit.gain_interval[1] < 0
 
@@ -174,6 +175,15 @@ def test_analyses_warn_and_a_saved_model_still_says_what_is_not_resolved(unknown
         cr.design.pid(cr.load_model(tmp_path / "model.json"))
 
 
+def test_the_gas_furnace_has_the_gain_of_box_and_jenkins():
+    record = measured.record("gas_furnace/record")
+    low, high = measured.fitted("gas_furnace/record").gain_interval
+    # (0.53 + 0.37 + 0.51) / (1 - 0.57) = 3.28, negative
+    assert low <= -3.28 <= high
+    with pytest.raises(UnsuitableSystemError, match="sign of the gain"):
+        cr.design.pid(cr.identify(record, structures=[(2, 1)]))
+
+
 def losing_its_gain():
     """The gain falls to a half during the record: no model leaves white noise."""
     rng = np.random.default_rng(0)
@@ -183,11 +193,16 @@ def losing_its_gain():
     return cr.Record(np.arange(u.size) * 1.0, u, y)
 
 
-def test_a_gain_that_changes_is_no_integrator_and_structures_that_differ_in_gain_are_named():
-    # the noise model, which settles it, is not used for structures that are given
-    system = cr.identify(losing_its_gain(), structures=[(1, 1), (2, 1)])
-    assert {"time_varying", "coloured_residual", "gain_not_resolved"} <= codes(system)
+def test_a_gain_that_changes_is_no_integrator():
+    system = cr.identify(losing_its_gain())
+    assert "time_varying" in codes(system)
     assert system.fit.gain == pytest.approx(1.5, abs=0.15)  # the mean of 2 and 1
     assert system.fit.interval[0] <= 8.0 <= system.fit.interval[1]
+
+
+def test_structures_that_differ_in_gain_are_named_under_a_coloured_residual():
+    # the noise model, which settles it, is not used for structures that are given
+    system = cr.identify(losing_its_gain(), structures=[(1, 1), (2, 1)])
+    assert {"coloured_residual", "gain_not_resolved"} <= codes(system)
     told = next(flag.message for flag in system.fit.flags if flag.code == "gain_not_resolved")
     assert "structures that the data cannot rule out have gains of" in told

@@ -8,7 +8,7 @@ from scipy.special import gammainc
 from scipy.stats import invgauss
 
 import ctrl_realize as cr
-from tests import rigs
+from tests import measured, rigs
 
 TS = rigs.TS
 
@@ -211,6 +211,17 @@ def test_records_fitted_together_know_the_noise_of_their_mean():
     assert fit.delay == pytest.approx(36.4, abs=0.1)
     low, high = fit.delay_interval
     assert low <= 36.4 <= high
+
+
+def test_the_ripple_of_a_measured_motor_leaves_its_delay_narrow():
+    data = measured.record("dc_motor_tacho/up")
+    fit = measured.fitted("dc_motor_tacho/up")
+    low, high = fit.interval
+    assert fit.at_noise_level
+    assert 31 <= fit.delay <= 42
+    assert high - low <= 0.3 * fit.onset
+    first, last = cr.fit_output_error(data, noise="white").fit.interval
+    assert last - first > 2 * (high - low)
 
 
 def test_a_rest_that_is_silent_but_for_bursts_tells_no_colour():
