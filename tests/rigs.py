@@ -9,6 +9,7 @@ import numpy as np
 from scipy.signal import lfilter
 
 import ctrl_realize as cr
+from ctrl_realize.results import ModelFit
 
 TS = 7.8125e-4  # the paper's sample time in s
 
@@ -21,6 +22,12 @@ def lag(hz: float) -> ct.TransferFunction:
 def pair(hz: float, zeta: float) -> ct.TransferFunction:
     w = 2 * np.pi * hz
     return ct.tf([w**2], [1, 2 * zeta * w, w**2])
+
+
+def codes(result: ct.StateSpace | ModelFit) -> set[str]:
+    """Codes of the flags of a fit, or of the fit that a model carries."""
+    fit = result.fit if isinstance(result, ct.StateSpace) else result
+    return {flag.code for flag in fit.flags}
 
 
 DT = 0.1  # sample time in s of the two plants that follow

@@ -210,7 +210,8 @@ def test_a_response_that_begins_in_a_gap_is_named_and_the_interval_holds():
     time = DT * np.arange(400)
     y = furnace(time, np.array([700.0]), np.array([3.0])) + 0.01 * rng.standard_normal(400)
     y[(time > 750) & (time < 950)] = np.nan
-    fit = cr.identify(cr.Record(time, 1.0 * (time >= 700) * 3, y, missing="keep")).fit
+    gap = cr.Record(time, 3.0 * (time >= 700), y, missing="keep")
+    fit = cr.identify(gap, structures=[(1, 1), (2, 2), (2, 1)]).fit
     assert "between 50 s and 250 s" in next(str(f) for f in fit.flags if f.code == "onset_in_gap")
     assert fit.interval[0] <= DELAY <= fit.interval[1]
 

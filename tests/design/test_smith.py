@@ -32,18 +32,6 @@ def test_the_set_point_response_is_that_of_the_core_alone_d_samples_later(
     np.testing.assert_allclose(found[delay:], alone, atol=1e-11)  # 600 steps of rounding
 
 
-@pytest.mark.parametrize("delay", [1, 37, 300])
-def test_the_controller_equals_feedback_of_the_difference_of_two_models(
-    valve, pi_controller, delay
-):
-    plant, controller = valve(delay), pi_controller(1.5, 0.1)
-    predictor = cr.design.smith_predictor(plant, controller)
-    z = np.exp(1j * np.geomspace(1e-3, 3, 40))
-    core, pi = plant.delay_free(z), controller(z)
-    expected = pi / (1 + pi * (core - core * z**-delay))
-    np.testing.assert_allclose(predictor(z), expected, rtol=1e-9)
-
-
 def test_margins_see_the_same_closed_loop_as_its_eigenvalues(valve, pi_controller):
     counts = []
     for gain, delay in ((0.5, 30), (1.5, 60), (4.0, 40), (4.0, 120)):

@@ -8,14 +8,11 @@ from scipy.signal import lfilter
 import ctrl_realize as cr
 from ctrl_realize.errors import DataError, NoStepError
 from tests import rigs
+from tests.rigs import codes
 
 DT = 0.1
 LAG = ct.tf([3.0], [1.0, 1.0])
 ONE = {"structures": [(1, 1)]}
-
-
-def codes(fit):
-    return {flag.code for flag in fit.flags}
 
 
 def lag_record(seed=0, *, n=120, edge=40, delay=7.3, noise=0.02, height=1.0, name=""):

@@ -9,6 +9,7 @@ import ctrl_realize as cr
 from ctrl_realize import report
 from ctrl_realize.errors import UnresolvedWarning, UnsuitableSystemError
 from tests import measured
+from tests.rigs import codes
 
 GAIN, LAG, DELAY, REST = 5.0, 12.0, 4.0, 150.0
 
@@ -37,10 +38,6 @@ def warned(design, *given):
         warnings.simplefilter("always", UnresolvedWarning)
         design(*given)
     return " | ".join(str(one.message) for one in caught)
-
-
-def codes(system):
-    return {flag.code for flag in system.fit.flags}
 
 
 def test_a_gain_far_beyond_the_record_is_not_stated_as_known():

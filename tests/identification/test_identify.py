@@ -9,7 +9,7 @@ from numpy.testing import assert_allclose
 from scipy.signal import lfilter
 
 import ctrl_realize as cr
-from tests.rigs import step_record
+from tests.rigs import codes, step_record
 
 
 def test_the_papers_method_is_the_paper_step_by_step():
@@ -73,10 +73,6 @@ def row():
 @pytest.fixture(scope="module")
 def chosen(row):
     return row.system
-
-
-def codes(system):
-    return {flag.code for flag in system.fit.flags}
 
 
 def test_modes_take_the_place_of_lags_that_leave_structure(chosen, row):

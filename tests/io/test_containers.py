@@ -46,9 +46,10 @@ ARRAYS = {
 # arrays are looked up alike whatever they come from; of .mat the types that its reader makes
 WRITTEN = [("npz", name) for name in ARRAYS] + [
     ("packed npz", "columns"),
-    *(("mat", name) for name in ("other arrays beside", "whole numbers", "one matrix, turned")),
-    *(("packed mat", name) for name in ("columns", "single precision")),
-    *(("old mat", name) for name in ("columns", "whole numbers")),
+    # each in a process of its own
+    *(("mat", name) for name in ("whole numbers", "one matrix, turned")),
+    ("packed mat", "single precision"),
+    ("old mat", "columns"),
 ]
 
 

@@ -44,10 +44,6 @@ def agreeing(seed=0):
     return fit_joint(step(seed), response(seed), structures=ONE_LAG).fit
 
 
-def codes(fit):
-    return {flag.code for flag in fit.flags}
-
-
 def test_it_is_the_maximum_of_the_likelihood_by_another_optimiser():
     fit, record, frf = agreeing(), step(), response()
     s = 2j * np.pi * HZ

@@ -15,6 +15,7 @@ import ctrl_realize as cr
 from ctrl_realize.errors import OptionError
 from ctrl_realize.identification import RecordGains
 from ctrl_realize.numerics.validation.own_response import disagreeing
+from tests.rigs import codes
 
 DT, DEAD_TIME, LAG, NOISE = 0.01, 0.123, 0.4, 0.01
 GAINS = (1.0, 0.5, 0.25)
@@ -52,10 +53,6 @@ def own(records, **kwargs):
 def fitted(seed=0):
     """Model of three records at three levels, which several tests look at."""
     return own(at_three_levels(seed))
-
-
-def codes(fit):
-    return {flag.code for flag in fit.flags}
 
 
 def test_gains_of_steps_are_within_their_intervals_and_the_dead_time_in_its():

@@ -11,13 +11,9 @@ import ctrl_realize as cr
 from ctrl_realize.numerics.state_space.responses import markov
 from tests.oracles import dense
 from tests.oracles.plants import modal, valve_pulse
-from tests.rigs import TS
+from tests.rigs import TS, codes
 
 KINDS = ["clean", "zero-phase", "causal", "unfiltered"]
-
-
-def codes(fit) -> set[str]:
-    return {flag.code for flag in fit.flags}
 
 
 @pytest.mark.parametrize("kind", KINDS)

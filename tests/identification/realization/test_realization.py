@@ -12,7 +12,7 @@ from ctrl_realize.errors import OptionError
 from ctrl_realize.identification.realization.realize import uses_feedthrough
 from ctrl_realize.numerics.state_space.responses import markov
 from tests.oracles.plants import modal, valve_pulse
-from tests.rigs import R3, TS, exact_step
+from tests.rigs import R3, TS, codes, exact_step
 
 
 @pytest.fixture(scope="module")
@@ -65,10 +65,6 @@ def test_direct_term_within_the_noise_is_left_out():
     assert direct_term(37) == 0
     assert direct_term(37, feedthrough=True) == pulse[37]
     assert direct_term(80) == pulse[80]  # 20 times the noise
-
-
-def codes(sys) -> set[str]:
-    return {flag.code for flag in sys.fit.flags}
 
 
 def test_flags_tell_what_to_distrust():

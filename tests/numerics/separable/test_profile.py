@@ -26,22 +26,29 @@ from ctrl_realize.numerics.separable.varpro import KnownFactor, Structure, evalu
 SIGMA, DEAD, LAGS = 0.01, 20.3, (12.0, 30.0)
 
 
+def problem_of(lags=LAGS, unit=1.0, seed=3, dead_time=DEAD):
+    """Lags behind a dead time, in noise; times in samples of `unit` seconds."""
+    k = np.arange(-300, 600, dtype=float)
+    rates = 1 / np.array(lags)
+    shares = [1 / np.prod(1 - p / np.delete(rates, i)) for i, p in enumerate(rates)]
+    late = np.clip(k - dead_time, 0, None)
+    y = 1 - np.exp(-np.outer(late, rates)) @ np.array(shares)
+    y = y + SIGMA * np.random.default_rng(seed).standard_normal(k.size)
+    data = step_data(y, (k >= 0).astype(float), unit, [(300, 1)])
+    return window(data, k.size, KnownFactor()).problem, step_scales(data, k.size, None)
+
+
+def start(dead_time: float, *lags: float) -> np.ndarray:
+    return np.append(dead_time, parameters_from_poles(-1 / np.array(lags, dtype=complex)))
+
+
 @pytest.fixture
 def found():
     """Two lags behind a dead time, in noise, and their fit."""
-    k = np.arange(-300, 600, dtype=float)
-    late = np.clip(k - DEAD, 0, None)
-    fast, slow = LAGS
-    y = 1 - (slow * np.exp(-late / slow) - fast * np.exp(-late / fast)) / (slow - fast)
-    y = y + SIGMA * np.random.default_rng(3).standard_normal(k.size)
-    data = step_data(y, (k >= 0).astype(float), 1.0, [(300, 1)])
-    scales = step_scales(data, k.size, None)
-    problem = window(data, k.size, KnownFactor()).problem
+    problem, scales = problem_of()
     structure = Structure(2, 2)
-    start = np.append(DEAD, parameters_from_poles(-1 / np.array(LAGS, dtype=complex)))
-    parameters, cost = fit_batch(
-        problem, structure, start[None], parameter_bounds(structure, scales)
-    )
+    bounds = parameter_bounds(structure, scales)
+    parameters, cost = fit_batch(problem, structure, start(DEAD, *LAGS)[None], bounds)
     return problem, Candidate(structure, parameters[0], float(cost[0])), scales
 
 
@@ -84,25 +91,6 @@ def test_near_the_optimum_it_is_the_parabola_of_the_standard_error(found):
     assert wide[1] - wide[0] == pytest.approx(2 * (high - low), rel=0.05)
 
 
-LOW_NOISE, SHORT_DEAD = 0.01, 20.3
-
-
-def problem_of(lags=(12.0, 30.0), unit=1.0, seed=3, dead_time=SHORT_DEAD):
-    """Lags behind a dead time, in noise; times in samples of `unit` seconds."""
-    k = np.arange(-300, 600, dtype=float)
-    rates = 1 / np.array(lags)
-    shares = [1 / np.prod(1 - p / np.delete(rates, i)) for i, p in enumerate(rates)]
-    late = np.clip(k - dead_time, 0, None)
-    y = 1 - np.exp(-np.outer(late, rates)) @ np.array(shares)
-    y = y + LOW_NOISE * np.random.default_rng(seed).standard_normal(k.size)
-    data = step_data(y, (k >= 0).astype(float), unit, [(300, 1)])
-    return window(data, k.size, KnownFactor()).problem, step_scales(data, k.size, None)
-
-
-def start(dead_time: float, *lags: float) -> np.ndarray:
-    return np.append(dead_time, parameters_from_poles(-1 / np.array(lags, dtype=complex)))
-
-
 def test_all_starts_come_to_one_minimum():
     problem, scales = problem_of()
     structure = Structure(2, 2)
@@ -123,7 +111,7 @@ def test_a_dead_time_that_crosses_a_hundred_samples_ends_where_one_beside_it_doe
     starts = np.array([start(at, 30.0, 60.0) for at in (140.0, 40.0)])
     near, far = (polish(problem, structure, one[None], bounds, scales.dt) for one in starts)
     # within the decrease at which Newton's method takes over, 0.05 variances
-    assert far[1][0] - near[1][0] < 0.1 * LOW_NOISE**2
+    assert far[1][0] - near[1][0] < 0.1 * SIGMA**2
     assert abs(far[0][0, 0] - near[0][0, 0]) < 0.1
 
 
@@ -137,7 +125,7 @@ def test_at_the_minimum_nothing_slopes(order, degree):
     x, _ = settle(problem, structure, near, bounds, scales.dt)
     state = evaluate(problem, structure, x[None])
     slope = state.jacobian[0].T @ state.residual[0]
-    size = np.linalg.norm(state.jacobian[0], axis=0) * LOW_NOISE
+    size = np.linalg.norm(state.jacobian[0], axis=0) * SIGMA
     free = (x > bounds.low) & (x < bounds.high)
     # in standard errors, were the others known
     assert np.all(np.abs(slope)[free] <= 1e-4 * size[free] + 1e-12)
@@ -165,24 +153,24 @@ def test_a_level_is_met_by_the_least_cost_at_that_dead_time(order, degree):
     bounds = parameter_bounds(structure, scales)
     near = polish(problem, structure, start(20.0, 10.0, 30.0)[None], bounds, scales.dt)[0][0]
     x, cost = settle(problem, structure, near, bounds, scales.dt)
-    goal = cost + 3.84 * LOW_NOISE**2
+    goal = cost + 3.84 * SIGMA**2
     aside = x.copy()
     aside[0] -= 0.5
-    found = solve_level(problem, structure, aside, bounds, scales.dt, goal, LOW_NOISE**2)
+    found = solve_level(problem, structure, aside, bounds, scales.dt, goal, SIGMA**2)
     assert found is not None
     assert found[0] < x[0]
     held = found[None].copy()
     held[:, 1:] = x[1:]
     again, _ = polish(problem, structure, held, bounds, scales.dt, dead_time_fixed=True)
     least = settle(problem, structure, again[0], bounds, scales.dt, dead_time_fixed=True)[1]
-    assert least == pytest.approx(goal, abs=1e-5 * LOW_NOISE**2)
+    assert least == pytest.approx(goal, abs=1e-5 * SIGMA**2)
 
 
 def test_what_is_compared_has_no_slope_and_the_cost_of_the_data_of_now():
     problem, scales = problem_of()
     shapes = [Structure(1, 1), Structure(2, 2), Structure(2, 1), Structure(3, 3), Structure(3, 2)]
     rough = search(problem, shapes, scales)
-    found = converged(problem, rough, scales, LOW_NOISE**2, 600.0)
+    found = converged(problem, rough, scales, SIGMA**2, 600.0)
     for shape in shapes:
         assert found[shape].cost <= rough[shape].cost
     # nested: a pole more, or a zero more, is never worse

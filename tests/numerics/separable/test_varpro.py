@@ -7,7 +7,7 @@ from numpy.testing import assert_allclose
 from ctrl_realize.numerics.separable.batch_search import fit_batch
 from ctrl_realize.numerics.separable.compressed import compress
 from ctrl_realize.numerics.separable.local_terms import Segments
-from ctrl_realize.numerics.separable.poles import parameters_from_poles, poles_from_parameters
+from ctrl_realize.numerics.separable.poles import parameters_from_poles
 from ctrl_realize.numerics.separable.responses import SampledInput, StepSequence
 from ctrl_realize.numerics.separable.structures import Scales, parameter_bounds, search
 from ctrl_realize.numerics.separable.varpro import (
@@ -107,21 +107,6 @@ def test_the_response_is_the_closed_form_at_any_fraction_of_a_sample():
         x = np.concatenate([[dead_time * rigs.TS], parameters_from_poles(poles)])
         ours = respond(drive, KnownFactor(), np.array([np.prod(-poles).real]), x)
         assert_allclose(ours, rigs.exact_step(rigs.R3, time - dead_time * rigs.TS), atol=1e-12)
-
-
-def test_means_over_bins_are_means_of_samples_also_where_moves_arrive():
-    moves, sizes = np.array([5.0, 6.0, 7.0, 100.0, 103.0]), np.array([0.3, 0.4, 0.3, -0.5, 1.0])
-    width = np.array([1] * 40 + [3, 5, 7, 4, 1, 2, 20, 60, 158])
-    first = np.concatenate([[0], np.cumsum(width)[:-1]])
-    poles, _ = poles_from_parameters(np.log([[0.03, 0.1, 0.2], [1e-7, 0.3, 0.02]]))
-    tau = np.array([7.3, 41.9])
-    bins = StepSequence(first.astype(float), width, 1.0, moves, sizes).modes(tau, poles)
-    samples = StepSequence(np.arange(300.0), ONES, 1.0, moves, sizes).modes(tau, poles)
-    for mean, values in zip(bins, samples, strict=True):
-        expected = np.add.reduceat(values, first, axis=1)
-        expected = expected / width.reshape(1, -1, *[1] * (values.ndim - 2))
-        # the slowest pole is at 1e-7: one minus its exponential keeps nine digits
-        assert_allclose(mean, expected, rtol=1e-8, atol=1e-10)
 
 
 @pytest.mark.parametrize("zeta", [0.05, 0.7, 1.3])

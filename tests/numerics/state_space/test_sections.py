@@ -1,6 +1,5 @@
 """Responses of state-space models and of sums of sections, and their fit."""
 
-import control as ct
 import numpy as np
 import pytest
 from hypothesis import given
@@ -9,7 +8,7 @@ from numpy.testing import assert_allclose
 from scipy.linalg import block_diag
 from scipy.optimize import least_squares
 
-from ctrl_realize.numerics.state_space import responses, sampling
+from ctrl_realize.numerics.state_space import responses
 from ctrl_realize.numerics.state_space.responses import markov, simulate
 from ctrl_realize.numerics.state_space.section_fit import Experiment, fit_sections
 from ctrl_realize.numerics.state_space.sections import in_sections, motion
@@ -62,20 +61,6 @@ def test_simulation_equals_the_recursion(seed, samples):
     expected = recursion(A, B, C, D, u, x)
     fast = responses.simulate(A, B, C, D, u, x)
     assert_allclose(fast, expected, rtol=0, atol=1e-11 * max(1.0, np.abs(expected).max()))
-
-
-@given(dt=st.floats(1e-3, 1.0), fraction=st.floats(0.0, 5.0))
-def test_sampling_is_that_of_the_continuous_step(dt, fraction):
-    plant = ct.ss(ct.tf([3.0], [0.5, 1.0]))
-    *model, delay = sampling.sample_with_dead_time(
-        plant.A, plant.B, plant.C, plant.D, dt, fraction * dt
-    )
-    k = np.arange(40)
-    exact = np.clip(3 * -np.expm1(-np.clip(k - fraction, 0, None) * dt / 0.5), 0, None)
-    step = np.zeros(40)
-    step[delay:] = responses.step_response(*model, 40)[0, 0, : 40 - delay]
-    assert_allclose(step, exact, rtol=0, atol=1e-8)
-    assert delay in (int(np.floor(fraction)), int(np.floor(fraction)) + 1)
 
 
 SAMPLES = 60
