@@ -108,8 +108,7 @@ def test_a_drift_is_told_from_a_plant_that_moves(rest):
 def test_eight_bit_quantisation_is_seen_and_the_interval_covers():
     clean = rigs.step_record(noise=0.0, before=600, after=1500)
     step = 16 * 1.2 / 128
-    rounded = changed(clean, np.round(clean.output / step) * step)
-    fit = cr.fit_output_error(rounded, structures=[(2, 2), (3, 3)]).fit
+    fit = cr.fit_output_error(changed(clean, np.round(clean.output / step) * step)).fit
     assert "coarse_quantisation" in codes(fit)
     assert covers(fit, 37)
 
