@@ -60,13 +60,7 @@ class Browser:
             self._session = attached["sessionId"]
             for domain in ("Page", "Runtime", "Log"):
                 self._ask(f"{domain}.enable")
-            width, height = self._size
-            self._ask(
-                "Emulation.setDeviceMetricsOverride",
-                width=width, height=height, deviceScaleFactor=1, mobile=True,
-            )  # fmt: skip
-            scheme = {"name": "prefers-color-scheme", "value": "dark" if self._dark else "light"}
-            self._ask("Emulation.setEmulatedMedia", features=[scheme])
+            self.show(*self._size, dark=self._dark)
         except BaseException:
             self._stop()
             raise
@@ -119,6 +113,15 @@ class Browser:
         message, _, self._rest = self._rest.partition(b"\0")
         answer: dict[str, Any] = json.loads(message)
         return answer
+
+    def show(self, width: int, height: int, *, dark: bool = False) -> None:
+        """Give the window another size, and the colours of another preference."""
+        self._ask(
+            "Emulation.setDeviceMetricsOverride",
+            width=width, height=height, deviceScaleFactor=1, mobile=True,
+        )  # fmt: skip
+        scheme = {"name": "prefers-color-scheme", "value": "dark" if dark else "light"}
+        self._ask("Emulation.setEmulatedMedia", features=[scheme])
 
     def open(self, page: Path) -> None:
         """Load a file, and wait until it is there."""

@@ -12,6 +12,7 @@ import pytest
 
 import ctrl_realize as cr
 from ctrl_realize.cli import main
+from tests.sources import parsed
 
 ROOT = Path(__file__).resolve().parents[1]
 DOCS = ROOT / "docs"
@@ -244,11 +245,9 @@ def test_the_lines_of_the_readme_run(tmp_path, monkeypatch):
 def test_every_source_that_the_code_names_is_on_the_page_of_references():
     page = (DOCS / "references.md").read_text().replace("–", "-")
     missing = []
-    for path in sorted(Path(cr.__file__).parent.rglob("*.py")):
+    for path, tree in parsed().items():
         documented = ast.AsyncFunctionDef, ast.FunctionDef, ast.ClassDef, ast.Module
-        nodes = [
-            node for node in ast.walk(ast.parse(path.read_text())) if isinstance(node, documented)
-        ]
+        nodes = [node for node in ast.walk(tree) if isinstance(node, documented)]
         words = "\n".join(ast.get_docstring(node) or "" for node in nodes)
         for entry in re.findall(r"^\.\. \[\d+\] (.*(?:\n   \S.*)*)", words, re.M):
             # Authors and title begin alike; section and digits may differ from place to place.
@@ -262,11 +261,12 @@ def test_every_source_that_the_code_names_is_on_the_page_of_references():
 
 
 def test_every_module_of_the_numerical_floor_names_its_sources_or_says_that_it_is_our_own():
-    floor = Path(cr.__file__).parent / "numerics"
     plumbing = {"__init__.py", "arrays.py", "blas_threads.py"}
     silent = []
-    for path in sorted(floor.rglob("*.py")):
-        words = ast.get_docstring(ast.parse(path.read_text())) or ""
-        if path.name not in plumbing and not re.search(r"^References$|[Oo]ur own", words, re.M):
-            silent.append(str(path.relative_to(floor)))
+    for path, tree in parsed().items():
+        words = ast.get_docstring(tree) or ""
+        if path.parts[0] != "numerics" or path.name in plumbing:
+            continue
+        if not re.search(r"^References$|[Oo]ur own", words, re.M):
+            silent.append(str(path))
     assert not silent

@@ -4,14 +4,12 @@ import ast
 from collections import Counter
 from functools import cache
 from graphlib import CycleError, TopologicalSorter
-from pathlib import Path
 from typing import Any
 
 import pytest
 
-import ctrl_realize as cr
+from tests.sources import parsed
 
-PACKAGE = Path(cr.__file__).parent
 MOST_MODULES = 16
 
 # From the ground up. Folders on one floor do not import one another.
@@ -44,12 +42,10 @@ Parts = tuple[str, ...]
 def sources() -> dict[Parts, list[ast.stmt]]:
     """Imports of every module, at top level or inside functions, by the parts of its name."""
     return {
-        path.relative_to(PACKAGE).with_suffix("").parts: [
-            node
-            for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
-            if isinstance(node, ast.Import | ast.ImportFrom)
+        path.with_suffix("").parts: [
+            node for node in ast.walk(tree) if isinstance(node, ast.Import | ast.ImportFrom)
         ]
-        for path in sorted(PACKAGE.rglob("*.py"))
+        for path, tree in parsed().items()
     }
 
 

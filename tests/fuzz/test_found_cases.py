@@ -149,6 +149,7 @@ def test_a_short_odd_record_of_a_step_is_fitted_or_refused(edge, height, dt, y):
         cr.identify(cr.Record(dt * k, np.where(k < edge, 0.0, height), y))
 
 
+@pytest.mark.usefixtures("without_figures")
 def test_a_file_name_that_is_no_utf8_does_not_lose_a_campaign(tmp_path):
     # model files and pandas refuse the lone surrogates that such a name comes with
     k = np.arange(60)

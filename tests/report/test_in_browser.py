@@ -42,32 +42,37 @@ def pages(tmp_path_factory):
     return {"one": (one, 7), "many": (many, 5)}
 
 
-in_a_browser = pytest.mark.skipif(browser.missing() is not None, reason=str(browser.missing()))
+pytestmark = [
+    pytest.mark.browser,
+    pytest.mark.skipif(browser.missing() is not None, reason=str(browser.missing())),
+]
 
 
-@pytest.mark.browser
-@in_a_browser
+@pytest.fixture(scope="module")
+def window(tmp_path_factory):
+    with browser.Browser(tmp_path_factory.mktemp("profile"), 1280, 900) as opened:
+        yield opened
+
+
 @pytest.mark.parametrize(("width", "height", "dark"), [(1280, 900, False), (375, 800, True)])
-def test_a_report_shows_every_figure_without_overflow_or_error(
-    tmp_path, pages, width, height, dark
-):
-    with browser.Browser(tmp_path, width, height, dark=dark) as window:
-        for page, count in pages.values():
-            window.open(page)
-            seen = window.run(MEASURE)
-            assert window.complaints() == []
-            assert seen["width"] == width
-            assert seen["scroll"] <= width
-            assert seen["wide"] == []
-            assert len(seen["figures"]) == count
-            for name, wide, high, paths in seen["figures"]:
-                assert wide > 0.8 * min(width, 480), name
-                assert high > 0.4 * wide, name
-                assert paths > 10, name
-            assert seen["first"] < height  # the verdict is on the first screen
-            light = "rgb(255, 255, 255)"
-            assert (seen["background"] == light) is not dark
-            assert seen["ink"] != seen["background"]
+def test_a_report_shows_every_figure_without_overflow_or_error(window, pages, width, height, dark):
+    window.show(width, height, dark=dark)
+    for page, count in pages.values():
+        window.open(page)
+        seen = window.run(MEASURE)
+        assert window.complaints() == []
+        assert seen["width"] == width
+        assert seen["scroll"] <= width
+        assert seen["wide"] == []
+        assert len(seen["figures"]) == count
+        for name, wide, high, paths in seen["figures"]:
+            assert wide > 0.8 * min(width, 480), name
+            assert high > 0.4 * wide, name
+            assert paths > 10, name
+        assert seen["first"] < height  # the verdict is on the first screen
+        light = "rgb(255, 255, 255)"
+        assert (seen["background"] == light) is not dark
+        assert seen["ink"] != seen["background"]
 
 
 VIEW = "return document.querySelector('svg.plot').getAttribute('viewBox').split(' ').map(Number);"
@@ -80,43 +85,38 @@ return [Math.round(box.left + box.width / 2), Math.round(box.top + box.height / 
 READ = "return document.querySelector('.tools output').textContent;"
 
 
-@pytest.mark.browser
-@in_a_browser
-def test_figures_zoom_by_button_key_and_hand_and_are_whole_on_paper(tmp_path, pages):
-    with browser.Browser(tmp_path, 1280, 900) as window:
-        window.open(pages["one"][0])
-        whole = window.run(VIEW)
-        assert whole[2] > 300
-        window.click(".tools button[aria-label=closer]")
-        near = window.run(VIEW)
-        assert near[2] == pytest.approx(whole[2] / 1.5)
-        assert near[3] / near[2] == pytest.approx(whole[3] / whole[2])
-        window.press("ArrowRight")  # the button that was clicked has the focus
-        assert window.run(VIEW)[0] == pytest.approx(near[0] + near[2] / 8)
-        before = window.run(VIEW)
-        x, y = window.run(MIDDLE)
-        window.drag((x, y), (x + 60, y))
-        assert window.run(VIEW)[0] < before[0]
-        window.press("-", "-")
-        assert window.run(VIEW) == pytest.approx(whole)
-        window.press("+")
-        window.run("dispatchEvent(new Event('beforeprint')); return 0;")
-        assert window.run(VIEW) == pytest.approx(whole)
-        # Where the pointer is, a time and a value are read off.
-        window.drag((x, y), (x + 1, y + 1))
-        assert " ms, " in window.run(READ)
-        assert window.complaints() == []
+def test_figures_zoom_by_button_key_and_hand_and_are_whole_on_paper(window, pages):
+    window.show(1280, 900)
+    window.open(pages["one"][0])
+    whole = window.run(VIEW)
+    assert whole[2] > 300
+    window.click(".tools button[aria-label=closer]")
+    near = window.run(VIEW)
+    assert near[2] == pytest.approx(whole[2] / 1.5)
+    assert near[3] / near[2] == pytest.approx(whole[3] / whole[2])
+    window.press("ArrowRight")  # the button that was clicked has the focus
+    assert window.run(VIEW)[0] == pytest.approx(near[0] + near[2] / 8)
+    before = window.run(VIEW)
+    x, y = window.run(MIDDLE)
+    window.drag((x, y), (x + 60, y))
+    assert window.run(VIEW)[0] < before[0]
+    window.press("-", "-")
+    assert window.run(VIEW) == pytest.approx(whole)
+    window.press("+")
+    window.run("dispatchEvent(new Event('beforeprint')); return 0;")
+    assert window.run(VIEW) == pytest.approx(whole)
+    # Where the pointer is, a time and a value are read off.
+    window.drag((x, y), (x + 1, y + 1))
+    assert " ms, " in window.run(READ)
+    assert window.complaints() == []
 
 
-@pytest.mark.browser
-@in_a_browser
-def test_the_page_runs_its_own_script_and_no_other(tmp_path, pages):
+def test_the_page_runs_its_own_script_and_no_other(window, tmp_path, pages):
     text = pages["one"][0].read_text(encoding="utf-8")
     foreign = tmp_path / "foreign.html"
     script = "<script>document.title = 'taken'</script></body>"
     foreign.write_text(text.replace("</body>", script), encoding="utf-8")
-    with browser.Browser(tmp_path, 800, 600) as window:
-        window.open(foreign)
-        assert window.run("return document.title;") != "taken"
-        assert any("Content Security Policy" in line for line in window.complaints())
-        assert window.run("return document.querySelectorAll('.tools').length;") == 7
+    window.open(foreign)
+    assert window.run("return document.title;") != "taken"
+    assert any("Content Security Policy" in line for line in window.complaints())
+    assert window.run("return document.querySelectorAll('.tools').length;") == 7
