@@ -35,17 +35,23 @@ relation to the input reached 23 in 25 records, for the best of all delays and l
 _APART = 5.0  # in standard deviations: largest distance of a record's gain from the others
 
 
+class UnrelatedError(DataError):
+    """The output does not respond to the input, as far as linear models tell."""
+
+
 def fit_any_input(
     records: tuple[Record, ...],
     limit: float | None,
     settings: Mapping[str, Any],
     ratios: FloatArray | None = None,
+    *,
+    refuses: bool = True,
 ) -> tuple[OutputErrorFit, OutputErrorEstimate]:
     """Fit one model to all records; level, drift and initial state are estimated for each record.
 
     A record whose delay or gain is an outlier is left out, as among step records, until there are
     no more outliers. With `ratios`, the relative gains of the records, their inputs are multiplied
-    by them.
+    by them. A model that hardly follows the output is refused, or not.
     """
     dt = common_sample_time(records)
     latest = None if limit is None else limit * dt
@@ -53,11 +59,16 @@ def fit_any_input(
     scales = np.ones(len(records)) if ratios is None else ratios
     signals = [(y, scale * u) for (y, u), scale in zip(map(_signals, records), scales, strict=True)]
     if len(records) == 1:
-        found = _fit(records, signals, dt, latest, settings)
+        found = _fit(records, signals, dt, latest, settings, refuses)
         return _summary(found, found.fit, records, used, limit, ()), found.fit
     while True:
         found = _fit(
-            tuple(records[i] for i in used), [signals[i] for i in used], dt, latest, settings
+            tuple(records[i] for i in used),
+            [signals[i] for i in used],
+            dt,
+            latest,
+            settings,
+            refuses,
         )
         own = [found.own_delay(*pair) for pair in signals]
         repeats = _repeatability(own, records, used, found.fit.dead_time)
@@ -82,14 +93,15 @@ def _fit(
     dt: float,
     latest: float | None,
     settings: Mapping[str, Any],
+    refuses: bool,
 ) -> SampledFit:
     for record in records:
         _check_moves(record)
     outputs, inputs = zip(*signals, strict=True)
     found = fit_sampled(outputs, inputs, dt, latest=latest, **settings)
-    if found.explained < FOLLOWS:
+    if refuses and found.explained < FOLLOWS:
         codes = [code for y in found.data.measured if (code := missing_code(y))]
-        raise DataError(
+        raise UnrelatedError(
             f"{_named(records)}: the output does not respond to the input (the best model "
             f"lowers the sum of squares by {found.explained:.3g} noise variances, expected at "
             f"least {FOLLOWS:g}); "

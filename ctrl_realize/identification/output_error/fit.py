@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import Literal, TypedDict
@@ -30,7 +30,7 @@ from ..process_structures import Structures, requested
 from ..step.steps import found_step
 from .actuated.alternatives import ASKED, Asked
 from .actuated.fit import with_actuator
-from .any_input import fit_any_input
+from .any_input import UnrelatedError, fit_any_input
 from .averaging import (
     aligned_steps,
     delay_outliers,
@@ -220,21 +220,19 @@ def fit_output_error(
         "huber": loss == "huber",
         "whiten": noise == "auto",
     }
-    if len(several) > 1:
-        # If all records are complete step experiments they can be averaged.
-        stepped = all(not record.n_missing and _edges(record) for record in several)
-        way = _fit_mean if stepped else fit_any_input
-        if gains == "own":
-            start = relative_gains(aligned_steps(several)) if stepped else None
-            result, _ = fit_own_gains(several, partial(way, several, limit, settings), start)
-        else:
-            result, _ = way(several, limit, settings)
-        result = replace(result, flags=result.flags + same_record_flags(several))
-    else:
-        result, _ = _fit_one(several[0], limit, settings)
-    result = checked(result, alone=known is None)
-    if actuator is not None:
+    linear = partial(_linear, several, limit, settings, own_gains=gains == "own")
+    try:
+        result = checked(linear(), alone=known is None)
+        if actuator is not None:
+            result = with_actuator(result, actuator, settings["structures"])
+    except UnrelatedError:
+        if actuator is None:
+            raise
+        # Beside what an actuator does, no linear model need follow the output.
+        result = checked(linear(refuses=False), alone=known is None)
         result = with_actuator(result, actuator, settings["structures"])
+        if result.actuator is None:
+            raise
     core = fitted_core(result.estimate, result.poles)
     if include_known and known is not None:
         core = ct.ss(known) * core
@@ -249,12 +247,38 @@ class _Settings(TypedDict):
     whiten: bool
 
 
+def _linear(
+    several: tuple[Record, ...],
+    limit: float | None,
+    settings: _Settings,
+    *,
+    own_gains: bool,
+    refuses: bool = True,
+) -> OutputErrorFit:
+    """Fit linear models. One that hardly follows the output is refused, or not."""
+    any_input = partial(fit_any_input, refuses=refuses)
+    if len(several) == 1:
+        return _fit_one(several[0], limit, settings, any_input)[0]
+    # If all records are complete step experiments they can be averaged.
+    stepped = all(not record.n_missing and _edges(record) for record in several)
+    way = _fit_mean if stepped else any_input
+    if own_gains:
+        start = relative_gains(aligned_steps(several)) if stepped else None
+        result, _ = fit_own_gains(several, partial(way, several, limit, settings), start)
+    else:
+        result, _ = way(several, limit, settings)
+    return replace(result, flags=result.flags + same_record_flags(several))
+
+
 def _fit_one(
-    record: Record, limit: float | None, settings: _Settings
+    record: Record,
+    limit: float | None,
+    settings: _Settings,
+    any_input: Callable[..., tuple[OutputErrorFit, OutputErrorEstimate]],
 ) -> tuple[OutputErrorFit, OutputErrorEstimate]:
     data = _step_data(record)
     if data is None:
-        return fit_any_input((record,), limit, settings)
+        return any_input((record,), limit, settings)
     latest = None if limit is None else limit * record.dt
     fit = fit_step_record(data, latest=latest, **settings)
     flags = fit_flags(data, fit, limit)

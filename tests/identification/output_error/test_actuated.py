@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import zlib
+
 import control as ct
 import numpy as np
 import pytest
 
 import ctrl_realize as cr
+from benchmarks.actuators.cases import both_ends
 from ctrl_realize.actuators import (
     Backlash,
     Characteristic,
@@ -142,6 +145,18 @@ def test_what_a_valve_does_is_named_and_told_with_intervals(asked, actuator, com
     moved, true = (one.simulate(command, DT) for one in (found.model, actuator))
     moved, true = ((one - one[0]) / np.ptp(one) for one in (moved, true))
     assert np.std(moved - true) < 0.03
+
+
+def test_no_linear_model_need_follow_what_a_valve_does():
+    trial = both_ends(np.random.default_rng([2, zlib.crc32(b"both_ends")]))
+    with pytest.raises(cr.errors.DataError, match="does not respond"):
+        cr.fit_output_error(trial.records, structures=trial.structures)
+    fit = cr.fit_output_error(
+        trial.records, actuator=trial.actuator, structures=trial.structures
+    ).fit
+    for name, truth in trial.values.items():
+        assert fit.actuator[name].low <= truth <= fit.actuator[name].high
+    assert fit.interval[0] <= trial.dead_time <= fit.interval[1]
 
 
 def test_records_at_several_positions_tell_a_characteristic_together():
