@@ -134,6 +134,9 @@ def _end(
         if start is not member:
             x = task.moved(member.x, index, value)
             found = min(found, task.improved(x, fixed=[index], turns=_TURNS), key=_cost)
+        if index == 0 and found.cost > member.cost + CHI2_95 * variance:
+            # Other lags belong to another dead time, and the way to them may be long.
+            found = task.improved(found.x, fixed=[index])
         excess = max((found.cost - member.cost) / variance, 0.0)
         return found, float(np.sqrt(excess)) - _EDGE
 

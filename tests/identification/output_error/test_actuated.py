@@ -18,6 +18,8 @@ from ctrl_realize.actuators import (
     Saturation,
     SlewRateLimit,
 )
+from ctrl_realize.numerics.actuators.limits import slew_limited
+from tests import rigs
 
 DT, DEAD_TIME = 0.1, 0.73
 PLANT = cr.delayed_ss(2 * ct.tf([1], [0.5, 1.5, 1]), dead_time=DEAD_TIME, dt=DT)
@@ -59,6 +61,20 @@ def test_a_single_large_step_tells_a_slew_rate_and_the_dead_time_behind_it():
     other = through(SlewRateLimit(12.0), staircase(-25.0, hold=150), 3)
     follows = cr.compare({"linear": linear_system, "actuator": system}, other).fit_percent
     assert follows["actuator"] > 97 > follows["linear"]
+
+
+def test_at_every_dead_time_other_lags_are_the_best_and_an_interval_follows_them_all_the_way():
+    # noise of 2 % hides the pair of R3: from one end of the interval to the other it must change
+    # by more than a few steps of a search
+    k, delay = np.arange(700.0), 37.3
+    demand = rigs.exact_step(rigs.R3, (k - 200 - delay) * rigs.TS)
+    noise = 0.02 * np.random.default_rng(2).standard_normal(k.size)
+    y = slew_limited(demand, 4.0, 4.0, rigs.TS) + noise
+    record = cr.Record(k * rigs.TS, np.where(k < 200, 0.0, 1.0), y)
+    fit = cr.fit_output_error(record, actuator="slew_rate", structures=[(3, 3)]).fit
+    assert fit.actuator is not None
+    low, high = np.array(fit.interval) / rigs.TS
+    assert low < delay < high < delay + 20
 
 
 def test_records_of_several_sizes_share_dead_band_and_linear_part():
