@@ -5,6 +5,7 @@ from __future__ import annotations
 from .definitions import DEFINITIONS, Definition
 from .evaluate import valve_report
 from .groups import Interval, SizeAndDirection
+from .limits import EXAMPLE_LIMITS, ExampleLimits
 from .loops.diagnose import diagnose_loop
 from .loops.methods import LoopMethod
 from .loops.result import LoopDiagnosis
@@ -19,7 +20,9 @@ from .steps import Ranges, StepMetrics
 
 __all__ = [
     "DEFINITIONS",
+    "EXAMPLE_LIMITS",
     "Definition",
+    "ExampleLimits",
     "Interval",
     "LoopDiagnosis",
     "LoopMethod",
