@@ -22,6 +22,8 @@ _MOST_FITTED = 4
 _MOST_SAMPLES = 1500
 """Samples of a step for the fit; more are averaged in blocks."""
 STRUCTURES = ((1, 1), (2, 2), (3, 3))
+STRUCTURES_OF_MORE_LAGS = ((4, 3), (4, 4), (5, 4), (5, 5))
+"""Tried where the data rule out the others: a valve with a slow sensor behind it."""
 """Lags of the linear models that are fitted."""
 
 
@@ -177,22 +179,26 @@ def _fitted_dead_time(steps: list[StepMetrics], records: Sequence[Record]) -> In
         return Interval()
     cut = [cut_out(records[one.record], one) for one in settled]
     found = linear_fit(cut)
+    if found is not None and found[0].interval_kind != "confidence":
+        found = linear_fit(cut, STRUCTURES_OF_MORE_LAGS)
     # no linear model fits a response at a limited rate: it has no dead time to report
     if found is None or found[0].interval_kind != "confidence":
         return Interval()
     return found[1]
 
 
-def linear_fit(records: Sequence[Record]) -> tuple[ModelFit, Interval] | None:
+def linear_fit(
+    records: Sequence[Record], structures: Sequence[tuple[int, int]] = STRUCTURES
+) -> tuple[ModelFit, Interval] | None:
     """Linear model of records with gains of their own, and its dead time; None if there is none."""
     try:
         # What a fit warns of concerns records given by a user, and these are cut out of one.
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", DataWarning)
             if len(records) == 1:
-                fit = identify(records[0], structures=STRUCTURES).fit
+                fit = identify(records[0], structures=structures).fit
             else:
-                fit = identify(records, structures=STRUCTURES, gains="own").fit
+                fit = identify(records, structures=structures, gains="own").fit
     except CtrlRealizeError:
         return None
     if not isinstance(fit, ModelFit) or fit.dead_time is None or fit.interval is None:

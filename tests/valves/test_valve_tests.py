@@ -199,6 +199,22 @@ def test_an_anti_surge_valve_gives_strokes_dead_time_and_overshoot_in_one_call()
     assert not report.steps[0].response.flags.writeable
 
 
+def test_example_limits_have_a_source_and_judge_a_valve():
+    up = np.linspace(0, 100, 1201)
+    command = np.r_[command_of(stairs(), 2.0, 0.1), np.r_[up, up[::-1]]]
+    for backlash, judgement in ((0.3, "met"), (1.5, "not met")):
+        moved = cr.actuators.Backlash(backlash).simulate(command, 0.1)
+        record = record_of(command, moved, 0.01, 1, dt=0.1, dead_time=0.3)
+        for example in valves.EXAMPLE_LIMITS.values():
+            assert example.url.startswith("https://")
+            assert "p. " in example.source
+            report = valves.valve_report(record, limits=example.limits, **QUICK)
+            judged = {one.key: one.judgement for one in report.metrics if one.judgement}
+            assert judged.keys() == example.limits.keys()
+            assert judged.get("dead_band", judgement) == judgement
+            assert judged["linearity"] == "met"
+
+
 def test_a_plan_is_written_and_its_measured_record_tells_every_metric(tmp_path):
     first = record_of(command_of([50, 55], 5.0), command_of([50, 55], 5.0), 0.02, 1)
     plan = valves.valve_test_plan(first, stroke_time=5.0, repeats=2, ramp_time=100.0, stairs=6)

@@ -9,6 +9,7 @@ import control as ct
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
+from scipy.ndimage import median_filter
 
 from ...errors import OptionError
 from ...valves.definitions import DEFINITIONS
@@ -18,6 +19,8 @@ from ...valves.steps import STEP_METRICS
 from .. import style
 from ..shared_docs import documented
 
+_SPIKE = 9
+"""Samples of a median, which leaves steps as they are."""
 _MOST_STEPS = 60
 _MOST_POINTS = 4000
 _SIZE = (8.0, 4.8)
@@ -279,7 +282,10 @@ def _draw_sizes(
         ticks = sorted({float(f"{one.size:.2g}") for one in known})
         axes.set_xticks(ticks, [f"{tick:g}" for tick in ticks])
         axes.minorticks_off()
-        axes.set_ylim(bottom=min(0.0, axes.get_ylim()[0]))
+        ends = [factor * end for one in known
+                for end in (one.estimates[metric].low, one.estimates[metric].high)]  # fmt: skip
+        low, high = min(0.0, *ends), max(0.0, *ends)
+        axes.set_ylim(low - (0.08 * (high - low) if low < 0 else 0.0), high + 0.08 * (high - low))
     else:
         _say_nothing(axes, "unknown for all sizes")
     name = "slew rate" if metric == "slew_rate" else definition.name
@@ -292,7 +298,8 @@ def _draw_loop(axes: Axes, report: ValveReport, looks: dict[str, Any]) -> list[L
     ranges = report.ranges
     few = report.records[:: max(len(report.records) // 20, 1)]
     for k, record in enumerate(few):
-        u, y = np.ravel(record.input), np.ravel(record.output)
+        # short spikes of the command, as switching leaves them, are not what the valve was asked
+        u, y = median_filter(np.ravel(record.input), _SPIKE), np.ravel(record.output)
         # corners of the loop are between neighbouring samples: samples are only left out evenly
         every = max(u.size // _MOST_POINTS, 1)
         own = {"color": _colours(max(len(few), 2))[k] if len(few) > 1 else style.MEASURED,
@@ -317,9 +324,10 @@ def _draw_signature(axes: Axes, report: ValveReport, looks: dict[str, Any]) -> l
             continue
         own = {"color": colour, "linestyle": line, "marker": marker, "markersize": 3.5,
                "linewidth": 1.2, "label": way, **looks}  # fmt: skip
-        lines += axes.plot(curve.command, values - curve.command, **own)
+        if np.isfinite(values).sum() > 1:
+            lines += axes.plot(curve.command, values - curve.command, **own)
     if not lines:
-        _say_nothing(axes, "no slow ramp, and no levels")
+        _say_nothing(axes, "needs a slow ramp, or several levels in one record")
     axes.set(xlabel="command [% of span]", ylabel="position - command [%]")
     return lines
 
