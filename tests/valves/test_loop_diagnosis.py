@@ -7,11 +7,13 @@ import pytest
 
 import ctrl_realize as cr
 from ctrl_realize.errors import DataError, OptionError
+from ctrl_realize.numerics.actuators.friction import kano, kano_rows
 from ctrl_realize.numerics.oscillation.cross_correlation import cross_correlation
 from ctrl_realize.numerics.oscillation.cycles import crossings, find_cycles, without_drift
 from ctrl_realize.numerics.oscillation.ellipse import fit_ellipse
 from ctrl_realize.numerics.oscillation.half_cycles import half_cycles
 from ctrl_realize.numerics.oscillation.movements import movement_indices
+from ctrl_realize.numerics.oscillation.rests import rests
 
 LOOPS = Path(__file__).resolve().parents[3] / "shared" / "data" / "valve_loops"
 STICKS, NOT_SO = "stiction", "no stiction: tuning or external oscillation"
@@ -94,6 +96,33 @@ def test_movements_of_a_valve_that_sticks_half_of_the_time():
     assert movement_indices(op, op, 64.0) == pytest.approx((0.0, 0.0), abs=0.03)
 
 
+def test_rests_of_a_parallelogram_have_its_sides():
+    op = np.abs((TIME % 64) - 32)
+    position = np.clip(np.abs(((TIME - 8) % 64) - 32), 8, 24)  # moves half of the time
+    found = rests(op - op.mean(), position - position.mean(), 64.0)
+    assert found.part == pytest.approx(0.5, abs=0.15)  # the ends of a movement count as rest
+    # of its swing, 2 sqrt(2) standard deviations, OP moves from a corner to the middle and back
+    assert found.side == pytest.approx(16 / (2 * np.sqrt(2) * op.std()), abs=0.15)
+    assert rests(op - op.mean(), op - op.mean(), 64.0).part < 0.05
+    assert rests(op * 0.0, op, 64.0) is None
+
+
+def test_commands_of_many_pairs_of_S_and_J_move_the_stem_as_those_of_one():
+    command = np.cumsum(np.random.default_rng(3).standard_normal(300))
+    stick, jump = np.array([0.0, 2.0, 3.0, 3.0]), np.array([0.0, 0.5, 0.0, 3.0])
+    moved = kano_rows(command, stick, jump, {0: 1.0})
+    for row, S, J in zip(moved, stick, jump, strict=True):
+        assert np.allclose(row, kano(command, S, J, start=1.0))
+    # on a ramp the last move is up: to be told so changes nothing, the contrary puts the stem down
+    ramp = np.arange(20.0)
+    plain, up, down = (
+        kano_rows(ramp, stick, jump, {0: 1.0, **more}) for more in ({}, {12: 1.0}, {12: -1.0})
+    )
+    assert np.array_equal(plain, up)
+    assert np.array_equal(plain[:, :12], down[:, :12])
+    assert np.allclose(down[:, 12], 12 + (stick - jump) / 2)
+
+
 @pytest.mark.parametrize("process", ["flow", "integrating"])
 def test_the_fit_finds_the_stiction_of_a_simulated_loop_and_none_in_a_linear_one(process):
     sticking = cr.bench.valve_loop(cr.actuators.KanoStiction(5, 2), process=process, noise=0.05)
@@ -105,6 +134,11 @@ def test_the_fit_finds_the_stiction_of_a_simulated_loop_and_none_in_a_linear_one
         # of the swing: a linear loop has a stem that could stick by as much unseen
         assert abs(fit.S - truth) < 0.1 * truth + 0.25 * (truth == 0) * fit.swing
         assert fit.S_range[0] <= fit.S <= fit.S_range[1]
+        if truth:  # the model of valve and process is the true one, and the noise white
+            assert fit.independent
+            assert pytest.approx(truth, rel=0.01) == fit.S
+            assert fit.S_range[0] <= truth <= fit.S_range[1] < 1.1 * truth
+            assert fit.J_range[0] <= 2 <= fit.J_range[1] < 5
         assert (fit.significance > 2 and fit.error < 0.7 * fit.linear_error) == (truth > 0)
         assert fit.gain > 0
     assert cr.valves.diagnose_loop(-record.input, record.output, dt=1.0).stiction_fit.gain < 0

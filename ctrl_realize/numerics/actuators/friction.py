@@ -27,6 +27,7 @@ References
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
@@ -124,6 +125,42 @@ def kano(position: FloatArray, stick: float, jump: float, start: float = 0.0) ->
         last, slope = command, change
         out.append(stem)
     return np.array(out)
+
+
+def kano_rows(
+    position: FloatArray, stick: FloatArray, jump: FloatArray, stops: Mapping[int, float]
+) -> FloatArray:
+    """Stem positions (M, N) for commands `position` (N,) by Kano's model, for M pairs of S and J.
+
+    `stops` tells at which samples, of which the first is one, the stem is known to have stopped
+    after a move up (1) or down (-1): a stem whose last move was another one is put there.
+    """
+    half = (stick - jump) / 2
+    last, slope = float(position[0]), 0.0
+    side, rest = np.ones(stick.shape), np.full(stick.shape, last)
+    stem, moving = last - half, np.zeros(stick.shape, dtype=bool)
+    out = np.empty((position.size, stick.size))
+    # `kano_step` for all pairs at once: a command turns, or pauses, for all of them alike
+    for k, command in enumerate(position.tolist()):
+        change = command - last
+        if k in stops:
+            missed = (side != stops[k]) | (k == 0)
+            side[missed], rest[missed], moving[missed] = stops[k], command, False
+            stem = np.where(missed, command - side * half, stem)
+        if change * slope <= 0:
+            rest[moving] = last
+            moving[:] = False
+        away = side * (command - rest)
+        turns = away < -stick
+        turns &= ~moving
+        if turns.any():
+            side[turns] *= -1
+        moving |= turns
+        moving |= away > jump
+        np.copyto(stem, command - side * half, where=moving)
+        last, slope = command, change
+        out[k] = stem
+    return out.T
 
 
 def choudhury_step(

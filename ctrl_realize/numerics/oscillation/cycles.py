@@ -63,17 +63,17 @@ class Cycles:
 def without_drift(signal: FloatArray, period: float) -> FloatArray:
     """Subtract the moving average over one period; half a period at both ends is left out.
 
-    An even number of samples is averaged with half weights at both ends.
+    `signal` is (..., N). An even number of samples is averaged with half weights at both ends.
     """
-    width = min(max(round(period), 2), signal.size // 2)
+    n = signal.shape[-1]
+    width = min(max(round(period), 2), n // 2)
     half = width // 2
-    if width % 2:
-        weights = np.full(width, 1.0 / width)
-    else:
-        weights = np.r_[0.5, np.ones(width - 1), 0.5] / width
-    mean = np.convolve(signal, weights, mode="valid")
-    middle = signal[half : half + mean.size]
-    return np.asarray(middle - mean)
+    values = signal - signal[..., :1]  # so that the sums are small
+    summed = np.concatenate([np.zeros_like(values[..., :1]), np.cumsum(values, axis=-1)], axis=-1)
+    mean = (summed[..., width:] - summed[..., :-width]) / width
+    if width % 2 == 0:
+        mean = 0.5 * (mean[..., :-1] + mean[..., 1:])
+    return np.asarray(values[..., half : half + mean.shape[-1]] - mean)
 
 
 def smoothed(signal: FloatArray, period: float, part: float) -> FloatArray:

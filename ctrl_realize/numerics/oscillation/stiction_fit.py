@@ -3,10 +3,8 @@
 A model of stiction with S and J is followed by linear dynamics; for each pair the linear part is
 fitted by least squares, and the pair with the smallest error is taken [1]_ [2]_. Here the stiction
 is Kano's [3]_, and the linear part a first-order lag, or an integrator, behind a dead time, with
-output errors. Drift is removed from both sides alike. The grids, the sign of the gain and the range
-are our own: the controller is a PI controller, so that its phase tells the sign of the process; a
-pair is within the range if its squared error over single cycles is not significantly larger than
-that of the best pair.
+output errors. The grids and the sign of the gain are our own: the controller is a PI controller, so
+that its phase tells the sign of the process.
 
 References
 ----------
@@ -21,45 +19,46 @@ References
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
-from scipy.signal import lfilter
 
-from ..actuators.friction import kano
 from ..arrays import FloatArray
-from ..constants import Z_95
 from .cycles import without_drift
+from .stiction_model import StickingLoop, Trial
+from .stiction_region import INDEPENDENT, Region, near, near_delays, resolution
 
 FEWEST_BLOCKS = 6
 """Cycles, whose errors are compared."""
-MOST_CYCLES, MOST_PER_CYCLE = 25, 120
-"""Of the middle of a record that are used, and samples of a cycle to which it is thinned out."""
+MOST_CYCLES, MOST_SAMPLES = 25, 6000
+"""Of the middle of a record that are used."""
 _LAGS = np.array([0.0, 0.02, 0.05, 0.1, 0.2, 0.4, 1.0, 3.0])
 """Time constants over the period."""
-_LONGEST_DELAY, _DELAYS = 0.6, 40
-_COARSE, _JUMPS = np.linspace(0.05, 1.2, 24), np.linspace(0, 1, 6)
-"""First grid: S over the swing, and J over S."""
-_FINE, _FINE_JUMPS = 0.0125 * np.arange(-10, 11), np.linspace(0, 1, 17)
-"""Second grid, about the best S, with the lags about the best one."""
-_FINEST = 0.004 * np.arange(-3, 4)
-"""Third grid: changes of S and J over the swing."""
-_ALIKE = 1.1
-"""Errors up to this multiple of the smallest are alike, because the linear part is a rough one."""
-_NEAR = 1.5
-"""Errors above this multiple of the smallest are not compared cycle by cycle."""
+_PER_CYCLE, _DELAYS = 40, 20
+"""Samples of a cycle and dead times in the first search."""
+_STICKS: FloatArray = np.r_[0.01:0.2:0.02, 0.2 * 1.012 ** np.arange(180.0)]
+"""First grid: S over the swing of the fundamental."""
+_JUMPS, _JUMPS_OF_LEVEL = np.linspace(0, 1, 8), np.linspace(0, 1, 21)
+"""First grid: J over S. A level remembers slips: a J that is wrong by 2 % of S is as bad as any."""
+_VALLEYS, _APART, _STARTS = 3, 0.03, 2
+"""Best pairs of the first grid that are followed, and their distance in S over the swing."""
+_STEPS = 8
+_NARROW, _NARROW_JUMPS = 0.002 * np.arange(-16, 17), 0.04 * np.arange(-5, 6)
+"""Grid, over S, for a stem that is at rest once and not in every cycle. If S is half a per cent too
+large, it misses a slip, after which it may never slip again: a smaller error is easily missed."""
 
 
 @dataclass(frozen=True)
 class StictionFit:
     """Stiction of a Hammerstein model, in the unit of the controller output.
 
-    ``S``, ``J`` with the ends of their ranges; ``swing`` is that of the output, peak to peak
-    of its fundamental; ``error`` and ``linear_error`` are the parts of the power of the process
-    value that the models with and without stiction leave; ``gain``, ``lag`` (inf for an
-    integrator) and ``delay`` in samples are those of the linear part; ``significance`` is the
-    mean difference of the errors of a cycle over its standard error.
+    ``S``, ``J`` with the ends of their 95 % confidence intervals; they are only ranges of similar
+    errors where ``correlation_time`` of the residual, in samples, is above 2. ``swing`` is that of
+    the output, peak to peak of its fundamental; ``error`` and ``linear_error`` are the parts of the
+    power of the process value that the models with and without stiction leave; ``gain``, ``lag``
+    (inf for an integrator) and ``delay`` in samples are those of the linear part; ``significance``
+    is the mean difference of the errors of a cycle over its standard error.
     """
 
     S: float
@@ -73,15 +72,12 @@ class StictionFit:
     gain: float
     lag: float
     delay: int
+    correlation_time: float
 
-
-class _Point(NamedTuple):
-    error: float
-    stick: float
-    jump: float
-    gain: float
-    lag: float
-    delay: int
+    @property
+    def independent(self) -> bool:
+        """Whether the errors of the samples are, so that the intervals hold what they promise."""
+        return self.correlation_time <= INDEPENDENT
 
 
 def fit_stiction(
@@ -92,67 +88,119 @@ def fit_stiction(
     `phase` is that of the output before the value, in rad, at the oscillation. None if there are
     fewer than `FEWEST_BLOCKS` cycles, or no linear part with the sign of the process fits.
     """
-    every = max(int(period // MOST_PER_CYCLE), 1)
-    output, value, period = output[::every], value[::every], period / every
-    most = round(MOST_CYCLES * period)
+    most = min(round(MOST_CYCLES * period), max(MOST_SAMPLES, round((FEWEST_BLOCKS + 4) * period)))
     start = max((output.size - most) // 2, 0)
     output, value = output[start : start + most], value[start : start + most]
     if output.size < (FEWEST_BLOCKS + 2) * period:
         return None
     # a PI controller lags by 0 to 90 degrees behind minus the value, for a process of gain > 0
     sign = 1.0 if np.cos(phase - 0.75 * np.pi) > 0 else -1.0
-    task = _Task(output, value, period, sign, integrating)
-    linear = task.best(0.0, 0.0, task.lags)
-    swing = 2 * np.sqrt(2) * float(without_drift(output, period).std())
-    points = _searched(task, swing)
-    best = min(points, key=_by_error)
+    swing = 2 * float(np.sqrt(2) * without_drift(output, period).std())
+    if swing == 0:
+        return None
+    every = max(output.size // MOST_SAMPLES, 1)
+    coarse = max(int(period // _PER_CYCLE), every)
+    rough = StickingLoop(output, value, period, sign, coarse)
+    loop = StickingLoop(output, value, period, sign, every)
+    lags = [np.inf] if integrating else (_LAGS * rough.period).tolist()
+    if rough.power == 0:
+        return None
+    valleys = sorted(
+        _followed(loop, seed, swing, coarse / every, starts)
+        for starts, levels in ((loop.every_cycle, _STICKS[::3]), (loop.once, _STICKS))
+        for seed in _valleys(rough, levels, swing, lags, starts[:_STARTS])
+    )
+    best = min(_once(loop, one, swing) for one in valleys[:2])
+    linear = loop.linear([each * coarse / every for each in lags], range(loop.longest + 1))
     if linear.gain == 0 or best.gain == 0:
         return None
-    blocks = task.blocks(best)
-    alike = [
-        one
-        for one in points
-        if one.error <= _ALIKE * best.error
-        or (one.error <= _NEAR * best.error and _larger(task.blocks(one), blocks) < Z_95)
-    ]
-    sticks, jumps = [one.stick for one in alike], [one.jump for one in alike]
+    region = Region(loop, best, swing)
+    best, margin = region.best, resolution(output)
+    sticks, jumps = region.ends(valleys)
     return StictionFit(
-        best.stick, (min(sticks), max(sticks)), best.jump, (min(jumps), max(jumps)), swing,
-        best.error, linear.error, _larger(task.blocks(linear), blocks), best.gain,
-        every * best.lag, every * best.delay,
+        best.stick, (max(sticks[0] - margin, 0.0), sticks[1] + margin), best.jump, jumps, swing,
+        best.error, linear.error, _larger(_blocks(loop, linear), _blocks(loop, best)), best.gain,
+        every * best.lag, every * best.delay, region.correlation_time,
     )  # fmt: skip
 
 
-def _searched(task: _Task, swing: float) -> list[_Point]:
-    """Try pairs of S and J on three grids, each about the best pair of the one before."""
-    points = [
-        task.best(stick, part * stick, task.lags) for stick in swing * _COARSE for part in _JUMPS
-    ]
-    center = min(points, key=_by_error)
-    near = _about(center.lag, 1.4)
-    points += [
-        task.best(stick, part * stick, near)
-        for stick in center.stick + swing * _FINE
-        for part in _FINE_JUMPS
-        if stick > 0
-    ]
-    center = min(points, key=_by_error)
-    near = _about(center.lag, 1.2)
-    points += [
-        task.best(stick, jump, near)
-        for stick in center.stick + swing * _FINEST
-        for jump in center.jump + swing * _FINEST
-        if stick > 0 and 0 <= jump <= stick
-    ]
-    return points
+def _valleys(
+    loop: StickingLoop,
+    levels: FloatArray,
+    swing: float,
+    lags: Sequence[float],
+    starts: Sequence[int],
+) -> list[Trial]:
+    """Best pairs of the first grid, with S over the swing at `levels`, apart from one another."""
+    parts = _JUMPS_OF_LEVEL if np.isinf(lags[0]) else _JUMPS
+    sticks = swing * np.repeat(levels, parts.size)
+    jumps = sticks * np.tile(parts, levels.size)
+    delays = np.unique(np.linspace(0, loop.longest, _DELAYS).astype(int)).tolist()
+    found: list[Trial] = []
+    for one in sorted(loop.best(sticks, jumps, lags, delays, starts)):
+        if all(abs(one.stick - other.stick) > _APART * swing for other in found):
+            found.append(one)
+            if len(found) == _VALLEYS:
+                break
+    return found
 
 
-def _about(lag: float, factor: float) -> list[float]:
-    return [lag] if np.isinf(lag) else [lag / factor, lag, lag * factor]
+def _followed(
+    loop: StickingLoop, seed: Trial, swing: float, thinner: float, starts: Sequence[int]
+) -> Trial:
+    """Search about a pair on smaller and smaller grids; `thinner` is the ratio of the samples."""
+    lag, delay = seed.lag * thinner, round(seed.delay * thinner)
+    best = seed._replace(error=np.inf, lag=lag, delay=delay)
+    stick_step, jump_step, factor = 0.007 * swing, 0.1 * seed.stick, 1.3
+    reach = max(round(thinner), 2)
+    for _ in range(_STEPS):
+        delays = near_delays(loop, best.delay, reach)
+        new = min(_about(loop, best, (stick_step, jump_step), factor, delays, starts))
+        starts = [new.start]
+        far = abs(new.stick - best.stick) > stick_step or abs(new.jump - best.jump) > jump_step
+        if not far or new.error >= best.error:
+            stick_step, jump_step, factor = 0.6 * stick_step, 0.7 * jump_step, factor**0.6
+        best, reach = min(best, new), min(reach, 2)
+    return best
 
 
-def _by_error(point: _Point) -> float:
-    return point.error
+def _about(
+    loop: StickingLoop,
+    best: Trial,
+    steps: tuple[float, float],
+    factor: float,
+    delays: Sequence[int],
+    starts: Sequence[int],
+) -> list[Trial]:
+    """Try a grid about a pair."""
+    sticks, jumps = np.meshgrid(
+        best.stick + steps[0] * np.arange(-2, 3), best.jump + steps[1] * np.arange(-2, 3)
+    )
+    inside = (sticks > 0) & (jumps >= 0) & (jumps <= sticks)
+    lags = near(best.lag, factor, loop.period)
+    return loop.best(sticks[inside], jumps[inside], lags, delays, starts)
+
+
+def _once(loop: StickingLoop, best: Trial, swing: float) -> Trial:
+    """Search about a pair for one that fits if the stem is put to rest only once."""
+    sticks, parts = np.meshgrid(best.stick * (1 + _NARROW), best.jump / best.stick + _NARROW_JUMPS)
+    inside = (parts >= 0) & (parts <= 1)
+    sticks, jumps = sticks[inside], (sticks * parts)[inside]
+    delays = near_delays(loop, best.delay, 2)
+    found = min(loop.best(sticks, jumps, [best.lag], delays, loop.once))
+    steps, factor = (0.001 * best.stick, 0.02 * best.stick), 1.1
+    for _ in range(_STEPS // 2):
+        delays = near_delays(loop, found.delay, 2)
+        found = min(found, *_about(loop, found, steps, factor, delays, [found.start]))
+        steps, factor = (0.7 * steps[0], 0.7 * steps[1]), factor**0.7
+    return min(best, found)
+
+
+def _blocks(loop: StickingLoop, trial: Trial) -> FloatArray:
+    """Sums of the squared errors over single cycles."""
+    left, length = loop.residual(trial), round(loop.period)
+    count = left.size // length
+    return np.asarray((left[: count * length] ** 2).reshape(count, length).sum(axis=1))
 
 
 def _larger(first: FloatArray, second: FloatArray) -> float:
@@ -160,67 +208,3 @@ def _larger(first: FloatArray, second: FloatArray) -> float:
     difference = first - second
     spread = float(difference.std(ddof=1)) / np.sqrt(difference.size)
     return float(difference.mean()) / spread if spread > 0 else 0.0
-
-
-class _Task:
-    """A record, and the linear parts that are tried."""
-
-    def __init__(
-        self, output: FloatArray, value: FloatArray, period: float, sign: float, integrating: bool
-    ) -> None:
-        self.output, self.period, self.sign = output, period, sign
-        self.lags = [np.inf] if integrating else (_LAGS * period).tolist()
-        longest = int(_LONGEST_DELAY * period)
-        self.delays = np.unique(np.linspace(0, longest, min(longest, _DELAYS) + 1).astype(int))
-        self.longest = int(self.delays[-1])
-        self.value = without_drift(value, period)[self.longest :]
-        self.power = float(self.value @ self.value)
-
-    def best(self, stick: float, jump: float, lags: list[float]) -> _Point:
-        """Fit the linear part for one pair of S and J."""
-        found = _Point(1.0, stick, jump, 0.0, 0.0, 0)
-        position = self._position(stick, jump)
-        if self.power == 0 or np.ptp(position) == 0:
-            return found
-        for lag in lags:
-            late = self._lagged(position, lag)
-            squares = np.r_[0.0, np.cumsum(late * late)]
-            ends = late.size - self.delays
-            starts = self.longest - self.delays
-            powers = squares[ends] - squares[starts]
-            products = np.correlate(late, self.value, mode="valid")[self.longest - self.delays]
-            good = (powers > 0) & (self.sign * products > 0)
-            if not good.any():
-                continue
-            gains = np.where(good, products / np.where(good, powers, 1.0), 0.0)
-            errors = 1 - gains * products / self.power
-            k = int(np.argmin(errors))
-            if errors[k] < found.error:
-                found = _Point(
-                    max(float(errors[k]), 0.0), stick, jump, float(gains[k]), lag,
-                    int(self.delays[k]),
-                )  # fmt: skip
-        return found
-
-    def blocks(self, point: _Point) -> FloatArray:
-        """Sums of the squared errors over single cycles."""
-        late = self._lagged(self._position(point.stick, point.jump), point.lag)
-        start = self.longest - point.delay
-        left = self.value - point.gain * late[start : start + self.value.size]
-        length = round(self.period)
-        count = left.size // length
-        return np.asarray((left[: count * length] ** 2).reshape(count, length).sum(axis=1))
-
-    def _position(self, stick: float, jump: float) -> FloatArray:
-        return self.output if stick == 0 else kano(self.output, stick, jump)
-
-    def _lagged(self, position: FloatArray, lag: float) -> FloatArray:
-        """Response of the lag, or of an integrator, without drift."""
-        if np.isinf(lag):
-            late = np.cumsum(position - position.mean())
-        elif lag > 0:
-            decay = np.exp(-1 / lag)
-            late = position[0] + lfilter([1 - decay], [1, -decay], position - position[0])
-        else:
-            late = position
-        return without_drift(late, self.period)

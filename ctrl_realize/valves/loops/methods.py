@@ -19,6 +19,7 @@ from ...numerics.oscillation.cross_correlation import (
 from ...numerics.oscillation.cycles import Cycles
 from ...numerics.oscillation.half_cycles import HalfCycles
 from ...numerics.oscillation.movements import LIMIT
+from ...numerics.oscillation.rests import REST_LIMIT, REST_NONE, Rests
 from ...numerics.oscillation.stiction_fit import FEWEST_BLOCKS, StictionFit
 
 LoopProcess: TypeAlias = Literal["self-regulating", "flow", "integrating"]
@@ -42,6 +43,7 @@ _SOURCES = {
     "curve_fit": "He et al. 2007",
     "relay_fit": "Rossi and Scali 2005",
     "movements": "Yamashita 2006",
+    "rests": "Kano et al. 2004, method A",
     "stiction_fit": "Srinivasan et al. 2005; Jelali 2008",
     "bicoherence": "Choudhury, Shah and Thornhill 2004",
 }
@@ -53,6 +55,7 @@ _NAMES = {
     "curve_fit": "curve fit: sine or triangle",
     "relay_fit": "relay fit",
     "movements": "movements of OP and flow",
+    "rests": "rests of the flow (parallelogram)",
     "stiction_fit": "fit of stiction (Hammerstein)",
     "bicoherence": "bicoherence",
 }
@@ -188,6 +191,24 @@ def movements(found: tuple[float, float] | None, process: LoopProcess, note: str
         return _method("movements", "OP, PV", np.nan, limit, "not applicable", note=note)
     said: MethodVerdict = "stiction" if min(found) >= LIMIT else "cannot tell"
     return _method("movements", "OP, PV", found[0], limit, said, found[1])
+
+
+def flow_rests(found: Rests | None, process: LoopProcess, note: str) -> LoopMethod:
+    """Judge by the part of the time in which the flow rests while OP moves.
+
+    Not counted in the verdict: it tells the same as `movements`.
+    """
+    limit = f"stiction from {REST_LIMIT:g}, none up to {REST_NONE:g}"
+    if process != "flow":
+        note = "for flows, or a measured position, only: process='flow'"
+    if found is None or process != "flow":
+        note = note or "nothing moves"
+        return _method("rests", "OP, PV", np.nan, limit, "not applicable", note=note)
+    said: MethodVerdict = (
+        "stiction" if found.part >= REST_LIMIT
+        else "no stiction" if found.part <= REST_NONE else "cannot tell"
+    )  # fmt: skip
+    return _method("rests", "OP, PV", found.part, limit, said, found.side)
 
 
 def stiction_fit(found: StictionFit | None, note: str) -> LoopMethod:

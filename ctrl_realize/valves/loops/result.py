@@ -52,7 +52,9 @@ class LoopDiagnosis(Result):
         Of the fundamentals of controller output and process value.
     stiction_fit : StictionFit or None
         Kano's model of stiction and a linear process fitted to the record: ``S`` and ``J`` with
-        their ranges, in the unit of OP, and the errors with and without stiction.
+        ``S_range`` and ``J_range``, in the unit of OP, and the errors with and without stiction.
+        The ranges are confidence intervals of 95 % if ``independent``: if the residual is white, so
+        that valve and process are those of the model; otherwise pairs with similar errors.
     flags : tuple of Flag
     choices : tuple of str
 
@@ -143,8 +145,9 @@ class LoopDiagnosis(Result):
             rows.append(("apparent stiction (ellipse)", f"{self.apparent_stiction:.3g}"))
         if self.verdict == "stiction" and self.stiction_fit is not None:
             fit = self.stiction_fit
+            word = "95 %:" if fit.independent else "similar errors:"
             for name, value, ends in (("S", fit.S, fit.S_range), ("J", fit.J, fit.J_range)):
-                told = f"{value:.3g} (range {ends[0]:.3g} to {ends[1]:.3g})"
+                told = f"{value:.3g} ({word} {ends[0]:.3g} to {ends[1]:.3g})"
                 rows.append((f"apparent {name} (fit)", told))
         for one in self.methods:
             indices = [f"{each:.3g}" for each in (one.index, one.second_index) if each == each]

@@ -1,0 +1,177 @@
+"""Kano's model of stiction and a linear process behind it, compared with a record of a loop.
+
+The linear part is a first-order lag, or an integrator, behind a dead time; its gain is fitted by
+least squares, its lag and dead time are searched. Drift is removed from both sides alike.
+
+Where the stem was before the record decides whether it slips in the first cycle, and a slip that is
+missed may never be made up for: the output then swings about another level by less than S. In a
+limit cycle the stem stopped where the output turned. So the stem is tried at rest at the largest
+and at the smallest output of the first half cycles; and at that of every cycle, so that what is
+missed in one does no harm in the next. This is our own.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+from scipy.signal import lfilter
+
+from ..actuators.friction import kano_rows
+from ..arrays import FloatArray
+from .cycles import crossings, smoothed, without_drift
+
+_LONGEST_DELAY = 0.6
+"""Over the period."""
+_HALF_CYCLES = 3
+"""At whose extremes of the output the stem is tried at rest."""
+_SMOOTHED = 0.25
+"""Part of a period over which the output is averaged before its half cycles are told apart."""
+_AT_ONCE = 3_000_000
+"""Samples that are simulated at once: some tens of megabytes."""
+
+
+class Trial(NamedTuple):
+    """One pair of S and J with its best linear part; `error` is the part of power that is left."""
+
+    error: float
+    stick: float
+    jump: float
+    gain: float
+    lag: float
+    delay: int
+    start: int
+
+
+class StickingLoop:
+    """Output and value (N,) of a loop, and the models that are compared with them.
+
+    The linear part sees means over `every` samples, of which the value is thinned out; lags and
+    delays are in thinned samples. `sign` is that of the gain.
+    """
+
+    def __init__(
+        self, output: FloatArray, value: FloatArray, period: float, sign: float, every: int = 1
+    ) -> None:
+        self.output, self.period, self.sign, self.every = output, period / every, sign, every
+        half = max(round(period / 2), 1)
+        once = [
+            {first + int(place(output[first : first + half])): side}
+            for first in range(0, _HALF_CYCLES * half, half)
+            for place, side in ((np.argmax, 1.0), (np.argmin, -1.0))
+        ]
+        cycles = _stops_of_cycles(output, period)
+        self.starts = (*cycles, *once)
+        self.every_cycle = range(len(cycles))
+        self.once = range(len(cycles), len(self.starts))
+        self.longest = max(int(_LONGEST_DELAY * self.period), 1)
+        self._first = self.longest + -(-_HALF_CYCLES * half // every)
+        self.value = without_drift(self._thinned(value[None]), self.period)[0, self._first :]
+        self.power = float(self.value @ self.value)
+
+    def linear(self, lags: Sequence[float], delays: Sequence[int]) -> Trial:
+        """Fit the linear part without stiction."""
+        return self._best(self._thinned(self.output[None]), np.zeros(1), np.zeros(1), lags, delays)[
+            0
+        ]
+
+    def best(
+        self,
+        sticks: FloatArray,
+        jumps: FloatArray,
+        lags: Sequence[float],
+        delays: Sequence[int],
+        starts: Sequence[int],
+    ) -> list[Trial]:
+        """Fit the linear part for each pair of S and J (M,); the best of the starts is taken."""
+        found = []
+        rows = max(_AT_ONCE // self.output.size, 1)
+        for first in range(0, sticks.size, rows):
+            stick, jump = sticks[first : first + rows], jumps[first : first + rows]
+            of_starts = [
+                self._best(self._positions(stick, jump, start), stick, jump, lags, delays, start)
+                for start in starts
+            ]
+            found += [min(each) for each in zip(*of_starts, strict=True)]
+        return found
+
+    def residual(self, trial: Trial) -> FloatArray:
+        """Value minus the model, without drift."""
+        position = (
+            self._thinned(self.output[None])
+            if trial.stick == 0
+            else self._positions(np.array([trial.stick]), np.array([trial.jump]), trial.start)
+        )
+        late = self._lagged(position, trial.lag)[0]
+        first = self._first - trial.delay
+        return np.asarray(self.value - trial.gain * late[first : first + self.value.size])
+
+    def _best(
+        self,
+        positions: FloatArray,
+        sticks: FloatArray,
+        jumps: FloatArray,
+        lags: Sequence[float],
+        delays: Sequence[int],
+        start: int = 0,
+    ) -> list[Trial]:
+        rows, n = np.arange(sticks.size), self.value.size
+        error, gain = np.ones(rows.size), np.zeros(rows.size)
+        lag, delay = np.full(rows.size, lags[0]), np.full(rows.size, delays[0])
+        for each in lags:
+            late = self._lagged(positions, each)
+            squares = np.cumsum(np.pad(late * late, ((0, 0), (1, 0))), axis=1)
+            first = self._first - np.asarray(delays)
+            power = squares[:, first + n] - squares[:, first]
+            product = np.stack([late[:, k : k + n] @ self.value for k in first], axis=1)
+            good = (power > 1e-12 * self.power) & (self.sign * product > 0)
+            factor = np.where(good, product / np.where(good, power, 1.0), 0.0)
+            left = 1 - factor * product / self.power
+            best = np.argmin(left, axis=1)
+            better = left[rows, best] < error
+            error = np.where(better, np.maximum(left[rows, best], 0.0), error)
+            gain = np.where(better, factor[rows, best], gain)
+            lag = np.where(better, each, lag)
+            delay = np.where(better, np.asarray(delays)[best], delay)
+        table = np.stack([error, sticks, jumps, gain, lag], axis=1).tolist()
+        return [
+            Trial(e, s, j, g, t, int(late), start)
+            for (e, s, j, g, t), late in zip(table, delay, strict=True)
+        ]
+
+    def _positions(self, sticks: FloatArray, jumps: FloatArray, start: int) -> FloatArray:
+        first = min(self.starts[start])
+        stops = {place - first: side for place, side in self.starts[start].items()}
+        moved = kano_rows(self.output[first:], sticks, jumps, stops)
+        return self._thinned(np.pad(moved, ((0, 0), (first, 0)), mode="edge"))
+
+    def _thinned(self, rows: FloatArray) -> FloatArray:
+        count = rows.shape[1] // self.every
+        cut = rows[:, : count * self.every]
+        return np.asarray(cut.reshape(-1, count, self.every).mean(axis=2))
+
+    def _lagged(self, positions: FloatArray, lag: float) -> FloatArray:
+        """Response of the lag, or of an integrator, without drift."""
+        late = positions - positions[:, :1]
+        if np.isinf(lag):
+            late = np.cumsum(positions - positions.mean(axis=1, keepdims=True), axis=1)
+        elif lag > 0:
+            decay = np.exp(-1 / lag)
+            late = lfilter([1 - decay], [1, -decay], late, axis=1)
+        return without_drift(late, self.period)
+
+
+def _stops_of_cycles(output: FloatArray, period: float) -> tuple[dict[int, float], ...]:
+    """Extremes of the output in all half cycles, from the first, second and third on."""
+    clean = smoothed(without_drift(output, period), period, _SMOOTHED)
+    offset = (output.size - clean.size) // 2
+    edges = offset + np.round(crossings(clean)).astype(int)
+    stops: dict[int, float] = {}
+    for first, last in pairwise(edges.tolist()):
+        part = output[first : last + 1]
+        up = clean[(first + last) // 2 - offset] > 0
+        stops[first + int(np.argmax(part) if up else np.argmin(part))] = 1.0 if up else -1.0
+    places = list(stops)
+    return tuple({k: stops[k] for k in places[first:]} for first in range(_HALF_CYCLES))
