@@ -104,10 +104,10 @@ def _third_lag_amid(views: Any) -> Any:
 def _constant_rest(noise: Any) -> Any:
     """Take a constant rest for one without noise."""
 
-    def made(before: Any, record: Any, quantum: float) -> Any:
+    def made(before: Any, record: Any, quantum: float, *rows: Any) -> Any:
         if before.size >= 8 and np.ptp(before) == 0:
             return quantum / np.sqrt(12), 0.0
-        return noise(before, record, quantum)
+        return noise(before, record, quantum, *rows)
 
     return made
 
