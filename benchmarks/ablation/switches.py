@@ -212,6 +212,18 @@ SWITCHES = (
         (f"{STEP}:fit_window", f"{FITS}.any_input.window:fit_window"),
         called=True,
     ),
+    Switch(
+        "integrator beside a lag of any ratio",
+        {f"{SEPARABLE}.window:_RAMP": value(0.0)},
+        (f"{STEP}:fit_window", f"{FITS}.any_input.window:fit_window"),
+        called=True,
+    ),
+    Switch(
+        "faster pairs in a ramp",
+        {f"{SEPARABLE}.structures:_NO_INTEGRATOR": value(1e-9)},
+        (f"{SEPARABLE}.structures:parameter_bounds",),
+        called=True,
+    ),
     Switch("chains of equal lags", {f"{FITS}.selection:fit_chains": giving([])}),
     Switch("chains that still improve", {f"{FITS}.interval:still_improving": giving(False)}),
     Switch("modes of diffusion", {f"{FITS}.selection:fit_diffusion": giving([])}),

@@ -20,8 +20,9 @@ import numpy as np
 from ..arrays import FloatArray
 from ..separable.batch_search import fit_batch
 from ..separable.compared_fits import converged
+from ..separable.compressed import squares
 from ..separable.structures import Candidate, Scales, choose, neighbour_starts, parameter_bounds
-from ..separable.varpro import Problem, Structure, evaluate
+from ..separable.varpro import Problem, Structure
 from ..separable.window import WindowFit
 from ..signals.noise import correlation_time, mad_sigma
 from ..signals.noise_model import noise_covariance, whitener
@@ -101,7 +102,7 @@ def _dead_times_near(problem: Problem, old: Candidate, scales: Scales) -> list[F
     """
     starts = np.tile(old.parameters, (_NEAR.size, 1))
     starts[:, 0] = np.clip(old.dead_time + _NEAR * scales.dt, scales.earliest, scales.latest)
-    cost = evaluate(problem, old.structure, starts).cost
+    cost = squares(problem, old.structure, starts)
     return [old.parameters, *starts[np.argsort(cost)[:2]]]
 
 

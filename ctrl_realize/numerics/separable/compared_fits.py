@@ -16,6 +16,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..arrays import FloatArray
+from .compressed import squares
 from .newton import settle
 from .poles import parameters_from_poles
 from .polish import polish
@@ -34,7 +35,7 @@ from .structures import (
     pattern_starts,
     plausible,
 )
-from .varpro import Bounds, Problem, Structure, evaluate
+from .varpro import Bounds, Problem, Structure
 
 REACH = 3 * PLAUSIBLE
 """Excess of the criterion up to which structures are followed to their minima. Of measured records
@@ -56,7 +57,7 @@ def on_new_data(
 ) -> dict[Structure, Candidate]:
     """Find the costs of models for changed data: all of them must be computed again."""
     return {
-        s: replace(c, cost=float(evaluate(problem, s, c.parameters[None]).cost[0]))
+        s: replace(c, cost=float(squares(problem, s, c.parameters[None])[0]))
         for s, c in candidates.items()
     }
 
@@ -136,7 +137,7 @@ def _in_order(problem: Problem, candidate: Candidate, bounds: Bounds) -> Candida
     x = np.append(candidate.dead_time, parameters_from_poles(candidate.poles))
     if np.any(x < bounds.low) or np.any(x > bounds.high):
         return candidate
-    cost = float(evaluate(problem, candidate.structure, x[None]).cost[0])
+    cost = float(squares(problem, candidate.structure, x[None])[0])
     # Coincident poles are separated in another way.
     return (
         candidate
@@ -160,7 +161,7 @@ def _near_minimum(
             ]
         ).reshape(-1, old.parameters.size)
         if problem.segments is None and len(more):
-            cost = evaluate(problem, structure, more).cost
+            cost = squares(problem, structure, more)
             promising = np.argsort(cost)[:_STARTS]
             near = cost[promising] <= old.cost * (1 + _PROMISING / problem.data.size)
             more = more[promising[near]]

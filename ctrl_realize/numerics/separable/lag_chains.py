@@ -29,6 +29,7 @@ import numpy as np
 from ..arrays import ComplexArray, FloatArray
 from ..constants import Z_95
 from ..regression.marquardt import Damping, damped_step, descend
+from .compressed import compress
 from .poles import parameters_from_poles
 from .structures import Candidate, Scales
 from .varpro import Problem, Structure, evaluate
@@ -276,7 +277,7 @@ def _evaluate(
     order = structure.order
     rates = law.rates(order, x[2]) * np.exp(-x[1])
     parameters = np.append(x[:1], _parameters(rates))
-    state = evaluate(problem, structure, parameters[None])
+    state = compress(problem, structure, parameters[None])
     by_dead_time, by_poles = state.jacobian[0][:, :1], state.jacobian[0][:, 1:]
     inwards = -_SMALL if x[2] + _SMALL > law.high else _SMALL
     slower = _parameters(rates * np.exp(-_SMALL))

@@ -84,6 +84,8 @@ def parameters_from_poles(poles: ComplexArray) -> FloatArray:
 def _separate(poles: ComplexArray) -> ComplexArray:
     """Separate coincident poles of different factors by the smallest useful amount."""
     order = poles.shape[1]
+    if order <= 2:
+        return poles  # a pair is apart
     gap = np.abs(poles[:, :, None] - poles[:, None]) < 0.5 * _GAP * np.abs(poles[:, None])
     if np.count_nonzero(gap) == gap.shape[0] * order:  # only every pole with itself
         return poles

@@ -19,7 +19,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..arrays import BoolArray, FloatArray, IntArray
-from .compressed import compress
+from .compressed import compress, triangle
 from .newton import IN_ROUNDING
 from .sample_kinks import beside_a_sample, cell, leaving, other_side, snapped
 from .varpro import Bounds, Problem, Structure
@@ -181,10 +181,12 @@ def _step(
     count = scaled.shape[2]
     walls = np.sqrt(damping)[:, None, None] * np.eye(count)
     # min |J s - r|^2 + damping |D s|^2 as least squares (Nocedal and Wright, section 10.3).
-    q, r = np.linalg.qr(np.concatenate([scaled, walls], axis=1))
     rows = residual.shape[1]
-    inside = np.einsum("bmk,bm->bk", q[:, :rows], residual)
-    step = np.linalg.solve(r, inside[:, :, None])[:, :, 0]
+    whole = np.zeros((len(columns), rows + count, count + 1))
+    whole[:, :rows, :count], whole[:, :rows, count] = scaled, residual
+    whole[:, rows:, :count] = walls
+    r = triangle(whole)
+    step = np.linalg.solve(r[:, :count, :count], r[:, :count, count:])[:, :, 0]
     step = np.where(moving & free, step / size, 0.0)
     longest = np.maximum(np.abs(step[:, 1:]).max(axis=1, initial=0.0) / _LONGEST_STEP, 1.0)
     step = step / longest[:, None]

@@ -139,12 +139,13 @@ class StepSequence:
         """
         if self.moves.size > 1 or self.samples is not None:
             return None
-        since: FloatArray = self.first - (self.moves[0] + tau[:, None])
-        before = since <= _TOGETHER * self.dt
-        if (before & (since + self.lengths > _TOGETHER * self.dt)).any():
+        arrival = self.moves[0] + tau
+        last = np.searchsorted(self.first, arrival + _TOGETHER * self.dt, side="right") - 1
+        within = self.first[last] + self.lengths[last] > arrival + _TOGETHER * self.dt
+        if (within & (last >= 0)).any():
             return None
-        since[before] = 0.0
-        return since
+        since: FloatArray = self.first - arrival[:, None]
+        return np.where(since > _TOGETHER * self.dt, since, 0.0)
 
     def means(self, rates: Any) -> tuple[Any, Any, IntArray]:
         """Mean of exp(p t) over kinds of bins (B, J, k), the mean time, and the kind of each bin.

@@ -39,7 +39,10 @@ SLOWEST = 1e-4
 """Smallest pole, over the length of the record: stands for an integrator."""
 _DAMPING = 20.0
 """Largest damping of a pair: two lags with a ratio of 1600."""
-_NO_INTEGRATOR = 10.0  # natural frequency times length of a pair that is none, in such a record
+_NO_INTEGRATOR = 10.0
+"""Natural frequency times length up to which a pair may be none in a record that looks integrating:
+in fewer than 600 samples that is more than the bound of an integrator and a lag. Ablation: faster
+pairs in a ramp."""
 FASTEST, SLOWER_WITH_ZEROS = 40.0, 2.0
 """Largest pole, in 1/samples. A response that jumps from one sample to the next needs it: with a
 lag of half a sample at least, its dead time would be known better than to the sample. Ablation:

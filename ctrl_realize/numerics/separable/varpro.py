@@ -227,11 +227,10 @@ def partial_fractions(
     first, that of the others being zero, and d(s^(i-1) K)/ds over a' at the poles.
     """
     n = poles.shape[1]
-    gap = poles[:, :, None] - poles[:, None, :]
-    gap[:, np.arange(n), np.arange(n)] = 1.0
-    slope = gap.prod(axis=2)
+    gap = poles[:, :, None] - poles[:, None, :] + np.eye(n)
+    slope = np.multiply.reduce(gap, axis=2)
     value = known[0] if known.size == 1 else np.polyval(known, poles)
-    gain = known[-1] / np.prod(-poles, axis=1).real
+    gain = known[-1] / np.multiply.reduce(-poles, axis=1).real
     exponent = np.arange(-1, count - 1)
     power = np.empty((*poles.shape, count), dtype=np.complex128)
     power[:, :, 0], power[:, :, 1:2] = 1.0 / poles, 1.0
@@ -251,13 +250,9 @@ def moved_amplitudes(
     numerator: FloatArray,
 ) -> ComplexArray:
     """Derivatives of amplitudes (rows j) w.r.t. poles (columns k), shape (B, J, J)."""
-    n = poles.shape[1]
-    own = np.arange(n)
-    gap = poles[:, :, None] - poles[:, None, :]
-    gap[:, own, own] = 1.0
-    inverse = 1.0 / gap
-    inverse[:, own, own] = 0.0
+    own = np.eye(poles.shape[1])
+    inverse = 1.0 / (poles[:, :, None] - poles[:, None, :] + own) - own
     moved = amplitudes[:, :, None] * inverse
-    through = np.einsum("bjk,bk->bj", dresidues, numerator)
-    moved[:, own, own] = through - amplitudes * inverse.sum(axis=2)
-    return np.asarray(moved)
+    through = (dresidues @ numerator[:, :, None])[:, :, 0]
+    along = through - amplitudes * np.add.reduce(inverse, axis=2)
+    return np.asarray(moved + along[:, :, None] * own)

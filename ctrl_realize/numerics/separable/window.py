@@ -46,7 +46,7 @@ from .varpro import Problem, Structure, evaluate, respond
 _PASSES = 2  # of modified residuals; see `fit_window`
 _RAMP = 0.1
 """Pole of a first-order fit times the length of the record, below which there may be an integrator
-beside a lag that is faster by any ratio."""
+beside a lag that is faster by any ratio. Ablation: integrator beside a lag of any ratio."""
 _LONG = 2**18  # samples that tell a frequency, for time and memory
 
 
@@ -224,7 +224,9 @@ def fit_window(
     """
     sigma, quantum = noise
     problem = window.problem
-    rough = search(problem, [Structure(1, 1)], scales)[Structure(1, 1)]
+    # Neither what rings nor what integrates matters to its search: it is made once.
+    first = search(problem, [Structure(1, 1)], scales)
+    rough = first[Structure(1, 1)]
     error = window.output - window.predict(problem, rough)
     spacing = window.spacing * scales.dt
     scales = replace(
@@ -232,7 +234,8 @@ def fit_window(
         ringing=_ringing(error[window.start :], spacing),
         integrating=bool(np.abs(rough.poles[0]) * scales.length < _RAMP),
     )
-    candidates = search(problem, structures, scales)
+    others = [s for s in structures if s not in first]
+    candidates = search(problem, others, scales, first if len(others) < len(structures) else None)
     passes = _PASSES if huber else 0
     rivals: dict[Structure, float] = {}
     for turn in range(passes + 1):

@@ -179,7 +179,8 @@ def test_what_is_compared_has_no_slope_and_the_cost_of_the_data_of_now():
     moved = replace(problem, data=problem.data + 0.1 * np.sin(np.arange(problem.data.size)))
     for shape, candidate in on_new_data(moved, found).items():
         state = evaluate(moved, shape, candidate.parameters[None])
-        assert candidate.cost == float(state.cost[0])
+        # the same sum over other rows
+        assert candidate.cost == pytest.approx(float(state.cost[0]), rel=1e-12)
 
 
 def test_the_unit_of_time_changes_dead_time_and_lags_and_nothing_else():
