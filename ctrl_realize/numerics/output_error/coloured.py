@@ -20,7 +20,7 @@ import numpy as np
 from ..arrays import FloatArray
 from ..separable.batch_search import fit_batch
 from ..separable.compared_fits import converged
-from ..separable.compressed import squares
+from ..separable.compressed import eliminate
 from ..separable.structures import Candidate, Scales, choose, neighbour_starts, parameter_bounds
 from ..separable.varpro import Problem, Structure
 from ..separable.window import WindowFit
@@ -102,7 +102,7 @@ def _dead_times_near(problem: Problem, old: Candidate, scales: Scales) -> list[F
     """
     starts = np.tile(old.parameters, (_NEAR.size, 1))
     starts[:, 0] = np.clip(old.dead_time + _NEAR * scales.dt, scales.earliest, scales.latest)
-    cost = squares(problem, old.structure, starts)
+    cost = eliminate(problem, old.structure, starts).cost
     return [old.parameters, *starts[np.argsort(cost)[:2]]]
 
 

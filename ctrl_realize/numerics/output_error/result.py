@@ -18,6 +18,7 @@ import numpy as np
 from ..arrays import ComplexArray, FloatArray
 from ..parameters.physical import ProcessParameter, fitted_parameters
 from ..parameters.process_form import ProcessForm
+from ..separable.compressed import eliminate
 from ..separable.dispersion.fit import DispersedFlow
 from ..separable.lag_chains import LagChain, lag_sum
 from ..separable.profile_ends import profile_limits
@@ -222,13 +223,12 @@ def _table(whole: WindowFit, profiles: dict[Structure, Profile]) -> tuple[Struct
     lines = []
     for s, candidate in whole.candidates.items():
         interval = profile_limits(*profiles[s]) if s in profiles else None
-        state = evaluate(whole.problem, s, candidate.parameters[None])
-        total = candidate.dead_time + lag_sum(candidate.poles, state.numerator[0])
+        poles = candidate.poles
+        numerator = eliminate(whole.problem, s, candidate.parameters[None]).numerator[0]
+        total = candidate.dead_time + lag_sum(poles, numerator)
         excess = whole.criterion[s] - best
-        gain = float(np.real(state.numerator[0, 0] / np.prod(-candidate.poles)))
-        lines.append(
-            StructureFit(s, candidate.dead_time, total, excess, interval, candidate.poles, gain)
-        )
+        gain = float(np.real(numerator[0] / np.prod(-poles)))
+        lines.append(StructureFit(s, candidate.dead_time, total, excess, interval, poles, gain))
     return tuple(sorted(lines, key=lambda line: line.delta_bic))
 
 

@@ -16,7 +16,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..arrays import FloatArray
-from .compressed import squares
+from .compressed import eliminate
 from .newton import settle
 from .poles import parameters_from_poles
 from .polish import polish
@@ -57,7 +57,7 @@ def on_new_data(
 ) -> dict[Structure, Candidate]:
     """Find the costs of models for changed data: all of them must be computed again."""
     return {
-        s: replace(c, cost=float(squares(problem, s, c.parameters[None])[0]))
+        s: replace(c, cost=float(eliminate(problem, s, c.parameters[None]).cost[0]))
         for s, c in candidates.items()
     }
 
@@ -137,7 +137,7 @@ def _in_order(problem: Problem, candidate: Candidate, bounds: Bounds) -> Candida
     x = np.append(candidate.dead_time, parameters_from_poles(candidate.poles))
     if np.any(x < bounds.low) or np.any(x > bounds.high):
         return candidate
-    cost = float(squares(problem, candidate.structure, x[None])[0])
+    cost = float(eliminate(problem, candidate.structure, x[None]).cost[0])
     # Coincident poles are separated in another way.
     return (
         candidate
@@ -161,7 +161,7 @@ def _near_minimum(
             ]
         ).reshape(-1, old.parameters.size)
         if problem.segments is None and len(more):
-            cost = squares(problem, structure, more)
+            cost = eliminate(problem, structure, more).cost
             promising = np.argsort(cost)[:_STARTS]
             near = cost[promising] <= old.cost * (1 + _PROMISING / problem.data.size)
             more = more[promising[near]]

@@ -68,16 +68,25 @@ def compress(problem: Problem, structure: Structure, parameters: FloatArray) -> 
     return Compressed(residual, derivative, np.add.reduce(residual * residual, axis=1))
 
 
-def squares(problem: Problem, structure: Structure, parameters: FloatArray) -> FloatArray:
-    """Sums of squares (B,) alone, as of `compress`."""
+@dataclass(frozen=True, eq=False)
+class Eliminated:
+    """Sums of squares (B,), and coefficients (B, z + 1) of the numerator, lowest power first."""
+
+    cost: FloatArray
+    numerator: FloatArray
+
+
+def eliminate(problem: Problem, structure: Structure, parameters: FloatArray) -> Eliminated:
+    """Eliminate the linear terms, and leave derivatives aside."""
     if not _compressible(problem):
-        return evaluate(problem, structure, parameters).cost
+        state = evaluate(problem, structure, parameters)
+        return Eliminated(state.cost, state.numerator)
     poles, _ = poles_from_parameters(parameters[:, 1:])
     basis = _Basis(poles)
     table = _factor(problem, parameters[:, 0], basis)
     residues, gain, _ = partial_fractions(poles, problem.known.numerator, structure.zeros + 1)
-    residual, _, _ = _eliminated(table, basis, residues, gain)
-    return np.asarray(np.add.reduce(residual * residual, axis=1))
+    residual, numerator, _ = _eliminated(table, basis, residues, gain)
+    return Eliminated(np.add.reduce(residual * residual, axis=1), numerator)
 
 
 def _compressible(problem: Problem) -> bool:

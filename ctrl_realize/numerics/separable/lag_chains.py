@@ -29,10 +29,10 @@ import numpy as np
 from ..arrays import ComplexArray, FloatArray
 from ..constants import Z_95
 from ..regression.marquardt import Damping, damped_step, descend
-from .compressed import compress
+from .compressed import compress, eliminate
 from .poles import parameters_from_poles
 from .structures import Candidate, Scales
-from .varpro import Problem, Structure, evaluate
+from .varpro import Problem, Structure
 
 SHORTEST, LONGEST = 4, 8
 """Shorter ones have few parameters when they are free; of longer ones rounding shows."""
@@ -199,7 +199,7 @@ def lag_sum(poles: ComplexArray, numerator: FloatArray) -> float:
 
 def time_moments(problem: Problem, like: Candidate) -> tuple[float, float]:
     """Mean and variance in time of the impulse response, from the cumulants of poles and zeros."""
-    numerator = evaluate(problem, like.structure, like.parameters[None]).numerator[0]
+    numerator = eliminate(problem, like.structure, like.parameters[None]).numerator[0]
     zeros = np.roots(numerator[::-1])
     mean = like.dead_time + lag_sum(like.poles, numerator)
     return mean, float(np.sum(like.poles**-2.0).real - np.sum(zeros**-2.0).real)

@@ -20,10 +20,11 @@ from scipy.special import ndtr, ndtri
 
 from ..arrays import ComplexArray, FloatArray
 from ..constants import SMALLEST, Z_95
+from .compressed import eliminate
 from .lag_chains import lag_sum
 from .poles import poles_from_parameters
 from .structures import Candidate
-from .varpro import Problem, evaluate, partial_fractions, respond
+from .varpro import Problem, partial_fractions, responses
 
 INTEGRATOR = 5e-3
 """Poles slower than this, times the length of the record, cannot be told from integrators: over it
@@ -96,8 +97,8 @@ def static_gain(
     length : float
         Duration of the record after the change of the input, in s.
     """
-    state = evaluate(problem, candidate.structure, candidate.parameters[None])
-    theta, numerator = candidate.parameters, state.numerator[0]
+    theta = candidate.parameters
+    numerator = eliminate(problem, candidate.structure, theta[None]).numerator[0]
     point = np.concatenate([theta, numerator])
     moves = _moves(candidate, numerator, length)
 
@@ -158,15 +159,12 @@ def local_errors(
     """Derivatives of a model with respect to its parameters, by differences."""
     theta = candidate.parameters
     moves = _moves(candidate, numerator, length)
-
-    def response(at: FloatArray) -> FloatArray:
-        return respond(problem.drive, problem.known, at[theta.size :], at[: theta.size])
-
     # A dead time is not negative: the derivatives at zero are those slightly later.
     inside = np.concatenate([[max(theta[0], moves[0, 0])], theta[1:], numerator])
-    slopes = np.stack(
-        [(response(inside + m) - response(inside - m)) / (2 * m.sum()) for m in moves], axis=1
-    )
+    there = np.concatenate([inside + moves, inside - moves])
+    setting = problem.drive, problem.known
+    ahead, behind = np.split(responses(*setting, there[:, theta.size :], there[:, : theta.size]), 2)
+    slopes = (ahead - behind).T / (2 * moves.diagonal())
     columns = problem.weighted(np.concatenate([slopes, problem.regressors], axis=1))
     if problem.segments is not None:
         columns = problem.local_terms(candidate.poles[None]).without(columns[None])[0]

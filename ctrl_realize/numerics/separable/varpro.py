@@ -207,15 +207,24 @@ def respond(
     drive: HeldInput, known: KnownFactor, numerator: FloatArray, parameters: FloatArray
 ) -> FloatArray:
     """Response (m,) of one model, numerator (n - r + 1,), parameters (1 + n,)."""
-    free = poles_from_parameters(parameters[None, 1:])[0]
-    poles = np.concatenate([free, known.poles[None]], axis=1)
-    residues, gain, _ = partial_fractions(poles, known.numerator, numerator.size)
-    amplitudes, level = residues[0] @ numerator, gain[0] * numerator[0]
-    parts = []
-    for piece in drive.pieces():
-        static, mode, _ = piece.modes(parameters[:1], poles)
-        parts.append((mode[0] @ amplitudes).real + static[0] * level)
+    parts = [
+        responses(piece, known, numerator[None], parameters[None])[0] for piece in drive.pieces()
+    ]
     return np.concatenate(parts) if len(parts) > 1 else parts[0]
+
+
+def responses(
+    drive: HeldInput, known: KnownFactor, numerator: FloatArray, parameters: FloatArray
+) -> FloatArray:
+    """Responses (B, m) of several models, numerators (B, n - r + 1), parameters (B, 1 + n)."""
+    poles = poles_from_parameters(parameters[:, 1:])[0]
+    if known.poles.size:
+        poles = np.concatenate([poles, np.tile(known.poles, (len(poles), 1))], axis=1)
+    residues, gain, _ = partial_fractions(poles, known.numerator, numerator.shape[1])
+    amplitudes = residues @ numerator[:, :, None]
+    static, mode, _ = drive.modes(parameters[:, 0], poles)
+    level = gain * numerator[:, 0]
+    return _real_product(mode, amplitudes)[:, :, 0] + static * level[:, None]
 
 
 def partial_fractions(
