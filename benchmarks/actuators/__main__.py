@@ -72,6 +72,7 @@ def main() -> None:
     parser.add_argument("--out", type=Path, default=Path("docs/actuators_table.md"))
     parser.add_argument("--only", nargs="*", default=[], help="names of cases")
     parser.add_argument("--table", action="store_true", help="write the page from the rows alone")
+    parser.add_argument("--note", default="", help="a sentence about the rows, for the page")
     asked = parser.parse_args()
     rows: list[Row] = []
     if asked.rows.exists():
@@ -86,7 +87,7 @@ def main() -> None:
                 rows.append(tried(case, seed))
                 store.write(json.dumps(rows[-1]) + "\n")
                 store.flush()
-    asked.out.write_text(page(rows), encoding="utf-8")
+    asked.out.write_text(page(rows, asked.note), encoding="utf-8")
 
 
 if __name__ == "__main__":

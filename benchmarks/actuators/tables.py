@@ -16,12 +16,13 @@ from .cases import ESTIMATED, LINEAR, WORLDS
 WITHIN = 0.1  # relative error that is asked for
 
 
-def page(rows: Sequence[dict[str, Any]]) -> str:
-    """Write the tables as Markdown."""
+def page(rows: Sequence[dict[str, Any]], note: str = "") -> str:
+    """Write the tables as Markdown, with a note on how the rows were made."""
     lines = [
         "*Simulated, as many seeds as there are trials. "
         f"`python -m benchmarks.actuators`, {date.today()}, ctrl_realize {cr.__version__}. "
         "In brackets: 95 % intervals of a share.*",
+        *(["", note] if note else []),
         "",
         "**Parameters of the actuator**, noise of 0.5 % of the range. Errors of an end of the "
         "travel are parts of what it cuts off:",
