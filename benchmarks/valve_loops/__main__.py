@@ -18,7 +18,7 @@ from .worlds import CAUSES, worlds
 
 TABLE = Path(__file__).resolve().parents[2] / "docs" / "valve_loops_table.md"
 DATA = Path(__file__).resolve().parents[3] / "shared" / "data" / "valve_loops"
-SEEDS = 4
+SEEDS = 10
 VERDICTS = (
     "stiction", "no stiction: tuning or external oscillation", "no oscillation", "cannot tell",
 )  # fmt: skip
@@ -42,8 +42,9 @@ def main() -> None:
     of_world: dict[tuple[str, str], Counter[str]] = {}
     of_method: dict[tuple[str, str], Counter[str]] = {}
     fits: list[Fit] = []
-    for world in worlds():
-        for seed in range(SEEDS):
+    measured = _measured_lines()
+    for seed in range(SEEDS):
+        for world in worlds():
             op, pv, cause = world.signals(seed)
             found = cr.valves.diagnose_loop(op, pv, dt=world.loop.dt, process=world.process)
             of_world.setdefault((world.name, cause), Counter())[found.verdict] += 1
@@ -61,11 +62,12 @@ def main() -> None:
             if found.oscillates is not False:
                 for name, verdict in said.values():
                     of_method.setdefault((name, cause), Counter())[verdict] += 1
-        print({key: dict(each) for key, each in of_world.items() if key[0] == world.name})
-    lines = _method_lines(of_method)
-    lines += ["", *_fit_lines(fits)]
-    lines += ["", *_world_lines(of_world), "", *_measured_lines()]
-    TABLE.write_text("\n".join(lines) + "\n", encoding="utf-8")
+            print(seed, world.name, cause, found.verdict, flush=True)
+        # after each seed, so that a run that is stopped leaves what it has
+        lines = _method_lines(of_method, seed + 1)
+        lines += ["", *_fit_lines(fits)]
+        lines += ["", *_world_lines(of_world, seed + 1), "", *measured]
+        TABLE.write_text("\n".join(lines) + "\n", encoding="utf-8")
 
 
 def _within(value: float, ends: tuple[float, float]) -> bool:
@@ -102,9 +104,9 @@ def _fit_lines(fits: list[Fit]) -> list[str]:
     return lines
 
 
-def _method_lines(counts: dict[tuple[str, str], Counter[str]]) -> list[str]:
+def _method_lines(counts: dict[tuple[str, str], Counter[str]], seeds: int) -> list[str]:
     lines = [
-        f"Simulated loops, {SEEDS} records each, whose process value oscillates, or may: of 100 "
+        f"Simulated loops, {seeds} records each, whose process value oscillates, or may: of 100 "
         "records, in how many each method says stiction / no stiction / cannot tell.",
         "",
         "| method | records: sticking, others | valves that stick | tuning or external |",
@@ -133,9 +135,9 @@ def _percent(counts: Counter[str], word: str) -> str:
     return f"{100 * counts[word] / total:.0f}" if total else "-"
 
 
-def _world_lines(counts: dict[tuple[str, str], Counter[str]]) -> list[str]:
+def _world_lines(counts: dict[tuple[str, str], Counter[str]], seeds: int) -> list[str]:
     lines = [
-        f"Verdict, number of {SEEDS} records. Where the stem came to rest before the record, the "
+        f"Verdict, number of {seeds} records. Where the stem came to rest before the record, the "
         "cause is none:",
         "",
         "| simulated loop | cause | stiction | no stiction | no oscillation | cannot tell |",

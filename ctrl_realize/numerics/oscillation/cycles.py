@@ -82,6 +82,12 @@ def smoothed(signal: FloatArray, period: float, part: float) -> FloatArray:
     return signal if width < 3 else np.asarray(uniform_filter1d(signal, width))
 
 
+def resolution(signal: FloatArray) -> float:
+    """Smallest distance of two different values."""
+    gaps = np.diff(np.unique(signal))
+    return float(gaps[gaps > 1e-9 * np.abs(signal).max()].min(initial=np.inf))
+
+
 def find_cycles(signal: FloatArray) -> Cycles | None:
     """Measure the strongest oscillation of `signal` (N,); None if nothing can be measured.
 

@@ -25,9 +25,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..arrays import FloatArray
-from .cycles import without_drift
+from .cycles import resolution, without_drift
 from .stiction_model import StickingLoop, Trial
-from .stiction_region import INDEPENDENT, Region, near, near_delays, resolution
+from .stiction_region import INDEPENDENT, Region, near, near_delays
 
 FEWEST_BLOCKS = 6
 """Cycles, whose errors are compared."""
@@ -108,6 +108,7 @@ def fit_stiction(
     valleys = sorted(
         _followed(loop, seed, swing, coarse / every, starts)
         for starts, levels in ((loop.every_cycle, _STICKS[::3]), (loop.once, _STICKS))
+        if len(starts)
         for seed in _valleys(rough, levels, swing, lags, starts[:_STARTS])
     )
     best = min(_once(loop, one, swing) for one in valleys[:2])

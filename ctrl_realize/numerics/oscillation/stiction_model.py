@@ -73,9 +73,8 @@ class StickingLoop:
 
     def linear(self, lags: Sequence[float], delays: Sequence[int]) -> Trial:
         """Fit the linear part without stiction."""
-        return self._best(self._thinned(self.output[None]), np.zeros(1), np.zeros(1), lags, delays)[
-            0
-        ]
+        position, none = self._thinned(self.output[None]), np.zeros(1)
+        return self._best(position, none, none, lags, delays)[0]
 
     def best(
         self,
@@ -174,4 +173,6 @@ def _stops_of_cycles(output: FloatArray, period: float) -> tuple[dict[int, float
         up = clean[(first + last) // 2 - offset] > 0
         stops[first + int(np.argmax(part) if up else np.argmin(part))] = 1.0 if up else -1.0
     places = list(stops)
-    return tuple({k: stops[k] for k in places[first:]} for first in range(_HALF_CYCLES))
+    return tuple(
+        {k: stops[k] for k in places[first:]} for first in range(min(_HALF_CYCLES, len(places)))
+    )

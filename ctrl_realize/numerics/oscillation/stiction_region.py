@@ -116,9 +116,3 @@ def correlation_time(residual: FloatArray) -> float:
     below = np.flatnonzero(rho <= 0)
     last = int(below[0]) if below.size else rho.size
     return float(max(1 + 2 * rho[1:last].sum(), 1.0))
-
-
-def resolution(signal: FloatArray) -> float:
-    """Smallest distance of two different values."""
-    gaps = np.diff(np.unique(signal))
-    return float(gaps[gaps > 1e-9 * np.abs(signal).max()].min(initial=np.inf))

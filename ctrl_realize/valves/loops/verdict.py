@@ -8,7 +8,7 @@ from typing import Literal, TypeAlias
 import numpy as np
 
 from ...numerics.arrays import FloatArray
-from ...numerics.oscillation.cycles import FEWEST_CYCLES, SHORTEST_PERIOD, Cycles
+from ...numerics.oscillation.cycles import FEWEST_CYCLES, SHORTEST_PERIOD, Cycles, resolution
 from ...results import Flag
 from .data import LONGEST_GAP, LoopData
 from .methods import VOTERS, LoopMethod
@@ -69,11 +69,11 @@ def flags_of(data: LoopData, cycles: Cycles | None) -> list[Flag]:
                     "that of the loop",
                 )
             )
-        elif np.ptp(signal) < _COARSE * _resolution(signal):
+        elif np.ptp(signal) < _COARSE * resolution(signal):
             flags.append(
                 Flag(
                     "coarse_quantisation",
-                    f"the {name} has {np.ptp(signal) / _resolution(signal) + 1:.0f} levels: half "
+                    f"the {name} has {np.ptp(signal) / resolution(signal) + 1:.0f} levels: half "
                     "cycles have no shape; record it with more digits, and without compression",
                 )
             )
@@ -147,12 +147,6 @@ def judge(
     if len(not_so) > 1 and len(not_so) >= 2 * len(sticks):
         return "no stiction: tuning or external oscillation", told
     return "cannot tell", told or "no method tells"
-
-
-def _resolution(signal: FloatArray) -> float:
-    """Smallest distance of two different values."""
-    gaps = np.diff(np.unique(signal))
-    return float(gaps[gaps > 1e-9 * np.abs(signal).max()].min(initial=np.inf))
 
 
 def _at_limits(signal: FloatArray) -> float:
