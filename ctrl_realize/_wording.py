@@ -163,6 +163,8 @@ def number_within(value: float, low: float, high: float) -> str:
     >>> from ctrl_realize._wording import number_within
     >>> number_within(37.0712, 36.9, 38.2), number_within(2.0, 2.0, 2.0)
     ('37.1', '2.000')
+    >>> number_within(7.21978e-05, 4.3e-05, 20.7e-05)
+    '7.22e-05'
     """
     if not (np.isfinite(low) and np.isfinite(high)):
         return f"{value:.4g}"

@@ -207,5 +207,5 @@ def _blocks(loop: StickingLoop, trial: Trial) -> FloatArray:
 def _larger(first: FloatArray, second: FloatArray) -> float:
     """Mean difference of two series over its standard error."""
     difference = first - second
-    spread = float(difference.std(ddof=1)) / np.sqrt(difference.size)
+    spread = float(difference.std(ddof=1) / np.sqrt(difference.size))
     return float(difference.mean()) / spread if spread > 0 else 0.0
