@@ -338,7 +338,8 @@ def main() -> None:
             "record, dead times up to 15 samples. The "
             "rules of `identify` "
             f"were made with the records of {', '.join(FIRST)} in view, and one of them with "
-            "two_cart_drive, which flatters it. "
+            "two_cart_drive, which flatters it. SRIVC: our prototype of a method that no package "
+            "in Python has, from three starts. "
         )
     text = "\n".join([*lines, "", note + made(arguments.table), ""])
     if arguments.output:
