@@ -6,7 +6,8 @@ a structure with as many zeros as poles. Structures of relative degree 1 cannot 
 little earlier.
 
 This alternative is ruled out as structures are [2]_, and its end is that of a profile likelihood
-[3]_. Ablation: friction behind lags.
+[3]_. Behind two lags, S and J are all that it has more: there it is kept while it fits no worse
+than the lags alone, as one lag more is. Ablation: friction behind lags.
 
 References
 ----------
@@ -44,8 +45,8 @@ def latest_slip(whole: WindowFit, lags: Candidate) -> float | None:
     Returns
     -------
     float or None
-        Upper end of its 95 % interval; None if friction is ruled out, or the visible onset is at
-        the dead time of the lags.
+        Upper end of its 95 % interval, or where it fits as well as the lags; None if friction is
+        ruled out, or the visible onset is at the dead time of the lags.
     """
     scales = whole.scales
     first, last = lags.dead_time, scales.latest
@@ -60,6 +61,10 @@ def latest_slip(whole: WindowFit, lags: Candidate) -> float | None:
     costs = polish(whole.problem, slips, starts, box, scales.dt, dead_time_fixed=True)[1]
     gained = (lags.cost - costs.min()) / whole.variance
     charge = max(slips.zeros, _S_AND_J) * max(LEAST_CHARGE, whole.penalty)
-    if charge - gained > PLAUSIBLE:
-        return None
-    return profile_limits(grid, (costs - costs.min()) / whole.variance)[1]
+    if charge - gained <= PLAUSIBLE:
+        return profile_limits(grid, (costs - costs.min()) / whole.variance)[1]
+    if slips.zeros != _S_AND_J:
+        return None  # the modes of more lags can do more than slip
+    # Noise hides friction as it hides lags, and does not remove it.
+    alike = grid[costs <= lags.cost]
+    return float(alike[-1]) if alike.size else None
