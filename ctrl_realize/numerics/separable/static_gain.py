@@ -33,6 +33,7 @@ they bend by an eighth of that, 0.06 % of the way."""
 SIGNIFICANT = Z_95  # standard errors: a gain of less may as well be none, or have the other sign
 
 _STEP = 1e-4  # of logarithms, and part of a numerator: for slopes by differences
+_TOGETHER = 2**16  # samples of responses that are found at a time
 _HALVINGS = 60  # of an interval, until a double has no more digits
 _NOTHING = 1e-13  # part of the largest singular value that is rounding
 
@@ -162,8 +163,11 @@ def local_errors(
     # A dead time is not negative: the derivatives at zero are those slightly later.
     inside = np.concatenate([[max(theta[0], moves[0, 0])], theta[1:], numerator])
     there = np.concatenate([inside + moves, inside - moves])
+    # Models of long records one by one, which bounds the memory.
+    parts = np.array_split(there, min(len(there), 1 + len(there) * problem.data.size // _TOGETHER))
     setting = problem.drive, problem.known
-    ahead, behind = np.split(responses(*setting, there[:, theta.size :], there[:, : theta.size]), 2)
+    every = [responses(*setting, x[:, theta.size :], x[:, : theta.size]) for x in parts]
+    ahead, behind = np.split(np.concatenate(every), 2)
     slopes = (ahead - behind).T / (2 * moves.diagonal())
     columns = problem.weighted(np.concatenate([slopes, problem.regressors], axis=1))
     if problem.segments is not None:
