@@ -30,6 +30,7 @@ MODELS = [
     Backlash(3.0, start=0.5),
     Resolution(0.7),
     Saturation(45, 55),
+    Saturation(-np.inf, 52),
     Saturation(high=55, low=-np.inf),
     DeadZone(-1, 52),
     Stiction(4, 1.5),
