@@ -381,4 +381,5 @@ def test_an_output_that_moves_at_its_last_sample_alone_is_fitted():
     with good_end() as models:
         models.append(cr.identify(cr.Record(1e-6 * np.arange(23), u, y)))
     low, high = models[0].fit.interval
-    assert 1.9e-6 < low < high <= 4e-6
+    # One sample tells no structure: the response comes after 2 to 3 samples, or one earlier.
+    assert 0.9e-6 < low <= 2e-6 < 3e-6 <= high <= 4e-6

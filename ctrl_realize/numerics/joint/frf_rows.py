@@ -117,6 +117,7 @@ class MeasuredPoints:
             Sines(self.omega),
             np.empty((2 * self.omega.size, 0)),
             KnownFactor(),
+            real=False,  # at a point, the modes of conjugate poles are not conjugate
         )
 
 
@@ -152,4 +153,5 @@ def with_rows(record: Problem, more: Problem) -> Problem:
         drive=Beside((record.drive, more.drive)),
         regressors=np.concatenate([record.regressors, more.regressors]),
         segments=segments,
+        real=record.real and more.real,
     )

@@ -5,7 +5,7 @@ static part, the modes exp(p t) and their derivatives t exp(p t), the regressors
 orthogonal transformation [1]_ takes the rows of a record, hundreds or thousands, to as many as
 these columns are. Squares and products of residual and Jacobian, all that a search needs, do not
 change: they are those of `varpro.evaluate`, which remains for records with local terms or known
-dynamics, and where the residual itself is needed.
+dynamics, for points of a frequency response, and where the residual itself is needed.
 
 Pairs of conjugate modes are a decaying cosine and sine, so that all columns are real.
 
@@ -90,7 +90,7 @@ def eliminate(problem: Problem, structure: Structure, parameters: FloatArray) ->
 
 
 def _compressible(problem: Problem) -> bool:
-    return problem.segments is None and not problem.known.poles.size
+    return problem.real and problem.segments is None and not problem.known.poles.size
 
 
 def _eliminated(

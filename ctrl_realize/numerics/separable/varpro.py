@@ -47,7 +47,8 @@ class Problem:
     """The problem: data (m,), root weights (m,), input, fixed regressors (m, q).
 
     With `segments` each of them has a separate initial state and regressors. Without them, a
-    `whitener` (m, m) may replace the weights for coloured noise.
+    `whitener` (m, m) may replace the weights for coloured noise. `real` tells whether the modes of
+    conjugate poles are conjugate, as those of signals are.
     """
 
     data: FloatArray
@@ -57,6 +58,7 @@ class Problem:
     known: KnownFactor
     segments: Segments | None = None
     whitener: FloatArray | None = None
+    real: bool = True
 
     def weighted(self, columns: FloatArray) -> FloatArray:
         """Columns (..., m, k) in units of the noise."""

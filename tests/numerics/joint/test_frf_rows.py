@@ -6,6 +6,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from ctrl_realize.numerics.joint.frf_rows import MeasuredPoints, Sines, both_together
+from ctrl_realize.numerics.separable.compressed import compress
 from ctrl_realize.numerics.separable.local_terms import Segments
 from ctrl_realize.numerics.separable.poles import parameters_from_poles
 from ctrl_realize.numerics.separable.responses import SampledInput
@@ -39,6 +40,11 @@ def test_the_cost_is_the_weighted_distance_with_half_of_the_variance_in_each_par
     model = (b[0] + b[1] * 1j * OMEGA) / np.polyval(np.poly(POLES), 1j * OMEGA)
     distance = np.abs(moved - model * np.exp(-1j * OMEGA * DEAD_TIME))
     assert_allclose(state.cost[0], np.sum(2 * (distance / sigma) ** 2), rtol=1e-10)
+    # a search sees the same cost, and the same slope
+    searched = compress(problem, Structure(3, 2), PARAMETERS[None])
+    assert_allclose(searched.cost, state.cost, rtol=1e-10)
+    slopes = [each.jacobian[0].T @ each.residual[0] for each in (searched, state)]
+    assert_allclose(*slopes, rtol=1e-8)
 
 
 @pytest.mark.parametrize("which", range(4))
