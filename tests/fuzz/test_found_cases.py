@@ -378,8 +378,12 @@ def test_an_output_that_moves_at_its_last_sample_alone_is_fitted():
     # responses that come after the record showed in rounding, with slopes of 1e168
     u, y = np.repeat([0.0, 1e30], [19, 4]), np.zeros(23)
     u[0], y[-1] = 8.75366413e-130, 2e20
+    record = cr.Record(1e-6 * np.arange(23), u, y)
     with good_end() as models:
-        models.append(cr.identify(cr.Record(1e-6 * np.arange(23), u, y)))
+        models.append(cr.identify(record))
+        models.append(cr.identify(record, structures=[(1, 1)]))
+    # One sample is that of any structure: the response comes after 2 to 3 samples, or one earlier.
     low, high = models[0].fit.interval
-    # One sample tells no structure: the response comes after 2 to 3 samples, or one earlier.
     assert 0.9e-6 < low <= 2e-6 < 3e-6 <= high <= 4e-6
+    low, high = models[1].fit.interval
+    assert 1.9e-6 < low < high <= 4e-6
