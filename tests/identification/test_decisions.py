@@ -214,16 +214,6 @@ def test_the_window_grows_until_the_response_has_died_away():
 # --- channels
 
 
-def test_delays_of_channels_move_to_where_the_responses_begin():
-    core = ct.ss([[0.9]], [[1.0]], [[0.1]], [[0.0]], DT)
-    plant = cr.DelayedStateSpace(core, 6)
-    u = random_levels(6, 800, 1)
-    y = plant.simulate(u) + 0.1 * np.random.default_rng(2).standard_normal(u.size)
-    found = cr.fit_state_space(cr.Record(DT * np.arange(u.size), u, y), 1)
-    assert found.delay == 6
-    assert found.delay_free.poles()[0] == pytest.approx(0.9, abs=0.03)
-
-
 def test_an_output_of_noise_is_named_and_the_other_one_is_fitted():
     rng = np.random.default_rng(0)
     u = random_levels(7, 300, 2)
@@ -236,14 +226,6 @@ def test_an_output_of_noise_is_named_and_the_other_one_is_fitted():
 
 
 # --- the order of a scan
-
-
-def test_an_order_that_only_follows_the_noise_is_not_suggested():
-    for plant, order in ((rigs.R1, 1), (rigs.R2, 2)):
-        record = rigs.step_record(plant, noise=1e-3, seed=4, before=1500, after=1500)
-        impulse = cr.impulse_from_step(cr.unit_step(record))
-        scan = cr.scan_orders(impulse, 5, max_delay=60)
-        assert scan.order == order
 
 
 def test_without_known_noise_the_least_order_of_nearly_the_least_misfit_is_suggested():

@@ -22,16 +22,6 @@ def step(seconds, *, lag=LAG, noise=0.05, seed=0, order=1):
     return cr.Record(t, u, y + noise * np.random.default_rng(seed).standard_normal(t.size))
 
 
-def wandering(seed, n=300):
-    """A plant of gain -3 whose output wanders as much as it responds."""
-    rng = np.random.default_rng(seed)
-    u = np.convolve(rng.standard_normal(n + 40), 0.9 ** np.arange(40))[40 : n + 40]
-    core = cr.design.ProcessModel(gain=-3.0, lag=4.0, dead_time=3.0).system(1.0).delay_free
-    y = cr.delayed_ss(core, 3).simulate(u)
-    y = y + 0.25 * np.cumsum(rng.standard_normal(n)) + 0.3 * rng.standard_normal(n)
-    return cr.Record(np.arange(n) * 1.0, u, y)
-
-
 def warned(design, *given):
     """What a design says of a record that does not resolve what it needs."""
     with warnings.catch_warnings(record=True) as caught:
@@ -145,23 +135,6 @@ def test_a_tank_that_fills_after_a_long_rest_is_not_called_unstable():
     assert "unstable" not in codes(system)
     low, high = system.fit.interval
     assert low <= 0.5 <= high
-
-
-def test_a_gain_is_told_beside_an_output_that_wanders():
-    fit = cr.identify(wandering(3)).fit
-    assert fit.gain == pytest.approx(-3.0, abs=0.5)
-    assert fit.gain_interval[1] < 0
-
-
-def test_a_level_tank_has_a_slope_that_is_known():
-    t = np.arange(400.0)
-    u = np.where(t < 100, 0.0, 1.0)
-    y = 0.01 * np.maximum(t - 110, 0)
-    noise = 0.02 * np.random.default_rng(0).standard_normal(400)
-    system = cr.identify(cr.Record(t, u, y + noise))
-    low, high = system.fit.gain_interval
-    assert low <= 0.01 <= high < 0.011
-    assert "gain_not_resolved" not in codes(system)
 
 
 def test_analyses_warn_and_a_saved_model_still_says_what_is_not_resolved(unknown, tmp_path):

@@ -19,8 +19,8 @@ def last_digit(record):
 
 
 def in_other_units(record):
-    """Of time (milliseconds), input and output at once, which moves last digits too."""
-    return cr.Record(1000 * record.time, 0.3 * record.input, 700.0 * record.output)
+    """Of time (nanoseconds), input and output at once, which moves last digits too."""
+    return cr.Record(1e9 * record.time, 0.3 * record.input, 700.0 * record.output)
 
 
 def two_lags_of_random_levels():

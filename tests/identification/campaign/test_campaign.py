@@ -2,7 +2,6 @@
 
 import functools
 import os
-import pickle
 import signal
 import threading
 import time
@@ -14,8 +13,6 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 import ctrl_realize as cr
-from ctrl_realize.identification.campaign.packed_model import PackedModel
-from ctrl_realize.io import FitSummary
 from tests.rigs import TS, step_record
 
 
@@ -73,41 +70,6 @@ def test_the_final_model_is_the_best_record_at_the_common_delay(campaign):
     scan = campaign.best.system.fit
     again = cr.realize(scan.impulse, 3, delay=system.delay, samples=1000, feedthrough=True)
     assert_array_equal(system.A, again.A)
-
-
-RNG = np.random.default_rng(1)
-SISO = ct.ss([[0.9, 0.1], [0, 0.5]], [[0], [1]], [[1, 1 / 3]], 0.1, 7e-4)
-MIMO = ct.ss(*(RNG.standard_normal(shape) for shape in ((3, 3), (3, 2), (2, 3), (2, 2))), 0.1)
-FIT = FitSummary("Fit", "how", ())
-STATIC = ct.ss([], [], [], [[2.0]], 1.0)
-
-
-@pytest.mark.parametrize(
-    "system",
-    [
-        cr.DelayedStateSpace(SISO, 37, name="valve", inputs="i", outputs="x", fit=FIT),
-        cr.DelayedStateSpace(SISO, 0),
-        cr.DelayedStateSpace(MIMO, (2, 5), output_delay=(0, 3), name="plant"),
-        cr.DelayedStateSpace(STATIC, 4),
-    ],
-    ids=["siso", "no delay", "mimo", "static"],
-)
-def test_unpacking_gives_the_model_bit_by_bit(system):
-    packed = pickle.loads(pickle.dumps(PackedModel.of(system)))
-    for twin in (PackedModel.of(system).unpack(), packed.unpack()):
-        for letter in "ABCD":
-            assert_array_equal(getattr(twin, letter), getattr(system, letter))
-            assert_array_equal(getattr(twin.delay_free, letter), getattr(system.delay_free, letter))
-        assert_array_equal(twin.delay, system.delay)
-        assert (twin.input_delays, twin.output_delays) == (
-            system.input_delays,
-            system.output_delays,
-        )
-        assert (twin.name, twin.dt) == (system.name, system.dt)
-        assert (twin.fit and twin.fit.report()) == (system.fit and system.fit.report())
-        assert twin.input_labels == system.input_labels
-        assert twin.output_labels == system.output_labels
-        assert twin.state_labels == system.state_labels
 
 
 def quick(seed: int, wait: float = 0.0) -> cr.Record:

@@ -77,12 +77,6 @@ def test_the_interval_is_narrower_than_either_alone_and_contains_the_truth():
     assert inside >= 5  # 95 % intervals
 
 
-def test_the_order_is_chosen_from_both():
-    fit = fit_joint(step(), response()).fit
-    assert fit.structure == (1, 1)
-    assert fit.interval[0] <= DEAD_TIME <= fit.interval[1]
-
-
 def test_the_statistic_is_the_rise_of_both_parts():
     agreed = agreeing().agreement
     assert agreed.statistic == agreed.record_rise + agreed.frf_rise
@@ -248,22 +242,6 @@ def test_identify_delegates_and_its_result_has_what_all_fits_have():
 def test_what_cannot_be_fitted_together_is_refused(arguments, error, match):
     with pytest.raises(error, match=match):
         cr.identify(step(), **arguments)
-
-
-def test_few_points_take_part():
-    frf = response()
-    few = cr.MeasuredFRF(frf.complex[::3], HZ[::3], std=frf.std[::3])
-    fit = fit_joint(step(), few, structures=ONE_LAG).fit
-    assert fit.frf_fit.frequency_hz.size == 5
-    assert not fit.agreement.contradicts
-
-
-def test_the_data_of_the_caller_are_not_changed():
-    record, frf = step(), response()
-    before = record.output.copy(), frf.complex.copy()
-    fit_joint(record, frf, structures=ONE_LAG)
-    assert np.array_equal(record.output, before[0])
-    assert np.array_equal(frf.complex, before[1])
 
 
 def measured_plant(folder, name):

@@ -22,7 +22,6 @@ from ctrl_realize.numerics.actuators.limits import slew_limited
 from tests import rigs
 
 DT, DEAD_TIME = 0.1, 0.73
-PLANT = cr.delayed_ss(2 * ct.tf([1], [0.5, 1.5, 1]), dead_time=DEAD_TIME, dt=DT)
 FINE = 20
 """Steps within a sample for a position that moves within it."""
 
@@ -47,7 +46,7 @@ def staircase(*moves, hold=120):
 def test_a_single_large_step_tells_a_slew_rate_and_the_dead_time_behind_it():
     record = through(SlewRateLimit(12.0), staircase(40.0, hold=150), 1)
     linear_system = cr.fit_output_error(record)
-    system = cr.fit_output_error(record, actuator="slew_rate")
+    system = cr.fit_output_error(record, actuator="auto")
     linear, fit = linear_system.fit, system.fit
     assert linear.actuator is None
     rate = fit.actuator["slew_rate"]
@@ -91,16 +90,6 @@ def test_records_of_several_sizes_share_dead_band_and_linear_part():
     assert fit.gain_interval[0] <= 2.0 <= fit.gain_interval[1]
 
 
-def test_small_steps_tell_slip_jump_and_stick_band():
-    command = staircase(*[0.5] * 8, *[-0.5] * 14, *[0.5] * 8, hold=40)
-    record = through(KanoStiction(S=2.6, J=1.3, start=1.0), command, 3)
-    fit = cr.fit_output_error(record, actuator="stiction", structures=[(2, 2)]).fit
-    for name, truth in (("S", 2.6), ("J", 1.3)):
-        found = fit.actuator[name]
-        assert found.low <= truth <= found.high
-        assert found.high - found.low < 0.8  # steps are 0.5 high
-
-
 def test_a_slip_of_another_step_is_no_outlier_and_spikes_are():
     large = staircase(15, -15, 15, hold=60) - 50.0
     small = 15.0 + np.repeat(np.cumsum([0.8] * 12 + [-0.8] * 24 + [0.8] * 24), 20)
@@ -132,12 +121,10 @@ FLOWS = {f"flow_at_{u}": (u**0.5 - 20**0.5) / (90**0.5 - 20**0.5) for u in range
 OTHERS = [
     ("slew_rate", SlewRateLimit(12.0, 20.0), staircase(30, -30, 20, -30, hold=90),
      {"slew_rate_opening": (12.0, 1.2), "slew_rate_closing": (20.0, 2.0)}),
-    ("slew_rate", SlewRateLimit(12.0), staircase(30, -30, 20, -30, hold=90),
-     {"slew_rate": (12.0, 1.2)}),
     ("saturation", Saturation(27.0, 84.0), LEVELS,
      {"travel_low": (27.0, 0.5), "travel_high": (84.0, 0.5)}),
     ("saturation", Saturation(-100.0, 76.0), LEVELS, {"travel_high": (76.0, 0.5)}),
-    ("auto", Characteristic("equal-percentage", rangeability=30), LEVELS,
+    ("characteristic", Characteristic("equal-percentage", rangeability=30), LEVELS,
      {"rangeability": (30.0, 1.5)}),
     ("characteristic", Characteristic("quick-opening"), LEVELS,
      {name: (flow, 0.03) for name, flow in FLOWS.items()}),
@@ -173,19 +160,6 @@ def test_no_linear_model_need_follow_what_a_valve_does():
     for name, truth in trial.values.items():
         assert fit.actuator[name].low <= truth <= fit.actuator[name].high
     assert fit.interval[0] <= trial.dead_time <= fit.interval[1]
-
-
-def test_records_at_several_positions_tell_a_characteristic_together():
-    plug = Characteristic("equal-percentage", rangeability=30)
-    records = [
-        through(plug, np.repeat([low, low + 10.0, low], 80), seed)
-        for seed, low in enumerate([20.0, 45.0, 70.0])
-    ]
-    fit = cr.fit_output_error(records, actuator="characteristic", structures=[(2, 2)]).fit
-    found = fit.actuator["rangeability"]
-    assert found.low <= 30.0 <= found.high
-    assert found.high - found.low < 2
-    assert fit.interval[0] <= DEAD_TIME <= fit.interval[1]
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,7 @@ from scipy.special import gammainc
 from scipy.stats import invgauss
 
 import ctrl_realize as cr
-from tests import measured, rigs
+from tests import rigs
 from tests.rigs import codes
 
 TS = rigs.TS
@@ -126,13 +126,6 @@ def test_the_dead_time_before_a_flow_is_found():
     assert "inverse_response" not in codes(fit)
 
 
-def test_a_lag_behind_the_flow_is_not_taken_for_it():
-    fit = cr.fit_output_error(flow_record(0.7, 0.001, lag=0.02)).fit
-    low, high = fit.delay_interval
-    assert abs(fit.delay - DELAY) < 2
-    assert low <= DELAY <= high
-
-
 BEFORE, N = 600, 1600
 
 
@@ -187,15 +180,6 @@ def test_slow_noise_leaves_a_narrower_interval_that_holds():
     assert narrower >= 3
 
 
-def test_colour_that_only_the_response_has_is_a_misfit():
-    # White at rest; a ringing that no model of the toolbox has is left in the response.
-    data, _ = record(2, lambda rng: rng.standard_normal(N), 0.005)
-    after = np.arange(N) >= BEFORE
-    bent = data.output + 0.02 * after * ringing(np.random.default_rng(5))
-    fit = cr.fit_output_error(cr.Record(data.time, data.input, bent), **LAGS).fit
-    assert "generalised" not in fit.report()
-
-
 def test_records_fitted_together_know_the_noise_of_their_mean():
     rng = np.random.default_rng(11)
     k = np.arange(N)
@@ -208,17 +192,6 @@ def test_records_fitted_together_know_the_noise_of_their_mean():
     assert fit.delay == pytest.approx(36.4, abs=0.1)
     low, high = fit.delay_interval
     assert low <= 36.4 <= high
-
-
-def test_the_ripple_of_a_measured_motor_leaves_its_delay_narrow():
-    data = measured.record("dc_motor_tacho/up")
-    fit = measured.fitted("dc_motor_tacho/up")
-    low, high = fit.interval
-    assert fit.at_noise_level
-    assert 31 <= fit.delay <= 42
-    assert high - low <= 0.3 * fit.onset
-    first, last = cr.fit_output_error(data, noise="white").fit.interval
-    assert last - first > 2 * (high - low)
 
 
 def test_a_rest_that_is_silent_but_for_bursts_tells_no_colour():

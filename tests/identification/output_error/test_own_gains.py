@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from scipy.optimize import least_squares
-from scipy.signal import lfilter
 
 import ctrl_realize as cr
 from ctrl_realize.errors import OptionError
@@ -68,14 +67,6 @@ def test_gains_of_steps_are_within_their_intervals_and_the_dead_time_in_its():
     assert sum(inside) >= 43
 
 
-def test_the_error_of_a_gain_is_its_scatter():
-    found = [fitted(seed).fit.gains for seed in range(12)]
-    scatter = np.std([one.gains for one in found], axis=0, ddof=1)
-    told = np.mean([one.errors for one in found], axis=0)
-    # twelve values: the standard deviation is known to 21 %
-    assert_allclose(told / scatter, 1.0, atol=0.5)
-
-
 def test_steps_agree_with_least_squares_over_all_parameters_at_once():
     records = at_three_levels(3)
 
@@ -98,39 +89,11 @@ def test_steps_agree_with_least_squares_over_all_parameters_at_once():
     assert_allclose(fit.gains.errors, errors[2:5], rtol=0.35)
 
 
-def test_gains_of_random_inputs_agree_with_least_squares_over_all_parameters_at_once():
+def test_gains_of_random_inputs_are_within_their_intervals():
     records = [moved(seed, gain) for seed, gain in enumerate(GAINS)]
-    fit = own(records, loss="least_squares").fit
+    fit = own(records).fit
     assert np.all((fit.gains.low <= GAINS) & (fit.gains.high >= GAINS))
     assert fit.interval[0] <= DEAD_TIME <= fit.interval[1]
-    used = [slice(40, None)] * 3
-
-    def residual(p):
-        # sampled by hand: an input comes a part of a sample late
-        delay, part_of = divmod(p[0] / DT, 1.0)
-        pole, early = np.exp(-DT / p[1]), np.exp((part_of - 1) * DT / p[1])
-        numerator = np.r_[np.zeros(int(delay) + 1), 1 - early, early - pole]
-        parts = []
-        for record, gain, level, part in zip(records, p[2:5], p[5:], used, strict=True):
-            y = gain * lfilter(numerator, [1, -pole], np.ravel(record.input))
-            parts.append((np.ravel(record.output) - y - level)[part])
-        return np.concatenate(parts)
-
-    exact = least_squares(residual, [0.12, 0.5, 0.8, 0.6, 0.3, 0.0, 0.0, 0.0], x_scale="jac")
-    errors = NOISE * np.sqrt(np.diag(np.linalg.inv(exact.jac.T @ exact.jac)))
-    # ours estimates a drift and an initial state of each record besides
-    assert np.all(np.abs(fit.gains.gains - exact.x[2:5]) < 1.5 * errors[2:5])
-    assert abs(fit.dead_time - exact.x[0]) < 1.5 * errors[0]
-
-
-@pytest.mark.parametrize("heights", [(2.0, -2.0, 2.0), (2.0, -1.0, 4.0)])
-def test_direction_and_height_of_the_steps_do_not_matter(heights):
-    records = [
-        step(i, gain, height=height)
-        for i, (gain, height) in enumerate(zip(GAINS, heights, strict=True))
-    ]
-    gains = own(records).fit.gains
-    assert np.all((gains.low <= GAINS) & (gains.high >= GAINS))
 
 
 def test_gains_of_fits_with_one_gain_agree_with_those_of_own_gains():

@@ -1,13 +1,10 @@
 """Several step records of one plant: mean, scatter, trend, outliers, differences."""
 
-from dataclasses import dataclass
-
 import control as ct
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from scipy.special import chdtrc
-from scipy.stats import norm
 
 import ctrl_realize as cr
 from ctrl_realize import report
@@ -16,9 +13,7 @@ from ctrl_realize.identification.output_error.averaging import (
     aligned_steps,
     mean_step,
     repeatability,
-    widened,
 )
-from ctrl_realize.identification.output_error.repeatability import Repeatability
 from ctrl_realize.report.verdict import campaign_verdict
 from tests import rigs
 from tests.rigs import codes
@@ -33,19 +28,13 @@ def record(seed, *, delay=37.0, amplitude=16.0, name="", plant=rigs.R3):
     return cr.Record(made.time, made.input, made.output, name=name or f"no. {seed}")
 
 
-@pytest.fixture(scope="module")
-def sixteen():
-    return cr.fit_output_error([record(seed) for seed in range(16)], structures=[(3, 3)]).fit
-
-
-def test_the_mean_of_sixteen_records_is_four_times_as_exact(sixteen):
+def test_the_mean_of_sixteen_records_is_four_times_as_exact():
+    sixteen = cr.fit_output_error([record(seed) for seed in range(16)], structures=[(3, 3)]).fit
     assert sixteen.std_given_structure / TS == pytest.approx(0.46 / 4, rel=0.25)
     assert abs(sixteen.delay - 37) < 4 * 0.46 / 4
     assert sixteen.at_noise_level
     assert sixteen.gain == pytest.approx(1.0, abs=0.002)
-
-
-def test_records_that_differ_by_noise_alone_are_not_called_different(sixteen):
+    # and records that differ by noise alone are not called different
     repeats = sixteen.repeatability
     assert repeats.p_value > 0.01
     assert not repeats.outlying
@@ -161,56 +150,6 @@ def test_errors_and_chi_square_are_those_of_the_noise():
     assert found.chi_square == pytest.approx(statistic, rel=1e-6)
     assert found.p_value == pytest.approx(chdtrc(kept.size - 1, statistic), rel=1e-6)
     assert found.p_value > 0.001
-
-
-def test_what_a_record_has_for_itself_moves_its_delay_no_more_than_noise_does():
-    made = simulated([37.0] * 3, [16.0] * 3, noise=1e-3)
-    mean = mean_step(made)
-    model = model_of(mean, 37.0)
-    own = np.column_stack([LEVEL, np.exp(-np.arange(1600) / 200)])
-    plain = repeatability(made, mean, model, 37 * TS, own)
-    moved = []
-    for i, step in enumerate(made):
-        record = step.record
-        extra = (i - 1) * (0.5 * np.exp(-np.arange(1600) / 200) + 2.0 * record.time)
-        moved.append(cr.Record(record.time, record.input, record.output + extra))
-    found = repeatability(aligned_steps(tuple(moved)), mean, model, 37 * TS, own)
-    assert_allclose(found.delays, plain.delays, atol=1e-3 * TS)
-    assert_allclose(found.errors, plain.errors, rtol=1e-3)
-
-
-@dataclass(frozen=True)
-class Fit:
-    """What is widened of a fit."""
-
-    low: float
-    high: float
-    std: float
-
-
-def repeats_of(delays, p_value):
-    n = len(delays)
-    return Repeatability(
-        names=("",) * n, amplitudes=np.ones(n), delays=np.array(delays), errors=np.ones(n),
-        gains=np.ones(n), chi_square=0.0, p_value=p_value, trend=0.0, trend_error=0.0, outlying=(),
-    )  # fmt: skip
-
-
-def test_an_interval_takes_up_the_scatter_of_records_that_differ():
-    fit = Fit(low=9.0, high=11.0, std=0.5)
-    delays = [10.0, 12.0, 8.0, 50.0]
-    between = np.std(delays[:3], ddof=1) / np.sqrt(3)
-    wide = widened(fit, repeats_of(delays, 1e-6), (0, 1, 2))
-    z = norm.ppf(0.975)
-    assert_allclose(
-        [wide.low, wide.high, wide.std],
-        [9 - z * between, 11 + z * between, np.sqrt(0.25 + between**2)],
-    )
-    # a delay is not negative
-    assert widened(Fit(0.1, 11.0, 0.5), repeats_of(delays, 1e-6), (0, 1, 2)).low == 0
-    # records that differ by noise alone leave it as it is
-    assert widened(fit, repeats_of(delays, 0.01), (0, 1, 2)) is fit
-    assert widened(fit, repeats_of(delays, 0.0099), (0, 1, 2)) is not fit
 
 
 T = 0.05 * np.arange(400)

@@ -8,7 +8,6 @@ from numpy.testing import assert_allclose
 
 import ctrl_realize as cr
 from ctrl_realize.errors import DataError, OptionError
-from ctrl_realize.numerics.signals.edges import Edge, find_edges
 from ctrl_realize.numerics.signals.filters import low_pass
 from tests.rigs import R3, TS, exact_step, step_record
 
@@ -136,17 +135,6 @@ def test_what_is_no_step_response_is_named():
     for order in (0, 11):
         with pytest.raises(OptionError, match="filter_order"):
             cr.impulse_from_step(step(), cutoff_hz=10.0, filter_order=order)
-
-
-def test_an_edge_of_a_record_is_that_of_its_samples_at_a_time():
-    u = np.repeat([4.0, 12.0, 2.0], [100, 80, 60])
-    found = cr.detect_step(cr.Record(5.0 + 0.1 * np.arange(240), u, u)).edges
-    plain = find_edges(u, 3, 0.1)
-    assert [isinstance(edge, Edge) for edge in found] == [True, True]
-    assert [{**vars(edge), "time": None, "edges": None} for edge in found] == [
-        {**vars(edge), "time": None, "edges": None} for edge in plain
-    ]
-    assert [edge.time for edge in found] == pytest.approx([15.0, 23.0])
 
 
 def test_measured_records_have_one_step_where_it_is(shared_data):

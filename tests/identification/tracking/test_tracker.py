@@ -115,16 +115,6 @@ def test_an_input_that_rests_does_not_tell():
     assert "no: no movement" in last.report()
 
 
-def test_an_output_that_is_stuck_does_not_tell():
-    record, _ = worn_valve(seconds=8)
-    rng = np.random.default_rng(1)
-    stuck = cr.Record(record.time, record.input, 0.3 + 0.08 * rng.standard_normal(record.n_samples))
-    bank = tracker()
-    track = bank.track(stuck)
-    assert np.mean(track.resolved) < 0.05
-    assert not bank.estimate().resolved
-
-
 def test_a_tracker_goes_on_after_pickling_as_if_nothing_had_happened():
     record, _ = worn_valve(seconds=4, last=37.0)
     one = tracker(forgetting_time=1.0)

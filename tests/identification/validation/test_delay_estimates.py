@@ -142,13 +142,6 @@ def test_only_pairs_that_rule_each_other_out_are_in_conflict():
     assert common_dead_time([A, view("r", 3.5, 6.0, "upper bound")]) == ((1.0, 3.0), ())
 
 
-def test_an_estimate_is_rounded_as_its_interval_is():
-    shown = check(
-        [DelayEstimate("a", "FRF", "dead time", 0.0123456, 0.012, 0.013)], dt=0.01
-    ).report()
-    assert "12.3 ms = 1.235 samples (12.0 to" in shown
-
-
 def first_coefficient(record, lag, order=12):
     """Coefficient of the input `lag` samples ago in a free ARX model, over its standard error."""
     u, y = np.ravel(record.input), np.ravel(record.output)

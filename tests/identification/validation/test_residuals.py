@@ -7,7 +7,6 @@ from numpy.testing import assert_allclose
 from scipy.signal import lfilter
 
 import ctrl_realize as cr
-from ctrl_realize.delayed.simulation import simulate_record
 from tests.measured import halves
 from tests.rigs import DT, TWO_INPUTS, TWO_STATES
 
@@ -58,19 +57,6 @@ def test_a_delay_that_is_off_by_one_shows_in_the_cross_correlation(delay):
     # the model's first response is missing, or comes too soon: G_1 = 0.1 at the sample after
     # the shorter of the delays
     assert np.abs(check.cross[0, 0, 25:]).argmax() in (5, 6, 7)
-
-
-def test_feedback_is_told_from_a_wrong_model():
-    rng = np.random.default_rng(0)
-    n = 2000
-    u, y, e = np.zeros(n), np.zeros(n), 0.3 * rng.standard_normal(n)
-    r = rng.standard_normal(n)
-    for k in range(1, n):
-        y[k] = 0.8 * y[k - 1] + 0.2 * u[k - 1] + (e[k] - 0.8 * e[k - 1])
-        u[k] = r[k] - 1.5 * y[k]
-    plant = ct.ss([[0.8]], [[1.0]], [[0.2]], [[0.0]], DT)
-    check = cr.validation.analyse_residuals(plant, cr.Record(DT * np.arange(n), u, y))
-    assert "feedback" in [flag.code for flag in check.flags]
 
 
 @pytest.mark.parametrize("integral", [0.0, 0.1])
@@ -144,24 +130,3 @@ def test_measured_plants_are_predicted_on_the_half_that_was_not_used(plant, leng
     model = cr.estimate_delay(cr.impulse_from_io(first, length), order, max_delay=10)
     assert cr.validation.analyse_residuals(model, second).fit_percent[0] > least
     assert cr.validation.predict(model, second, 1).fit_percent[0] > least + 3
-
-
-TS = 0.1
-
-
-def core(pole=0.8, D=0.0, dt=TS):
-    return ct.ss([[pole]], [[1.0]], [[1 - pole]], [[D]], dt)
-
-
-def measured(u, y, dt=TS):
-    return cr.Record(dt * np.arange(np.shape(u)[-1]), u, y)
-
-
-def test_each_output_has_its_own_offset_and_delay():
-    system = cr.DelayedStateSpace(
-        ct.ss([[0.8]], [[1.0]], [[1.0], [2.0]], np.zeros((2, 1)), TS), 0, output_delay=(0, 4)
-    )
-    u = np.random.default_rng(0).standard_normal(80)
-    y = system.simulate(u) + np.array([[3.0], [-5.0]])
-    one = measured(u[20:], y[:, 20:])
-    assert_allclose(simulate_record(system, one, "estimate"), one.output, rtol=0, atol=1e-9)
