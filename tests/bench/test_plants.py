@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-import ctrl_realize as cr
 from ctrl_realize import bench
 from ctrl_realize.errors import DataError, OptionError
 
@@ -70,27 +69,6 @@ def test_the_sampled_truth_simulates_any_record(make):
     deviation = plant.truth.sampled.simulate(held - held[0])
     assert_allclose(record.output, plant.steady_state[1] + deviation, atol=1e-10)  # levels of 50
     assert_allclose(record.input, held, rtol=0)
-
-
-def test_a_plant_that_settles_begins_at_the_level_of_its_first_input():
-    heater = bench.heater(**CLEAN)
-    assert_allclose(heater.record(np.full(5, 60.0)).output, 40 + 0.9 * (60 - 20), rtol=1e-14)
-    assert_allclose(bench.tank(**CLEAN).record(np.full(5, 60.0)).output, 30.0, rtol=1e-14)
-
-
-@pytest.mark.parametrize(
-    ("make", "structure"), [(bench.heater, "P2D"), (bench.tank, "P1ID"), (bench.flow_loop, "P2D")]
-)
-def test_identify_finds_the_truth_within_its_interval(make, structure):
-    plant = make()
-    record = plant.step_record(rng=2)
-    fit = cr.identify(record, structures=structure).fit
-    low, high = fit.interval
-    assert low <= plant.truth.dead_time <= high
-    rate = plant.truth.integrating_rate
-    # over 20 seeds the gain scatters by 0.4 % at most
-    assert fit.gain == pytest.approx(plant.truth.gain if rate is None else rate, rel=0.015)
-    assert fit.total_delay == pytest.approx(plant.truth.total_delay, rel=0.03)
 
 
 def test_noise_disturbance_and_rounding_are_those_asked_for():

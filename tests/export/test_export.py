@@ -84,63 +84,57 @@ def structured_text(system, folder, **options):
     return FunctionBlock(export.to_structured_text(system, folder / "u.st", **options).read_text())
 
 
-def signals():
-    hand = ~np.isnan(MANUAL)
-    columns = SETPOINT, MEASURED, hand, np.nan_to_num(MANUAL)
-    return zip(*(column.tolist() for column in columns), strict=True)
+def ran(system, language, inputs, folder):
+    """Outputs of the exported code, a column for each row of inputs."""
+    inputs = [list(map(float, row)) for row in inputs]
+    algorithm = isinstance(system, cr.design.PIDAlgorithm)
+    outputs = 1 if algorithm else system.noutputs
+    if language == "python":
+        unit = python_unit(system, folder)
+        return np.transpose([np.atleast_1d(unit.step(*row)) for row in inputs])
+    got = []
+    if language == "c":
+        made, state = compiled(system, folder)
+        made.unit_init(state)
+        for row in inputs:
+            given = [ctypes.c_double(value) for value in row]
+            if algorithm:
+                given[2] = int(row[2])
+            out = [ctypes.c_double() for _ in range(outputs)]
+            single = made.unit_step(state, *given, *map(ctypes.byref, out if outputs > 1 else []))
+            got.append([each.value for each in out] if outputs > 1 else [single])
+        return np.transpose(got)
+    block = structured_text(system, folder)
+    names = ["u"] if len(inputs[0]) == 1 else ["u1", "u2"]
+    for row in inputs:
+        if algorithm:
+            block(setpoint=row[0], measured=row[1], manual=bool(row[2]), manual_output=row[3])
+        else:
+            block(**dict(zip(names, row, strict=True)))
+        shown = r"u" if algorithm else r"y\d?"
+        got.append([value for name, value in block.values.items() if re.fullmatch(shown, name)])
+    return np.transpose(got)
+
+
+LANGUAGES = pytest.mark.parametrize("language", [pytest.param("c", marks=gcc), "python", "st"])
 
 
 @pytest.mark.parametrize("kind", ALGORITHMS)
-@pytest.mark.parametrize("language", [pytest.param("c", marks=gcc), "python", "st"])
+@LANGUAGES
 def test_an_exported_controller_is_the_simulated_one(kind, language, tmp_path):
-    algorithm = ALGORITHMS[kind]
-    expected = algorithm.simulate(SETPOINT, MEASURED, MANUAL)
-    if language == "c":
-        made, state = compiled(algorithm, tmp_path)
-        made.unit_init(state)
-        got = [
-            made.unit_step(state, *map(ctypes.c_double, (r, y)), int(m), ctypes.c_double(v))
-            for r, y, m, v in signals()
-        ]
-    elif language == "python":
-        unit = python_unit(algorithm, tmp_path)
-        got = [unit.step(r, y, m, v) for r, y, m, v in signals()]
-    else:
-        block, got = structured_text(algorithm, tmp_path), []
-        for r, y, m, v in signals():
-            block(setpoint=r, measured=y, manual=m, manual_output=v)
-            got.append(block.values["u"])
-    np.testing.assert_allclose(got, expected, rtol=1e-12, atol=1e-12)
+    expected = ALGORITHMS[kind].simulate(SETPOINT, MEASURED, MANUAL)
+    signals = np.stack([SETPOINT, MEASURED, ~np.isnan(MANUAL), np.nan_to_num(MANUAL)], axis=1)
+    got = ran(ALGORITHMS[kind], language, signals, tmp_path)
+    np.testing.assert_allclose(got[0], expected, rtol=1e-12, atol=1e-12)
     assert np.ptp(expected) > 5
 
 
 @pytest.mark.parametrize("kind", PLANTS)
-@pytest.mark.parametrize("language", [pytest.param("c", marks=gcc), "python", "st"])
+@LANGUAGES
 def test_an_exported_plant_is_the_simulated_one(kind, language, tmp_path):
-    plant = PLANTS[kind]
-    u, expected = simulated(plant)
-    if language == "c":
-        made, state = compiled(plant, tmp_path)
-        made.unit_init(state)
-        got = []
-        for sample in u.T.tolist():
-            given = list(map(ctypes.c_double, sample))
-            if plant.noutputs == 1:
-                got.append([made.unit_step(state, *given)])
-            else:
-                out = [ctypes.c_double() for _ in range(plant.noutputs)]
-                made.unit_step(state, *given, *map(ctypes.byref, out))
-                got.append([each.value for each in out])
-    elif language == "python":
-        unit = python_unit(plant, tmp_path)
-        got = [np.atleast_1d(unit.step(*sample)) for sample in u.T]
-    else:
-        block, got = structured_text(plant, tmp_path), []
-        for sample in u.T.tolist():
-            block(**dict(zip(("u",) if len(sample) == 1 else ("u1", "u2"), sample, strict=True)))
-            got.append([v for n, v in block.values.items() if re.fullmatch(r"y\d?", n)])
-    scale = np.abs(expected).max()
-    np.testing.assert_allclose(np.transpose(got), expected, rtol=0, atol=1e-12 * scale)
+    u, expected = simulated(PLANTS[kind])
+    got = ran(PLANTS[kind], language, u.T, tmp_path)
+    np.testing.assert_allclose(got, expected, rtol=0, atol=1e-12 * np.abs(expected).max())
 
 
 def test_exported_loop_is_the_simulated_loop(tmp_path):

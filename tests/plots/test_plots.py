@@ -13,6 +13,8 @@ from ctrl_realize import plots
 from ctrl_realize.errors import OptionError
 from ctrl_realize.plots import style
 
+AFTER = "time after the step "
+
 
 @pytest.fixture(scope="module")
 def record(valve):
@@ -31,18 +33,6 @@ def fitted(record):
 
 
 @pytest.fixture(scope="module")
-def campaign(valve):
-    records = [valve.step_record(height, rng=k) for k, height in enumerate((16, 16, 8, 8))]
-    return cr.identify_campaign(records, method="scan", order=3, max_delay=80, progress=False)
-
-
-@pytest.fixture(scope="module")
-def orders(record):
-    impulse = cr.impulse_from_step(cr.unit_step(record))
-    return cr.scan_orders(impulse, 4, max_delay=60, samples=500)
-
-
-@pytest.fixture(scope="module")
 def measured(valve):
     frequency = np.geomspace(0.1, 50.0, 120)
     truth = valve.truth.frf(frequency)
@@ -57,60 +47,45 @@ def measured(valve):
     )
 
 
-@pytest.fixture
-def every(record, scanned, fitted, campaign, orders, measured, valve):
-    """Each public plot as (name, function of ax, number of axes)."""
+@pytest.fixture(scope="module")
+def every(record, scanned, fitted, measured, valve):
+    """Each public plot: name -> function of ax, number of axes, label of the lowest."""
     impulse = scanned.fit.impulse
+    orders = cr.scan_orders(impulse, 4, max_delay=60, samples=500)
+    records = [valve.step_record(height, rng=k) for k, height in enumerate((16, 16, 8, 8))]
+    campaign = cr.identify_campaign(records, method="scan", order=3, max_delay=80, progress=False)
     comparison = cr.compare_frf(fitted, measured)
-    return [
-        ("record_plot", lambda ax: plots.record_plot(record, ax=ax), 2),
-        ("step_plot", lambda ax: plots.step_plot(record, fitted, ax=ax), 1),
-        ("onset_plot", lambda ax: plots.onset_plot(record, fitted, ax=ax), 1),
-        ("impulse_plot", lambda ax: plots.impulse_plot(impulse, scanned, ax=ax), 1),
-        ("delay_plot", lambda ax: plots.delay_plot(scanned, ax=ax), 1),
-        ("singular_value_plot", lambda ax: plots.singular_value_plot(scanned, ax=ax), 1),
-        ("order_plot", lambda ax: plots.order_plot(orders, ax=ax), 2),
-        ("fit_plot", lambda ax: plots.fit_plot(fitted, ax=ax), 3),
-        ("dead_time_plot", lambda ax: plots.dead_time_plot(fitted, ax=ax), 1),
-        ("campaign_plot", lambda ax: plots.campaign_plot(campaign, truth=37, ax=ax), 1),
-        ("frf_plot", lambda ax: plots.frf_plot([measured, fitted], ax=ax), 3),
-        ("comparison_plot", lambda ax: plots.comparison_plot(comparison, ax=ax), 2),
-        ("truth_plot", lambda ax: plots.truth_plot(valve.truth, ax=ax), 2),
-        ("system_plot", lambda ax: plots.system_plot(fitted, ax=ax), 1),
-    ]
-
-
-UNITS = {
-    "record_plot": "time [s]",
-    "step_plot": "time after the step [s]",
-    "onset_plot": "time after the step [ms]",
-    "impulse_plot": "time [ms]",
-    "delay_plot": "delay [samples]",
-    "singular_value_plot": "number",
-    "order_plot": "order",
-    "fit_plot": "dead time [ms]",
-    "dead_time_plot": "dead time [ms]",
-    "campaign_plot": "delay [samples]",
-    "frf_plot": "frequency [Hz]",
-    "comparison_plot": "frequency [Hz]",
-    "truth_plot": "frequency [Hz]",
-    "system_plot": "time after the step [s]",
-}
+    return {
+        "record_plot": (lambda ax: plots.record_plot(record, ax=ax), 2, "time [s]"),
+        "step_plot": (lambda ax: plots.step_plot(record, fitted, ax=ax), 1, AFTER + "[s]"),
+        "onset_plot": (lambda ax: plots.onset_plot(record, fitted, ax=ax), 1, AFTER + "[ms]"),
+        "impulse_plot": (lambda ax: plots.impulse_plot(impulse, scanned, ax=ax), 1, "time [ms]"),
+        "delay_plot": (lambda ax: plots.delay_plot(scanned, ax=ax), 1, "delay [samples]"),
+        "values": (lambda ax: plots.singular_value_plot(scanned, ax=ax), 1, "number"),
+        "order_plot": (lambda ax: plots.order_plot(orders, ax=ax), 2, "order"),
+        "fit_plot": (lambda ax: plots.fit_plot(fitted, ax=ax), 3, "dead time [ms]"),
+        "dead_time_plot": (lambda ax: plots.dead_time_plot(fitted, ax=ax), 1, "dead time [ms]"),
+        "campaign": (lambda ax: plots.campaign_plot(campaign, truth=37, ax=ax), 1, "delay ["),
+        "frf_plot": (lambda ax: plots.frf_plot([measured, fitted], ax=ax), 3, "frequency [Hz]"),
+        "comparison": (lambda ax: plots.comparison_plot(comparison, ax=ax), 2, "frequency [Hz]"),
+        "truth_plot": (lambda ax: plots.truth_plot(valve.truth, ax=ax), 2, "frequency [Hz]"),
+        "system_plot": (lambda ax: plots.system_plot(fitted, ax=ax), 1, AFTER + "[s]"),
+    }
 
 
 def test_every_plot_returns_a_control_plot_with_units_on_its_axes(every):
-    for name, draw, count in every:
+    for name, (draw, count, label) in every.items():
         drawn = draw(None)
         assert isinstance(drawn, ct.ControlPlot), name
         assert drawn.axes.size == count, name
         assert drawn.lines.shape == drawn.axes.shape, name
         assert all(len(lines) > 0 for lines in drawn.lines.ravel()), name
-        assert drawn.axes.ravel()[-1].get_xlabel().startswith(UNITS[name]), name
+        assert drawn.axes.ravel()[-1].get_xlabel().startswith(label), name
         assert drawn.figure is drawn.axes[0, 0].figure, name
 
 
 def test_plots_draw_into_what_they_are_given_and_make_no_figure_of_their_own(every):
-    for name, draw, count in every:
+    for name, (draw, count, _) in every.items():
         given = np.ravel(Figure().subplots(count, 1, squeeze=False))
         assert list(draw(given).axes.ravel()) == list(given), name
         assert draw(Figure()).axes.size == count, name

@@ -206,12 +206,3 @@ def test_a_comparison_report_judges_by_the_error_in_the_band(tmp_path, fitted, m
     assert comparison_verdict(fitted, good).level != "poor"
     path = report.write_comparison(tmp_path / "r.html", fitted, measured, off)
     assert "disagree" in parsed(path).text
-
-
-def test_the_level_of_trust_follows_the_flags(record):
-    system = cr.delayed_ss(cr.bench.valve().truth.sampled.delay_free, 37)
-    assert verdict_of(system).level == "good"
-    assert verdict_of(system, [cr.results.Flag("drift", "a drift was seen")]).level == "caution"
-    bad = verdict_of(system, [cr.results.Flag("delay_at_bound", "try a larger one")])
-    assert bad.level == "poor"
-    assert bad.reasons == ("Try a larger one.",)
