@@ -90,7 +90,7 @@ def test_steps_agree_with_least_squares_over_all_parameters_at_once():
 
 
 def test_gains_of_random_inputs_are_within_their_intervals():
-    records = [moved(seed, gain) for seed, gain in enumerate(GAINS)]
+    records = [moved(seed, gain, n=200) for seed, gain in enumerate(GAINS)]
     fit = own(records).fit
     assert np.all((fit.gains.low <= GAINS) & (fit.gains.high >= GAINS))
     assert fit.interval[0] <= DEAD_TIME <= fit.interval[1]

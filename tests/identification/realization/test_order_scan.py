@@ -33,11 +33,10 @@ def rest(noise: float, seed: int = 77) -> np.ndarray:
 
 
 @pytest.mark.parametrize(("noise", "order"), [(2e-4, 3), (1e-3, 3), (5e-3, 2)])
-@pytest.mark.parametrize("seed", [1, 2, 3])
-def test_suggested_order_is_what_stands_out_of_the_noise(noise, order, seed):
+def test_suggested_order_is_what_stands_out_of_the_noise(noise, order):
     # Of 32 seeds on simulated R3: 31, 31 and 28 as here; below 0.5 % the third value drowns.
     impulse = cr.ImpulseResponse(
-        valve_pulse("zero-phase", noise=noise, seed=seed), TS, noise=rest(noise)
+        valve_pulse("zero-phase", noise=noise, seed=1), TS, noise=rest(noise)
     )
     scan = cr.scan_orders(impulse, 6, max_delay=100, samples=1000)
     assert scan.order == order

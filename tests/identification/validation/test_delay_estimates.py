@@ -140,25 +140,3 @@ def test_only_pairs_that_rule_each_other_out_are_in_conflict():
         assert [set(pair) for pair in common_dead_time(order)[1]] == [{"a", "c"}]
     # the interval of an upper bound begins where nothing is said: only its end counts
     assert common_dead_time([A, view("r", 3.5, 6.0, "upper bound")]) == ((1.0, 3.0), ())
-
-
-def first_coefficient(record, lag, order=12):
-    """Coefficient of the input `lag` samples ago in a free ARX model, over its standard error."""
-    u, y = np.ravel(record.input), np.ravel(record.output)
-    past = range(order, y.size)
-    columns = [[*y[k - order : k], *u[k - order : k + 1], 1.0] for k in past]
-    X = np.array(columns)
-    solution, left = np.linalg.lstsq(X, y[order:], rcond=None)[:2]
-    variance = left[0] / (len(X) - X.shape[1]) * np.linalg.inv(X.T @ X).diagonal()
-    return (solution / np.sqrt(variance))[2 * order - lag]
-
-
-def test_a_measured_plant_under_random_input_is_agreed_on():
-    record = measured.record("hairdryer/record")
-    check = cr.validation.compare_delay_estimates(record)
-    assert check.agree
-    # an input is held for a sample: a first coefficient after two samples is a dead time of one to
-    # two, and that coefficient is five standard errors from zero
-    assert first_coefficient(record, 2) > 4
-    assert record.dt <= check.common[1] <= 2 * record.dt
-    assert check.common[0] <= 2 * record.dt
