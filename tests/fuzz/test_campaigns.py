@@ -2,6 +2,7 @@
 
 import contextlib
 import pickle
+import shutil
 import warnings
 from dataclasses import dataclass
 from unittest.mock import patch
@@ -66,41 +67,37 @@ class Source:
         return cr.Record(t, u, y, name=self.name, missing="keep")
 
 
-class Remembering:
-    """`identify` of records that came before, with the same result, warnings and error.
+def remembering(identify):
+    """Give the same result, warnings and error for records that came before.
 
     What is tested here is what a campaign makes of them; to identify them is most of a case's
     time, and there are few different ones.
     """
+    known = {}
 
-    MOST = 2000
-
-    def __init__(self, identify):
-        self.identify, self.known = identify, {}
-
-    def __call__(self, record, **choice):
+    def again(record, **choice):
         arrays = (record.time, record.input, record.output)
         key = (record.name, repr(choice), *(values.tobytes() for values in arrays))
-        if key not in self.known:
-            if len(self.known) >= self.MOST:
-                self.known.clear()
-            result = error = None
-            with warnings.catch_warnings(record=True) as caught:
+        if len(known) > 2000:
+            known.clear()
+        if key not in known:
+            with warnings.catch_warnings(record=True) as told:
                 warnings.simplefilter("always")
                 try:
-                    result = self.identify(record, **choice)
-                except Exception as raised:
-                    error = raised.with_traceback(None)
-            self.known[key] = result, error, [entry.message for entry in caught]
-        result, error, told = self.known[key]
-        for message in told:
-            warnings.warn(message, stacklevel=2)
-        if error is not None:
-            raise error.with_traceback(None)
+                    known[key] = identify(record, **choice), told
+                except Exception as error:
+                    known[key] = error, told
+        result, told = known[key]
+        for entry in told:
+            warnings.warn(entry.message, stacklevel=2)
+        if isinstance(result, Exception):
+            raise result.with_traceback(None)
         return result
 
+    return again
 
-REMEMBERED = patch.object(rows, "identify", Remembering(rows.identify))
+
+REMEMBERED = patch.object(rows, "identify", remembering(rows.identify))
 
 
 def identified(rng):
@@ -235,20 +232,12 @@ def stopped_campaign(rng, tmp_path_factory):
             pass
         if rng.randrange(2):
             spoil(rng, folder)
-    with good_end() as campaigns:
-        campaigns.append(
-            cr.identify_campaign(sources, store=cr.io.CampaignStore(folder), **settings)
-        )
-    same(campaigns[0], whole)
-    with good_end() as campaigns:
-        # all from the store now
-        campaigns.append(
-            cr.identify_campaign(sources, store=cr.io.CampaignStore(folder), **settings)
-        )
-    same(campaigns[0], whole)
-    for path in folder.iterdir():
-        path.unlink()
-    folder.rmdir()
+    for _ in range(2):  # the second time all rows come from the store
+        store = cr.io.CampaignStore(folder)
+        with good_end() as campaigns:
+            campaigns.append(cr.identify_campaign(sources, store=store, **settings))
+        same(campaigns[0], whole)
+    shutil.rmtree(folder)
 
 
 @pytest.mark.parametrize("method", ["scan", "output_error"])
