@@ -137,57 +137,6 @@ def test_a_loop_connected_by_python_control_is_the_loop_of_the_bench(valve):
     assert_allclose(here.record.output - 50, flow, atol=1e-9)
 
 
-def cycle(values: np.ndarray, dt: float) -> tuple[float, float]:
-    """Amplitude and period of a steady oscillation."""
-    away = values - values.mean()
-    up = np.flatnonzero((away[:-1] < 0) & (away[1:] >= 0))
-    return np.ptp(values) / 2, dt * (up[-1] - up[0]) / (up.size - 1)
-
-
-def test_backlash_before_an_integrator_cycles_as_the_describing_function_says():
-    width = 2.0
-    loop = cr.bench.valve_loop(Backlash(width), process="integrating", dt=0.5)
-    gain, integral_time = loop.controller
-
-    def open_loop(w):
-        s, z = 1j * w, np.exp(1j * w * loop.dt)
-        held = (1 - 1 / z) / (s * loop.dt)
-        return (
-            gain
-            * (1 + loop.dt / integral_time / (1 - 1 / z))
-            * held
-            * (loop.gain / s * np.exp(-s * loop.dead_time))
-        )
-
-    def describing(amplitude):  # Slotine and Li, Applied Nonlinear Control, section 5.2
-        c = width / 2
-        part = 2 * c / amplitude - 1
-        in_phase = np.pi / 2 - np.arcsin(part) - part * np.sqrt(1 - part**2)
-        return (in_phase + 4j * c / amplitude * (c / amplitude - 1)) / np.pi
-
-    omega = np.geomspace(0.01, 0.06, 600)
-    amplitude = np.geomspace(1.01, 5.0, 600)
-    miss = np.abs(1 + open_loop(omega)[:, None] * describing(amplitude)[None, :])
-    # Of two intersections this, with the lower frequency, is the stable one.
-    w, a = np.unravel_index(np.argmin(miss), miss.shape)
-    assert miss[w, a] < 0.01
-    record = loop.simulate(1500.0, settle=1500.0).record
-    found = cycle(record.input, loop.dt)
-    # The method neglects harmonics: a seventh.
-    assert_allclose(found, (amplitude[a], 2 * np.pi / omega[w]), rtol=0.15)
-
-
-def test_stiction_lets_a_loop_cycle_that_backlash_and_a_linear_valve_leave_at_rest():
-    swings = {
-        str(valve): np.ptp(cr.bench.valve_loop(valve).simulate(1000.0, settle=2000.0).position)
-        for valve in (Stiction(5, 2), KanoStiction(5, 2), HeStiction(3.5, 1.5), Backlash(5.0), None)
-    }
-    *sticking, play, linear = swings.values()
-    # The stem cannot move by less than its jump.
-    assert min(sticking) >= 2.0 - 1e-9
-    assert max(play, linear) < 0.05
-
-
 @pytest.mark.parametrize("process", ["flow", "first-order", "integrating"])
 def test_the_gain_margin_of_a_loop_is_that_of_its_open_loop(process):
     loop = cr.bench.valve_loop(process=process, dead_time=4.0, tightness=1.5)

@@ -9,7 +9,7 @@ from scipy.linalg import expm
 
 import ctrl_realize as cr
 from ctrl_realize import bench, paper
-from ctrl_realize.actuators import Backlash, SlewRateLimit, Stiction
+from ctrl_realize.actuators import Stiction
 
 CLEAN = {"noise": 0, "input_noise": 0, "spikes": 0, "bits": None}
 DT = 1 / 1280
@@ -47,19 +47,6 @@ def test_default_truth_is_a_valve_of_2_2_hz_behind_37_samples():
     # Rig R3 of a real pole and a pair: 37 + 92.6 + 35.7 samples of lag in all.
     expected = 37 * DT + 1 / (2 * np.pi * 2.2) + 1.4 / (2 * np.pi * 8) + 1 / (2 * np.pi * 1e4)
     assert truth.total_delay == pytest.approx(expected, rel=1e-9)
-
-
-def test_sampled_truth_simulates_the_record():
-    valve = bench.valve(**CLEAN)
-    current = 8 + 4 * np.repeat(np.random.default_rng(0).integers(0, 2, 40), 50).astype(float)
-    current[:100] = 8.0
-    record = valve.record(current)
-    _, y = ct.forced_response(
-        valve.truth.sampled, DT * np.arange(current.size), current - current[0]
-    )
-    assert_allclose(record.output - record.output[0], y, atol=1e-12)
-    assert isinstance(valve.truth.sampled, cr.DelayedStateSpace)
-    assert valve.truth.sampled.delay == 37
 
 
 def test_analog_anti_aliasing_adds_1_06_samples_to_the_truth():
@@ -110,12 +97,6 @@ def test_a_sine_through_an_actuator_is_that_of_the_simulated_current(place):
     # A current that is held changes where the stem breaks away, by part of a sample.
     assert_allclose(sine.output, held.output[1:], atol=0.004)
     assert np.ptp(sine.output) > 0.05
-
-
-def test_backlash_is_an_actuator_and_a_short_argument():
-    short = bench.valve(hysteresis=0.02, slew_limit=5.0, **CLEAN).step_record(8)
-    spelt = bench.valve(actuator=[SlewRateLimit(500.0), Backlash(2.0)], **CLEAN).step_record(8)
-    assert_allclose(short.output, spelt.output, atol=1e-12)
 
 
 def test_the_static_test_shows_the_dead_band_and_the_linear_relation():

@@ -36,29 +36,27 @@ def answer(fit):
     return shape, np.array([fit.dead_time, *fit.interval]) / fit.dt
 
 
-def alike(record, change=in_other_units, fit=None):
-    shape, times = answer(fit or cr.fit_output_error(record).fit)
+def rounded():
+    record = rigs.step_record(rigs.R2, noise=0.005, seed=2, before=150, after=450)
+    return cr.Record(record.time, record.input, np.round(record.output, 1))
+
+
+@pytest.mark.parametrize(
+    ("make", "change"),
+    [
+        (lambda: rigs.step_record(noise=0.005, seed=3, before=150, after=450), in_other_units),
+        (rounded, last_digit),  # steps of a converter
+        (two_lags_of_random_levels, in_other_units),
+        (lambda: measured.record("heating_system/edge2"), last_digit),
+    ],
+    ids=["step", "rounded step", "random levels", "measured"],
+)
+def test_a_changed_record_is_answered_alike(make, change):
+    record = make()
+    shape, times = answer(cr.fit_output_error(record).fit)
     again, others = answer(cr.fit_output_error(change(record)).fit)
     assert again == shape
     np.testing.assert_allclose(others, times, rtol=0, atol=CLOSE * max(times[0], 1.0))
-
-
-def test_a_step_record_is_answered_alike():
-    alike(rigs.step_record(rigs.R3, noise=0.005, seed=3, before=150, after=450))
-
-
-def test_a_record_in_steps_of_a_converter_is_answered_alike():
-    record = rigs.step_record(rigs.R2, noise=0.005, seed=2, before=150, after=450)
-    alike(cr.Record(record.time, record.input, np.round(record.output, 1)), last_digit)
-
-
-def test_a_record_of_random_levels_is_answered_alike():
-    alike(two_lags_of_random_levels())
-
-
-def test_a_measured_record_is_answered_alike():
-    name = "heating_system/edge2"
-    alike(measured.record(name), last_digit, measured.fitted(name))
 
 
 def two_modes_that_do_not_begin_at_rest(seed):

@@ -68,9 +68,3 @@ def test_held_samples_and_coloured_residuals_widen_the_interval_to_the_truth():
     low, high = fit.interval
     assert low <= fit.dead_time <= high
     assert low <= case.dead_time
-
-
-def test_a_linear_valve_is_not_called_nonlinear_by_few_steps():
-    record = cr.bench.valve().step_record(2.0, rng=5)
-    fit = cr.fit_output_error(record, structures=[(3, 3)]).fit
-    assert not codes(fit) & {"not_linear", "time_varying"}

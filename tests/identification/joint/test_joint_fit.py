@@ -77,15 +77,6 @@ def test_the_interval_is_narrower_than_either_alone_and_contains_the_truth():
     assert inside >= 5  # 95 % intervals
 
 
-def test_the_statistic_is_the_rise_of_both_parts():
-    agreed = agreeing().agreement
-    assert agreed.statistic == agreed.record_rise + agreed.frf_rise
-    assert agreed.parameters == 3  # dead time, lag, gain
-    fit = agreeing()
-    away = np.abs(fit.response(2 * np.pi * HZ) - fit.frf_fit.measured)
-    assert np.array_equal(agreed.outside, away > agreed.radius)
-
-
 def test_another_dead_time_of_the_frequency_response_is_found():
     fit = fit_joint(step(), response(dead_time=DEAD_TIME + 0.02), structures=ONE_LAG).fit
     (shift, chance), (_, by_gain) = fit.agreement.later, fit.agreement.gain_ratio

@@ -51,20 +51,6 @@ def test_units_go_from_the_record_to_the_parameters():
     assert per_minute["value"] == pytest.approx(60 * per_second["value"])
 
 
-@pytest.mark.parametrize(
-    ("value", "error", "text"),
-    [
-        (0.79971, 0.0010, "0.800 +-0.001"),
-        (0.79971, 0.0014, "0.7997 +-0.0014"),
-        (179.04, 0.4, "179.0 +-0.4"),
-        (2400.0, 31.0, "2400 +-31"),
-        (2.5, float("nan"), "2.5"),
-    ],
-)
-def test_an_estimate_is_rounded_like_its_error(value, error, text):
-    assert cr.results.Parameter("lag_1", value, error).text() == text
-
-
 def test_a_furnace_in_minutes_is_reported_and_drawn_in_minutes(tmp_path):
     t = 60.0 * np.arange(400)
     after = np.clip(t - 60 * 100 - 360, 0, None)

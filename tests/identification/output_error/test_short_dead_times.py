@@ -37,17 +37,6 @@ def test_a_padded_rest_is_no_rest_without_noise():
     assert fit.interval[0] <= 5.3 <= fit.interval[1]
 
 
-def test_white_noise_that_comes_with_the_motion_is_noise():
-    # The record ends before the response settles, so that no noise at rest follows it.
-    u, y = response((80.0, 30.0), 12.6, n=400)
-    k = np.arange(u.size)
-    noise = np.random.default_rng(0).standard_normal(u.size)
-    fit = fitted(u, y + np.where(k < 150, 0.004, 0.01) * noise, structures=FEW)
-    assert fit.at_noise_level
-    assert "structured_misfit" not in codes(fit)
-    assert fit.interval[0] <= 12.6 <= fit.interval[1]
-
-
 def test_a_slope_of_slow_noise_before_the_step_does_not_change_the_gain():
     # Taken for a free response or a drift that goes on, it changes the gain by 2 %.
     rng = np.random.default_rng([22, 7])

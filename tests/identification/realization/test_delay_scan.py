@@ -70,20 +70,6 @@ def test_strictly_proper_candidates_have_no_direct_term():
 # -- what the scan says about itself ---------------------------------------------------------
 
 
-@pytest.mark.parametrize(
-    ("noise", "code"), [(1e-4, None), (2e-3, "order_near_noise"), (3e-2, "order_in_noise")]
-)
-def test_last_singular_value_is_compared_with_that_of_the_noise(noise, code):
-    # the same processing of samples at rest
-    pulse = valve_pulse("zero-phase", noise=noise)
-    quiet = valve_pulse("zero-phase", noise=noise, delay=5000.0, seed=9, n=3000)
-    fit = cr.estimate_delay(
-        cr.ImpulseResponse(pulse, TS, noise=quiet), 3, max_delay=100, samples=1000
-    ).fit
-    assert codes(fit) & {"order_near_noise", "order_in_noise"} == ({code} if code else set())
-    assert fit.noise_ratio == pytest.approx(fit.singular_values[fit.delay, 2] / fit.noise_floor)
-
-
 # -- input that cannot be used ---------------------------------------------------------------
 
 

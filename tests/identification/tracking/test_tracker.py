@@ -215,20 +215,6 @@ def test_a_residual_much_louder_than_the_models_stops_it_from_telling(known):
         tracker(noise_std=-1.0)
 
 
-def test_intervals_are_in_seconds_and_in_samples():
-    record, _ = worn_valve(seconds=6, last=37.0)
-    bank = tracker(dynamics=False)
-    track = bank.track(record)
-    told = bank.estimate()
-    assert told.interval == tuple(TS * d for d in told.delay_interval)
-    assert told.dead_time_interval == told.interval
-    assert told.interval[0] - TS / 2 <= told.dead_time <= told.interval[1] + TS / 2
-    np.testing.assert_allclose(track.low, TS * track.delay_low)
-    np.testing.assert_allclose(track.high, TS * track.delay_high)
-    # A model that is used for a controller brings its interval along.
-    assert cr.design.pid(bank.model).check.stable_within_interval is not None
-
-
 def test_the_exchanger_keeps_its_delay_of_zero():
     record = measured.record("exchanger/record")
     first = cr.impulse_from_io(record.between(0, 1500), 200)
