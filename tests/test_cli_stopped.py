@@ -23,17 +23,35 @@ from ctrl_realize.cli.staging import appearing
 from ctrl_realize.errors import OptionError
 from ctrl_realize.identification.campaign import rows
 
-FAST = ["--method", "scan", "--order", "3", "--max-delay", "80"]
+QUICK = ["--method", "scan", "--order", "1", "--max-delay", "40"]
+OPTIONS = {"method": "scan", "order": 1, "max_delay": 40}
 COUNT = 4
+
+pytestmark = [
+    pytest.mark.skipif(not hasattr(signal, "SIGKILL"), reason="processes are stopped otherwise"),
+    pytest.mark.usefixtures("without_figures"),
+]
+
+
+def record(seed: int) -> cr.Record:
+    t = 0.1 * np.arange(150)
+    y = np.where(t > 5.0, 1.5 * (1 - np.exp(-(t - 5.0) / 1.5)), 0.0)
+    noise = 0.004 * np.random.default_rng(seed).normal(size=t.size)
+    return cr.Record(t, (t >= 3.0).astype(float), y + noise, name=f"r{seed}")
+
+
+def killed(seed: int) -> cr.Record:
+    os.kill(os.getpid(), signal.SIGKILL)
+    return record(seed)
 
 
 @pytest.fixture(scope="module")
 def files(tmp_path_factory):
-    folder, valve = tmp_path_factory.mktemp("records"), cr.bench.valve(pre_step_time=0.5, hold=1.0)
-    for k in range(COUNT):
-        made = valve.step_record(16.0, rng=k)
+    folder = tmp_path_factory.mktemp("records")
+    for seed in range(COUNT):
+        made = record(seed)
         columns = {"time_s": made.time, "input": made.input, "output": made.output}
-        pd.DataFrame(columns).to_csv(folder / f"step_{k}.csv", index=False)
+        pd.DataFrame(columns).to_csv(folder / f"step_{seed}.csv", index=False)
     return [str(path) for path in sorted(folder.iterdir())]
 
 
@@ -64,7 +82,7 @@ def test_a_stopped_campaign_goes_on_where_it_was_with_the_same_files(
     files, tmp_path, capsys, monkeypatch
 ):
     out = tmp_path / "out"
-    command = ["identify", *files, "-o", str(out), *FAST]
+    command = ["identify", *files, "-o", str(out), *QUICK]
     assert main(command) == 0
     straight = contents(out)
     assert not any(name.startswith("rows") for name in straight)
@@ -93,12 +111,12 @@ def test_a_disk_that_is_full_loses_no_result(files, tmp_path, capsys, monkeypatc
         patched.setattr("ctrl_realize.io.store.write_text", full)
         records = [cr.read_record(file) for file in files]
         store = cr.io.CampaignStore(tmp_path / "store")
-        kept = cr.identify_campaign(records, method="scan", order=3, max_delay=80, store=store)
+        kept = cr.identify_campaign(records, store=store, **OPTIONS)
     assert len(kept.good) == COUNT
     assert all("No space left" in row.warnings[-1] for row in kept.rows)
     assert len(store) == 0
     monkeypatch.setattr("ctrl_realize.cli.results.report.write_campaign", full)
-    main(["identify", *files, "-o", str(tmp_path / "out"), *FAST])
+    main(["identify", *files, "-o", str(tmp_path / "out"), *QUICK])
     assert "the report could not be written (OSError" in capsys.readouterr().err
     assert {"model.json", "records.csv"} <= {path.name for path in (tmp_path / "out").iterdir()}
 
@@ -110,43 +128,13 @@ def test_an_interruption_leaves_finished_records_alone(
     owner = (identify_command, "identify_record") if separate else (rows, "identify")
     stop_after(monkeypatch, owner, count)
     out, more = tmp_path / "a" / "out", ["--separate"] if separate else []
-    assert main(["identify", *files, "-o", str(out), *more, *FAST]) == 130
+    assert main(["identify", *files, "-o", str(out), *more, *QUICK]) == 130
     assert capsys.readouterr().err.startswith("ctrl-realize: interrupted; ")
     if count:
         assert {path.name for path in out.iterdir()} == {"step_0", "step_1"}
         assert all((out / name / "report.html").exists() for name in ("step_0", "step_1"))
     else:
         assert list(tmp_path.iterdir()) == []
-
-
-QUICK = ["--method", "scan", "--order", "1", "--max-delay", "40"]
-OPTIONS = {"method": "scan", "order": 1, "max_delay": 40}
-
-pytestmark = [
-    pytest.mark.skipif(not hasattr(signal, "SIGKILL"), reason="processes are stopped otherwise"),
-    pytest.mark.usefixtures("without_figures"),
-]
-
-
-def record(seed: int) -> cr.Record:
-    t = 0.1 * np.arange(150)
-    y = np.where(t > 5.0, 1.5 * (1 - np.exp(-(t - 5.0) / 1.5)), 0.0)
-    noise = 0.004 * np.random.default_rng(seed).normal(size=t.size)
-    return cr.Record(t, (t >= 3.0).astype(float), y + noise, name=f"r{seed}")
-
-
-def killed(seed: int) -> cr.Record:
-    os.kill(os.getpid(), signal.SIGKILL)
-    return record(seed)
-
-
-@pytest.fixture
-def csv_files(tmp_path):
-    for seed in range(4):
-        made = record(seed)
-        columns = {"time_s": made.time, "input": made.input, "output": made.output}
-        pd.DataFrame(columns).to_csv(tmp_path / f"step_{seed}.csv", index=False)
-    return [str(path) for path in sorted(tmp_path.iterdir())]
 
 
 def started(*words, **keywords):
@@ -183,11 +171,11 @@ def test_a_record_whose_process_is_killed_is_a_row_with_the_reason_and_all_other
 
 
 @pytest.mark.slow
-def test_a_termination_leaves_finished_rows_and_neither_workers_nor_folders(csv_files, tmp_path):
+def test_a_termination_leaves_finished_rows_and_neither_workers_nor_folders(files, tmp_path):
     out, temporary = tmp_path / "out", tmp_path / "tmp"
     temporary.mkdir()
     environment = {**os.environ, "TMPDIR": str(temporary)}
-    words = ["identify", *csv_files * 8, "-o", str(out), "--jobs", "2", *QUICK]
+    words = ["identify", *files * 8, "-o", str(out), "--jobs", "2", *QUICK]
     process = started(*words, env=environment)
     while not list(out.glob("rows/row-*.json")):
         assert process.poll() is None, process.communicate()
@@ -207,11 +195,11 @@ def test_a_termination_leaves_finished_rows_and_neither_workers_nor_folders(csv_
     assert left_in_session(process) == []
 
 
-def test_a_report_that_cannot_be_written_is_told_and_costs_no_model(csv_files, tmp_path, capsys):
+def test_a_report_that_cannot_be_written_is_told_and_costs_no_model(files, tmp_path, capsys):
     system = cr.identify(record(1), **OPTIONS)
     (tmp_path / "report.html").mkdir()  # in the way
     nothing = {"frf": None, "comparison": None, "settings": {}, "calls": []}
-    assert not write_record_files(tmp_path, system, record(1), [Path(csv_files[0])], **nothing)
+    assert not write_record_files(tmp_path, system, record(1), [Path(files[0])], **nothing)
     assert "the report could not be written (IsADirectoryError" in capsys.readouterr().err
     assert cr.load_model(tmp_path / "model.json").delay == system.delay
     assert not (tmp_path / "figures").exists()  # nothing by halves
@@ -236,7 +224,7 @@ def test_an_interruption_while_the_program_is_loaded_is_one_line(tmp_path):
 
 
 def files_in(folder):
-    return {path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file()}
+    return set(contents(folder)) | {"manifest.json"}
 
 
 def write(folder, names, run):
@@ -246,26 +234,22 @@ def write(folder, names, run):
             (staged / name).write_text(run.command, encoding="utf-8")
 
 
-def test_a_folder_with_results_of_another_run_is_refused_or_cleared_on_request(tmp_path):
-    out = tmp_path / "out"
-    write(out, ["model.json", "records.csv", "models/1.json", "models/2.json"], Run("three files"))
+def test_results_are_replaced_by_their_own_command_whole_and_by_others_on_request(tmp_path):
+    out, run = tmp_path / "out", Run("three files")
+    write(out, ["model.json", "records.csv", "models/1.json", "models/2.json"], run)
     (out / "models" / "mine.json").write_text("keep")
-    before = {name: (out / name).read_bytes() for name in files_in(out)}
+    write(out, ["model.json", "records.csv", "models/1.json"], run)  # one record fewer
+    names = {"manifest.json", "model.json", "records.csv", "models/1.json", "models/mine.json"}
+    assert files_in(out) == names
+    before = contents(out)
     with pytest.raises(OptionError, match=r"made by: three files; .* or use --overwrite"):
         write(out, ["model.json"], Run("one file"))
-    assert {name: (out / name).read_bytes() for name in files_in(out)} == before
+    with pytest.raises(ZeroDivisionError), appearing(out, run):
+        raise ZeroDivisionError
+    assert contents(out) == before
     write(out, ["model.json", "figures/fit.png"], Run("one file", overwrite=True))
     assert files_in(out) == {"manifest.json", "model.json", "figures/fit.png", "models/mine.json"}
     assert (out / "model.json").read_text() == "one file"
-
-
-def test_a_run_that_fails_leaves_the_results_of_the_last_one(tmp_path):
-    run = Run("command")
-    write(tmp_path, ["model.json"], run)
-    before = {name: (tmp_path / name).read_bytes() for name in files_in(tmp_path)}
-    with pytest.raises(ZeroDivisionError), appearing(tmp_path, run):
-        raise ZeroDivisionError
-    assert {name: (tmp_path / name).read_bytes() for name in files_in(tmp_path)} == before
 
 
 @pytest.mark.parametrize("name", ["../mine.txt", "{}/mine.txt", "a/../../mine.txt", "..\\mine.txt"])
@@ -279,21 +263,13 @@ def test_a_manifest_of_others_removes_nothing_outside_its_folder(tmp_path, name)
     assert (tmp_path / "mine.txt").read_text() == "keep"
 
 
-def test_the_manifest_names_command_versions_inputs_and_files(tmp_path, capsys):
-    t = 0.1 * np.arange(150)
-    y = np.where(t > 5.0, 1.5 * (1 - np.exp(-(t - 5.0) / 1.5)), 0.0)
-    files = []
-    for seed in range(2):
-        noise = 0.004 * np.random.default_rng(seed).normal(size=t.size)
-        files.append(str(tmp_path / f"step_{seed}.csv"))
-        columns = {"time_s": t, "input": t >= 3.0, "output": y + noise}
-        pd.DataFrame(columns).astype(float).to_csv(files[-1], index=False)
+def test_the_manifest_names_command_versions_inputs_and_files(files, tmp_path, capsys):
     out = tmp_path / "out"
-    options = ["--method", "scan", "--order", "1", "--max-delay", "40", "-o", str(out)]
-    assert main(["identify", *files, *options]) == 0
+    options = [*QUICK, "-o", str(out)]
+    assert main(["identify", *files[:2], *options]) == 0
     content = json.loads((out / "manifest.json").read_text(encoding="utf-8"))
     assert content["command"] == (
-        f"ctrl-realize identify {' '.join(files)} --method scan --order 1 --max-delay 40"
+        f"ctrl-realize identify {' '.join(files[:2])} --method scan --order 1 --max-delay 40"
     )
     assert content["versions"]["ctrl-realize"] == cr.__version__
     with open(files[1], "rb") as file:
@@ -335,9 +311,9 @@ def test_a_record_over_which_the_process_died_twice_is_not_tried_for_ever(tmp_pa
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_reader_that_goes_away_costs_no_result(csv_files, tmp_path):
+def test_a_reader_that_goes_away_costs_no_result(files, tmp_path):
     out = tmp_path / "out"
-    words = ["identify", csv_files[0], "-o", str(out), "--no-report", *QUICK]
+    words = ["identify", files[0], "-o", str(out), "--no-report", *QUICK]
     with started(*words) as process:
         process.stdout.close()  # "| head" has seen enough
         assert process.stderr.read() == ""
@@ -350,14 +326,6 @@ def test_signals_are_handled_as_before_after_a_command():
     before = [signal.getsignal(number) for number in numbers]
     assert main(["identify", str(Path("nowhere.csv")), "-o", "out"]) == 2
     assert [signal.getsignal(number) for number in numbers] == before
-
-
-def test_the_same_command_replaces_all_of_its_own_results_and_nothing_else(tmp_path):
-    run = Run("command")
-    write(tmp_path, ["model.json", "models/1.json", "models/2.json"], run)
-    (tmp_path / "notes.txt").write_text("keep")
-    write(tmp_path, ["model.json", "models/1.json"], run)  # one record fewer
-    assert files_in(tmp_path) == {"manifest.json", "model.json", "models/1.json", "notes.txt"}
 
 
 @pytest.mark.parametrize("text", ["", "{", "[]", '{"format": "ctrl_realize results"}', "null"])

@@ -1,9 +1,6 @@
 """Laws of systems with delays inside, against augmented matrices and closed forms."""
 
-import copy
-import pickle
 import tracemalloc
-import warnings
 
 import control as ct
 import numpy as np
@@ -234,14 +231,6 @@ def test_zeros_of_a_loop_are_those_of_its_parts():
     assert_allclose(np.sort(sensitivity.zeros().real)[-2:], [0.8, 0.9], rtol=1e-9)
 
 
-def test_the_inverse_of_the_inverse_is_the_system():
-    S = 1 + cr.delayed_ss(LAG, 17, dt=DT)
-    back = (S**-1) ** -1
-    assert back.internal_delays == S.internal_delays
-    assert_allclose(back(Z), S(Z), rtol=1e-12)
-    assert_allclose((S / S)(Z), 1, rtol=1e-12)
-
-
 MERGING = {
     "sum of equal delays": (lambda P, Q: P + Q * 3, (), 17),
     "difference from itself": (lambda P, Q: P - P, (), 17),
@@ -286,41 +275,6 @@ def test_names_go_through_interconnections():
     loop = ct.feedback(P, C)
     assert (loop.input_labels, loop.output_labels) == (["u"], ["y"])
     assert ct.append(P, ct.feedback(C * P)).input_labels == ["u[0]", "u[1]"]
-
-
-def test_connect_of_python_control_keeps_the_delays():
-    P, K = cr.delayed_ss(LAG, 30, dt=DT), ct.ss(PI)
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", FutureWarning)  # python-control's word on connect
-        loop = ct.connect(ct.append(P, K), [[1, 2], [2, -1]], [2], [1])
-    assert isinstance(loop, cr.DelaySystem)
-    assert_allclose(loop(Z), ct.feedback(P * K, 1)(Z), rtol=1e-10)
-
-
-COPIES = {
-    "copy": lambda s: s.copy(),
-    "copy.copy": copy.copy,
-    "deepcopy": copy.deepcopy,
-    "pickle": lambda s: pickle.loads(pickle.dumps(s)),
-    "text": lambda s: eval(
-        s._repr_eval_(),
-        {"array": np.array, "StateSpace": ct.StateSpace, "DelaySystem": cr.DelaySystem},
-    ),
-}
-
-
-@pytest.mark.parametrize("way", COPIES)
-def test_copies_are_the_same_system(way):
-    loop = cr.interconnect(
-        [cr.delayed_ss(LAG, 30, dt=DT, name="P", inputs="u", outputs="y"),
-         ct.summing_junction(["r", "-y"], "u")], inputs="r", outputs="y", name="loop",
-    )  # fmt: skip
-    again = COPIES[way](loop)
-    assert type(again) is cr.DelaySystem
-    assert_array_equal(again(Z), loop(Z))
-    assert (again.input_labels, again.output_labels) == (["r"], ["y"])
-    assert again.state_labels == loop.state_labels
-    assert "internal delay 30 samples" in repr(again)
 
 
 @pytest.mark.parametrize("d", [5, 37, 300, 1000])
@@ -373,20 +327,6 @@ LOST = {
     "append": lambda L: ct.append(PI, L),
     "lft": lambda L: ct.append(PI, PI).lft(L),
 }
-KEPT = {
-    "series": (lambda L: ct.series(PI, L), lambda g, c: g * c),
-    "series behind": (lambda L: ct.series(L, PI), lambda g, c: c * g),
-    "parallel": (lambda L: ct.parallel(PI, L), lambda g, c: c + g),
-    "difference": (lambda L: PI - L, lambda g, c: c - g),
-    "quotient": (lambda L: PI / (1 + L), lambda g, c: c / (1 + g)),
-    "number over": (lambda L: 1 / (1 + L), lambda g, c: 1 / (1 + g)),
-    "tf behind": (lambda L: L * FILTER + 1, lambda g, c: g * FILTER(Z) + 1),
-    "feedback": (lambda L: ct.feedback(cr.DelaySystem(PI), L), lambda g, c: c / (1 + c * g)),
-    "append": (
-        lambda L: ct.append(cr.DelaySystem(PI), L),
-        lambda g, c: np.stack([np.stack([c, 0 * c]), np.stack([0 * g, g])]),
-    ),
-}
 
 
 @pytest.mark.parametrize("case", LOST)
@@ -397,16 +337,6 @@ def test_where_python_control_loses_the_delay_the_warning_says_what_keeps_it(cas
     said = [one for one in caught if one.category is ModelWarning]
     assert len(said) == 1
     assert said[0].filename == __file__
-
-
-@pytest.mark.parametrize("case", KEPT)
-def test_these_orders_keep_the_delay(case):
-    loop = ct.feedback(cr.delayed_ss(LAG, 60, dt=DT))
-    make, expected = KEPT[case]
-    made = make(loop)
-    assert isinstance(made, cr.DelaySystem)
-    assert made.internal_delays == (60,)
-    assert_allclose(made(Z), expected(loop(Z), PI(Z)), rtol=1e-9, atol=1e-12)
 
 
 def test_bandwidth_is_where_the_gain_has_dropped():

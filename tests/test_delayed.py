@@ -1,6 +1,5 @@
 """Laws of systems that carry a dead time."""
 
-import copy
 import pickle
 import tracemalloc
 
@@ -55,58 +54,6 @@ def test_states_are_core_then_past_inputs():
     assert_array_equal(states[5, 3:], u[:-3])
 
 
-KEEPING = {
-    "negation": lambda S: (-S, -1.0),
-    "number * S": lambda S: (2 * S, 2.0),
-    "S * number": lambda S: (S * 2.5, 2.5),
-    "S / number": lambda S: (S / 4, 0.25),
-    "numpy number * S": lambda S: (np.float64(3) * S, 3.0),
-    "array * S": lambda S: (np.array([[2.0]]) * S, 2.0),
-    "S * array": lambda S: (S * np.array([[2.0]]), 2.0),
-    "copy": lambda S: (S.copy(), 1.0),
-    "copy.copy": lambda S: (copy.copy(S), 1.0),
-    "copy.deepcopy": lambda S: (copy.deepcopy(S), 1.0),
-    "pickle": lambda S: (pickle.loads(pickle.dumps(S)), 1.0),
-    "power one": lambda S: (S**1, 1.0),
-    "replace": lambda S: (S.replace(name="other"), 1.0),
-    "index": lambda S: (S[0, 0], 1.0),
-}
-
-
-@pytest.mark.parametrize("operation", KEEPING)
-@pytest.mark.parametrize("delay", [0, 1, 37])
-def test_scalar_operations_and_copies_keep_the_delay(operation, delay):
-    S = valve(delay)
-    result, factor = KEEPING[operation](S)
-    assert isinstance(result, cr.DelayedStateSpace)
-    assert result.delay == delay
-    # Near Nyquist, where |G| is 1e-8, the sum of the core's parts cancels to 1e-11.
-    assert_allclose(result(circle()), factor * S(circle()), rtol=1e-10)
-    assert_allclose(ct.ss(result)(circle()), factor * S(circle()), rtol=1e-10, atol=1e-13)
-
-
-SERIES = {
-    "K * S": lambda S: (CONTROLLER * S, 1),
-    "S * K": lambda S: (S * CONTROLLER, 1),
-    "series(S, K)": lambda S: (ct.series(S, CONTROLLER), 1),
-    "series(K, S)": lambda S: (ct.series(CONTROLLER, S), 1),
-    "S * tf": lambda S: (S * ct.tf(CONTROLLER), 1),
-    "S * S": lambda S: (S * S, 2),
-    "S ** 2": lambda S: (S**2, 2),
-}
-
-
-@pytest.mark.parametrize("operation", SERIES)
-@pytest.mark.parametrize("delay", [0, 1, 37])
-def test_series_keeps_and_adds_delays(operation, delay):
-    S = valve(delay)
-    result, times = SERIES[operation](S)
-    assert isinstance(result, cr.DelayedStateSpace)
-    assert result.delay == times * delay
-    other = S if times == 2 else CONTROLLER
-    assert_allclose(result(circle()), S(circle()) * other(circle()), rtol=1e-9, atol=1e-14)
-
-
 def test_a_fit_survives_copies_and_names_but_not_algebra():
     S = valve(2).replace(fit=FitSummary("Fit", "found here", ()))
     for kept in (S.copy("b"), pickle.loads(pickle.dumps(S)), S.replace(name="c")):
@@ -117,16 +64,6 @@ def test_a_fit_survives_copies_and_names_but_not_algebra():
 def test_a_fit_that_is_none_is_refused():
     with pytest.raises(OptionError, match="fit is a dict; expected None or"):
         valve(2).replace(fit={"found": "here"})
-
-
-def test_a_copy_computes_with_its_own_matrices():
-    S = valve(3)
-    twin = S.copy()
-    t = TS * np.arange(20)
-    a = ct.forced_response(twin, t, np.ones(20)).outputs
-    b = ct.input_output_response(twin, t, np.ones(20)).outputs
-    assert_allclose(a, b, rtol=1e-12)
-    assert twin._core is not S._core
 
 
 def test_a_long_delay_costs_memory_only_where_matrices_are_asked_for():

@@ -126,6 +126,15 @@ def test_channels_are_chosen_by_the_names_that_python_control_gave(renaming):
 
 SHOWN = {
     "system": lambda: cr.delayed_ss(NAMED, 4, name="valve"),
+    "loop": lambda: cr.interconnect(
+        [
+            cr.delayed_ss(NAMED, 30, name="P", inputs="u", outputs="y"),
+            ct.summing_junction(["r", "-y"], "u"),
+        ],
+        inputs="r",
+        outputs="y",
+        name="valve",
+    ),
     "controller": lambda: cr.design.PIDController(0.3, dt=TS, name="valve"),
     "predictor": lambda: cr.design.smith_predictor(
         plant(5), ct.tf([0.5, -0.498], [1, -1], TS), name="valve"
@@ -136,7 +145,7 @@ SHOWN = {
 }
 
 
-@pytest.mark.parametrize("kind", ["system", "controller", "response"])
+@pytest.mark.parametrize("kind", ["system", "loop", "controller", "response"])
 def test_the_text_that_can_be_loaded_makes_the_same_again(kind):
     shown = SHOWN[kind]()
     shown.repr_format = "eval"
@@ -144,6 +153,7 @@ def test_the_text_that_can_be_loaded_makes_the_same_again(kind):
         "array": np.array,
         "StateSpace": ct.StateSpace,
         "DelayedStateSpace": cr.DelayedStateSpace,
+        "DelaySystem": cr.DelaySystem,
         "PIDController": cr.design.PIDController,
         "MeasuredFRF": cr.MeasuredFRF,
     }

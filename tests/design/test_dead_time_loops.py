@@ -1,7 +1,5 @@
 """Design functions take systems with dead time inside, and return them."""
 
-import pickle
-
 import control as ct
 import numpy as np
 import pytest
@@ -69,17 +67,6 @@ def test_controllers_of_every_design_close_loops_with_the_delay_inside(length):
         )
     difference = pid - plant
     assert_allclose(difference(z), pid(z) - plant(z), rtol=1e-9)
-
-
-def test_margins_are_those_of_plant_and_dead_time_given_apart():
-    inside, apart = design.margins(P, C), design.margins(CORE, C, dead_time=0.3)
-    for name in ("gain_margin", "phase_margin", "modulus_margin", "delay_margin"):
-        assert getattr(inside, name) == pytest.approx(getattr(apart, name), rel=1e-8)
-    # as much dead time as the margin allows, and a little more
-    for extra, stable in ((0.99, True), (1.01, False)):
-        later = P * cr.delay(extra * inside.delay_margin) * C
-        assert ct.feedback(later).is_stable() is stable
-        assert design.margins(later).stable is stable
 
 
 @pytest.mark.parametrize(
@@ -179,23 +166,6 @@ def test_a_bound_for_continuous_plants_holds_all_of_them():
         assert design.margins(other, pi).ms <= found.performance * (1 + 1e-6)
 
 
-def test_lqg_of_a_continuous_plant_is_designed_for_its_sampled_form():
-    plant = ct.tf([1], [1, -0.5]) * cr.delay(0.4)
-    sampled = plant.to_discrete(0.05)
-    controller = design.lqg(sampled, 1.0, 1.0, 1.0, 1.0)
-    assert controller.check.stable
-    assert ct.feedback(sampled * controller).is_stable()
-
-
-def test_margins_of_an_outer_loop_count_the_poles_of_the_inner_one():
-    # the inner loop alone is unstable: K = 20 with a critical gain of 6.2 / 2
-    inner = ct.feedback(10 * P)
-    assert not inner.is_stable()
-    found = design.margins(inner, 1e-3)
-    assert not found.stable
-    assert found.unstable_poles == np.sum(inner.poles().real > 0)
-
-
 def test_performance_in_continuous_time_is_the_limit_of_short_samples():
     lag = ct.tf([1], [0.08, 1])
     pid = design.PIDController(1.379, 0.08)
@@ -208,26 +178,3 @@ def test_performance_in_continuous_time_is_the_limit_of_short_samples():
     for name in ("setpoint_error", "load_error", "settling_time"):
         # half a sample of the hold, of some 60
         assert getattr(continuous, name) == pytest.approx(getattr(sampled, name), rel=0.03)
-
-
-def test_performance_of_a_plant_that_is_a_loop_itself():
-    inner = ct.feedback(PLANT, 0.3)
-    plain = cr.DelayedStateSpace(ct.ss(inner.A, inner.B, inner.C, inner.D, DT))
-    ours, theirs = (design.performance(plant, 0.5) for plant in (inner, plain))
-    assert ours.overshoot == pytest.approx(theirs.overshoot, abs=1e-5)
-    assert ours.settling_time == pytest.approx(theirs.settling_time)
-
-
-def test_identified_models_become_continuous_systems_and_come_back():
-    plant = cr.delayed_ss(ct.tf([2], [0.08, 1]), dead_time=0.0289, dt=DT, inputs="i", outputs="x")
-    model = design.to_continuous(plant)
-    system = model.system
-    assert isinstance(system, cr.DelaySystem)
-    assert_allclose(
-        system(1j * OMEGA), 2 * np.exp(-0.0289j * OMEGA) / (1 + 0.08j * OMEGA), rtol=1e-9
-    )
-    assert (system.input_labels, system.output_labels) == (["i"], ["x"])
-    back = design.to_discrete(system, dt=DT)
-    assert back.delay == plant.delay
-    assert_allclose(back.step(300), plant.step(300), atol=1e-10)
-    assert pickle.loads(pickle.dumps(system)).internal_delays == system.internal_delays

@@ -1,6 +1,7 @@
 """Values, poles, algebra, indexing, conversion: the answers of `StateSpace`, for any delay."""
 
 import copy
+import pickle
 
 import control as ct
 import numpy as np
@@ -24,6 +25,7 @@ from tests.host.pairs import (
 Z = np.exp(1j * GRID * DT)
 
 SLYCOT = ct.slycot_check()
+KINDS = cr.DelaySystem, cr.DelayedStateSpace
 
 
 def in_order(roots: np.ndarray) -> np.ndarray:
@@ -74,6 +76,8 @@ ANY = {
     "copy": lambda s: s.copy(),
     "copy.copy": lambda s: copy.copy(s),
     "copy.deepcopy": lambda s: copy.deepcopy(s),
+    # python-control's own class cannot be pickled
+    "pickle": lambda s: pickle.loads(pickle.dumps(s)) if isinstance(s, KINDS) else s,
     "negate": lambda s: ct.negate(s),
     "append": lambda s: ct.append(s, s),
     "append method": lambda s: s.append(OTHER),
@@ -101,6 +105,9 @@ SISO = {
     "plus a system": lambda s: s + OTHER,
     "system plus": lambda s: OTHER + s,
     "minus a system": lambda s: s - OTHER,
+    "system minus": lambda s: OTHER - s,
+    "quotient": lambda s: OTHER / (1 + 0.05 * s),
+    "number over": lambda s: 1 / (1 + 0.05 * s),
     "plus a transfer function": lambda s: s + OTHER_TF,
     "squared": lambda s: s**2,
     "to the zeroth": lambda s: s**0,
@@ -108,6 +115,7 @@ SISO = {
     "series behind": lambda s: ct.series(OTHER, s, OTHER),
     "series with itself": lambda s: ct.series(s, s),
     "parallel": lambda s: ct.parallel(s, OTHER),
+    "parallel behind": lambda s: ct.parallel(OTHER, s),
     "feedback": lambda s: ct.feedback(0.1 * s, 1),
     "feedback around a system": lambda s: ct.feedback(OTHER, 0.1 * s),
     "feedback with itself": lambda s: ct.feedback(0.1 * s, 0.1 * s),
@@ -167,6 +175,13 @@ CASES = [
 # Found by finite differences and by iteration, to what their steps and tolerances leave.
 LOOSE = {"any: linearize", "one channel: interconnect", "one channel: operating point"}
 
+# Matrices are asked for, or the other system is asked first; all else is a system with its delay.
+PLAIN = {
+    "any: ct.ss", "any: StateSpace", "any: linearize", "one channel: to the zeroth",
+    "one channel: similar", "one channel: interconnect", "one channel: feedback around a system",
+    "one channel: unit feedback of one", "channels: feedback of a system",
+}  # fmt: skip
+
 CASES = [
     (core, operation, delay)
     for core, operation in CASES
@@ -184,7 +199,10 @@ def test_the_answer_is_that_of_state_space(core, operation, delay):
     ours, theirs = pair(core, delay)
     before = [M.copy() for M in (ours.A, ours.B, ours.C, ours.D)]
     rtol = 1e-6 if operation in LOOSE else 1e-9
-    assert_same(quietly(ALL[operation], ours), quietly(ALL[operation], theirs), rtol=rtol)
+    result, expected = (quietly(ALL[operation], system) for system in (ours, theirs))
+    assert_same(result, expected, rtol=rtol)
+    if isinstance(expected, ct.StateSpace):
+        assert isinstance(result, KINDS) is (operation not in PLAIN)
     for M, old in zip((ours.A, ours.B, ours.C, ours.D), before, strict=True):
         np.testing.assert_array_equal(M, old)
     assert isinstance(ours, cr.DelaySystem if core == LOOP else cr.DelayedStateSpace)

@@ -5,9 +5,6 @@ import hashlib
 import json
 import os
 import stat
-import subprocess
-import sys
-import time
 
 import control as ct
 import numpy as np
@@ -77,42 +74,6 @@ def test_rows_of_another_version_are_made_anew(records, tmp_path, package):
     again = cr.identify_campaign(records[:1], method="paper", store=store)
     assert_same_results(first, again)
     assert json.loads(path.read_text())["versions"] != content["versions"]
-
-
-SCRIPT = """
-import functools, sys, time
-import ctrl_realize as cr
-from tests.io.test_campaign_store import record
-
-def slowly(seed):
-    time.sleep(0.3 if seed else 0.0)
-    return record(seed)
-
-store = cr.io.CampaignStore(sys.argv[1])
-sources = [functools.partial(slowly, seed) for seed in range(40)]
-cr.identify_campaign(sources, method="paper", store=store)
-"""
-
-
-def test_a_killed_run_goes_on_with_the_same_results(tmp_path):
-    run = subprocess.Popen(
-        [sys.executable, "-c", SCRIPT, str(tmp_path)],
-        stderr=subprocess.DEVNULL,
-        cwd=os.fspath(pytest.importorskip("tests").__path__[0] + "/.."),
-    )
-    store = cr.io.CampaignStore(tmp_path)
-    for _ in range(6000):  # five minutes: a busy machine takes one to import
-        if len(store) >= 2:
-            break
-        time.sleep(0.05)
-    run.kill()
-    run.wait(timeout=30)
-    done = len(store)
-    assert 2 <= done < 40
-    sources = [functools.partial(record, seed) for seed in range(done + 1)]
-    resumed = cr.identify_campaign(sources, method="paper", store=store)
-    fresh = cr.identify_campaign(sources, method="paper")
-    assert_same_results(fresh, resumed)
 
 
 def names(folder):

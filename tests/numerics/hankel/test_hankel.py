@@ -11,7 +11,6 @@ from ctrl_realize.numerics.hankel.matrix import (
     hankel_matrix,
     hankel_norm_squared,
 )
-from ctrl_realize.numerics.hankel.recurrence import extreme_pairs
 from ctrl_realize.numerics.hankel.svd import leading_triplets, thin_svd
 from tests.oracles.plants import modal, valve_pulse
 
@@ -80,17 +79,6 @@ def test_pairs_satisfy_their_definition_to_the_tolerance(kind, count):
         assert residual.max() <= 1e-9 * found[-1] + 1e-13 * dense[0]
 
 
-def test_values_inside_the_noise_cluster_are_the_dense_ones():
-    noise = np.random.default_rng(3).standard_normal(2 * 300 + 8)
-    h = windows(noise, 300, 8)
-    pairs = leading_eigenpairs(h, 300, 6)
-    for d in range(8):
-        dense = np.linalg.svd(hankel_matrix(h[d], 300, 300), compute_uv=False)
-        # nothing but noise: neighbours differ by a percent
-        assert_allclose(np.abs(pairs.values[d]), dense[:6], rtol=0, atol=1e-10 * dense[0])
-        assert dense[6] * 0.9 <= pairs.following[d] <= dense[6] * (1 + 1e-9)
-
-
 @pytest.mark.parametrize("place", [3, 40, 77])
 def test_a_pulse_on_a_smooth_response_does_not_hide_its_copies(place):
     k = np.arange(2 * 150)
@@ -98,19 +86,6 @@ def test_a_pulse_on_a_smooth_response_does_not_hide_its_copies(place):
     expected = np.linalg.svd(hankel_matrix(h[0], 150, 150), compute_uv=False)[:6]
     found = np.abs(leading_eigenpairs(h, 150, 6).values[0])
     assert_allclose(found, expected, rtol=0, atol=1e-10 * expected[0])
-
-
-@pytest.mark.parametrize("n", [1, 2, 3, 30])
-@pytest.mark.parametrize("count", [1, 4, 40])
-def test_tridiagonal_pairs_are_those_of_the_full_decomposition(n, count):
-    rng = np.random.default_rng(n)
-    a, b = rng.standard_normal(n), rng.uniform(0.1, 1, max(n - 1, 0))
-    T = np.diag(a) + np.diag(b, 1) + np.diag(b, -1)
-    values, vectors = extreme_pairs(a.copy(), b.copy(), count)
-    expected = np.linalg.eigvalsh(T)
-    expected = expected[np.argsort(-np.abs(expected))][:count]
-    assert_allclose(values, expected, atol=1e-13)
-    assert_allclose(T @ vectors, vectors * values, atol=1e-12)
 
 
 @pytest.mark.parametrize(("p", "m"), [(2, 2), (3, 1), (2, 4)])
@@ -139,13 +114,6 @@ def test_equal_channels_of_low_rank_are_not_taken_for_one(rank):
     assert not found.complete
     assert_allclose(found.values[:-1], expected[: 3 * rank], rtol=0, atol=1e-12 * expected[0])
     assert found.values[-1] == 0
-
-
-def test_a_power_of_two_scales_every_bit():
-    h = windows(valve_pulse("causal"), 200, 4)
-    plain, scaled = leading_eigenpairs(h, 200, 3), leading_eigenpairs(h * 2.0**-900, 200, 3)
-    assert np.array_equal(plain.vectors, scaled.vectors)
-    assert np.array_equal(plain.values * 2.0**-900, scaled.values)
 
 
 @pytest.mark.parametrize("size", [40, 100, 300])

@@ -42,21 +42,6 @@ def test_paper_formulas_with_the_misprints_corrected_return_the_markov_parameter
     assert_allclose(model, g, rtol=0, atol=1e-13 * np.abs(g).max())
 
 
-def test_model_without_hankel_products_is_the_textbook_model():
-    g = valve_pulse("causal")[np.newaxis, np.newaxis, :401]
-    A, B, C, _ = dense.kung(g, 30, 300, 4)
-    values, vectors = np.linalg.eigh(hankel_matrix(g[0, 0, 31:], 150, 150))
-    lead = np.argsort(-np.abs(values))[:4]
-    fast = realize_symmetric(
-        values[np.newaxis, lead], vectors.T[np.newaxis, lead], g[0, :, 181:331]
-    )
-    turn = np.sign(B[:, 0])  # the textbook leaves the signs of the vectors open
-    # cond(S) is 100 here
-    assert_allclose(fast[0][0], turn[:, np.newaxis] * A * turn, atol=1e-12)
-    assert_allclose(fast[1][0], turn * B[:, 0], atol=1e-14)
-    assert_allclose(fast[2][0], turn * C[0], atol=1e-14)
-
-
 @pytest.mark.parametrize("size", [150, 700])  # below and above the complete decomposition
 @pytest.mark.parametrize("kind", ["zero-phase", "unfiltered"])
 def test_padded_error_is_below_the_bound_and_poles_are_inside_for_every_order(size, kind):

@@ -82,14 +82,14 @@ def test_at_the_optimum_the_jacobian_is_minus_the_derivative_of_the_residual(n, 
     parts = tuple(SampledInput(rng.normal(size=size // 10).repeat(10), 1.0) for size in (90, 130))
     drive = SeveralInputs(parts, (20, 20))
     walk = rng.normal(size=180).cumsum()
-    nothing = np.empty((180, 0))
+    nothing, weight = np.empty((180, 0)), np.linspace(0.5, 2.0, 180)
     x = np.concatenate([[7.3], theta])[None]
 
     def problem(data):
-        return Problem(data, np.ones(180), drive, nothing, KnownFactor(), STRETCHES)
+        return Problem(data, weight, drive, nothing, KnownFactor(), STRETCHES)
 
     structure = Structure(n, r)
-    data = walk - evaluate(problem(walk), structure, x).residual[0]
+    data = walk - evaluate(problem(walk), structure, x).residual[0] / weight
     exact = problem(data)
     state = evaluate(exact, structure, x)
     assert np.abs(state.residual).max() < 1e-9 * np.abs(data).max()

@@ -91,19 +91,6 @@ def test_near_the_optimum_it_is_the_parabola_of_the_standard_error(found):
     assert wide[1] - wide[0] == pytest.approx(2 * (high - low), rel=0.05)
 
 
-def test_all_starts_come_to_one_minimum():
-    problem, scales = problem_of()
-    structure = Structure(2, 2)
-    bounds = parameter_bounds(structure, scales)
-    starts = np.array([start(d, 8.0, 35.0) for d in (15.0, 20.0, 23.0)])
-    ends, _ = polish(problem, structure, starts, bounds, scales.dt)
-    fits = [settle(problem, structure, end, bounds, scales.dt) for end in ends]
-    for x, cost in fits[1:]:
-        # rounding: of the cost, and its square root in standard errors of the parameters
-        assert cost == pytest.approx(fits[0][1], rel=1e-12)
-        assert_allclose(x, fits[0][0], atol=1e-5)
-
-
 def test_a_dead_time_that_crosses_a_hundred_samples_ends_where_one_beside_it_does():
     problem, scales = problem_of((30.0, 60.0), dead_time=140.3)
     structure = Structure(2, 2)

@@ -6,17 +6,14 @@ from numpy.testing import assert_allclose
 
 from ctrl_realize.numerics.separable.batch_search import fit_batch
 from ctrl_realize.numerics.separable.compressed import compress
-from ctrl_realize.numerics.separable.local_terms import Segments
 from ctrl_realize.numerics.separable.poles import parameters_from_poles
 from ctrl_realize.numerics.separable.responses import SampledInput, StepSequence
 from ctrl_realize.numerics.separable.structures import Scales, parameter_bounds, search
 from ctrl_realize.numerics.separable.varpro import (
-    Bounds,
     KnownFactor,
     Problem,
     Structure,
     evaluate,
-    partial_fractions,
     respond,
 )
 from tests import rigs
@@ -109,26 +106,6 @@ def test_the_response_is_the_closed_form_at_any_fraction_of_a_sample():
         assert_allclose(ours, rigs.exact_step(rigs.R3, time - dead_time * rigs.TS), atol=1e-12)
 
 
-@pytest.mark.parametrize("zeta", [0.05, 0.7, 1.3])
-def test_exact_data_give_their_own_parameters_back(zeta):
-    poles = (rigs.lag(2.2) * rigs.pair(8.0, zeta)).poles().astype(complex)
-    time = rigs.TS * np.arange(-50, 900)
-    drive = StepSequence(time, np.ones(950, dtype=np.int64), rigs.TS, np.zeros(1), np.ones(1))
-    truth = np.concatenate([[36.4 * rigs.TS], parameters_from_poles(poles)])
-    data = 2.0 + respond(drive, KnownFactor(), np.array([np.prod(-poles).real]), truth)
-    problem = Problem(data, np.ones(950), drive, np.ones((950, 1)), KnownFactor())
-    scales = Scales(50 * rigs.TS, 80 * rigs.TS, 900 * rigs.TS, rigs.TS, 100 * rigs.TS)
-    found = search(problem, [Structure(3, 3)], scales)[Structure(3, 3)]
-    polished, _ = fit_batch(
-        problem,
-        Structure(3, 3),
-        found.parameters[None],
-        parameter_bounds(Structure(3, 3), scales),
-        tolerance=1e-13,
-    )
-    assert_allclose(polished[0, 0], truth[0], rtol=1e-6)
-
-
 def test_no_random_start_beats_the_few_that_are_tried():
     # The starts are ten; thirty random ones from the whole box must not find a lower cost.
     worse = 0
@@ -155,7 +132,6 @@ TIME = DT * np.arange(SIZE)
 NOTHING = KnownFactor()
 LAG = 2.5
 TRUTH = np.array([3.3, -np.log(LAG)])
-BOX = Bounds(np.array([0.0, np.log(0.02)]), np.array([9.0, np.log(4.0)]))
 
 
 def train(unit=1.0, at=2.0):
@@ -185,24 +161,6 @@ def noisy(gain=2.0, level=5.0, noise=0.02, seed=0):
 # --- responses
 
 
-@pytest.mark.parametrize("known", [np.ones(1), np.array([0.2, 0.0, 0.3])])
-def test_partial_fractions_add_up(known):
-    poles = np.array([[-0.4 + 0j, -0.3 + 2j, -0.3 - 2j], [-1.0, -2.0, -7.0]])
-    residues, gain, moved = partial_fractions(poles, known, 2 if known.size > 1 else 3)
-    s = 0.7 + 0.3j
-    for row, p in enumerate(poles):
-        for i in range(residues.shape[2]):
-            whole = s ** (i - 1) * np.polyval(known, s) / np.prod(s - p)
-            parts = (i == 0) * gain[row] / s + np.sum(residues[row, :, i] / (s - p))
-            assert parts == pytest.approx(whole, rel=1e-12)
-            # the derivative of its numerator, s^(i-1) K, at every pole; over a' there
-            slope = np.array([np.prod(x - np.delete(p, j)) for j, x in enumerate(p)])
-            ahead, behind = ((p + h) ** (i - 1.0) * np.polyval(known, p + h) for h in (1e-6, -1e-6))
-            # central differences of a step of 1e-6
-            expected = (ahead - behind) / 2e-6 / slope
-            assert moved[row, :, i] == pytest.approx(expected, rel=1e-7, abs=1e-8)
-
-
 # --- elimination
 
 
@@ -221,44 +179,7 @@ def test_the_residual_is_that_of_weighted_least_squares():
         assert state.regression[row, 0] == pytest.approx(best[1])
 
 
-def test_own_terms_are_taken_out_of_data_and_model():
-    # a free response of the plant and a level of its own in each of two segments
-    free = np.concatenate([4.0 * np.exp(-TIME[:40] / LAG), 1.0 - 2 * np.exp(-TIME[:50] / LAG)])
-    clock = np.concatenate([TIME[:40], TIME[:50]])
-    pieces = Segments(np.array([0, 40, SIZE]), clock, np.ones((SIZE, 1)))
-    data = respond(train(), NOTHING, np.array([0.8]), TRUTH) + free
-    none = np.empty((SIZE, 0))
-    weight = np.linspace(0.5, 2.0, SIZE)
-    made = problem(data, regressors=none, segments=pieces, root_weight=weight)
-    state = evaluate(made, ONE, TRUTH[None])
-    assert state.cost[0] < 1e-20
-    assert state.numerator[0] == pytest.approx([0.8])
-    # the lag of the free response moves along with that of the model
-    h = 1e-5
-    for q in range(2):
-        step = h * (np.arange(2) == q)
-        ahead, behind = (evaluate(made, ONE, (TRUTH + d)[None]).residual[0] for d in (step, -step))
-        expected = (behind - ahead) / (2 * h)
-        # central differences of 1e-5: 1e-10 of curvature and 1e-7 of rounding
-        assert np.abs(state.jacobian[0, :, q] - expected).max() < 2e-6 * np.abs(expected).max()
-
-
 # --- steps
-
-
-def fitted(data, start, bounds=BOX, **settings):
-    x, cost = fit_batch(problem(data), ONE, np.atleast_2d(start), bounds, **settings)
-    return x[0], cost[0]
-
-
-def test_a_dead_time_that_is_fixed_is_kept_wherever_it_is():
-    for dead_time in (1.0, 3.3, 11.0):
-        x, _ = fitted(noisy(), [dead_time, 0.0], dead_time_fixed=True, tolerance=1e-12)
-        assert x[0] == dead_time
-        rates = np.clip(x[1] + 1e-2 * np.array([-1, 0, 1]), BOX.low[1], BOX.high[1])
-        trials = np.stack([np.full(3, dead_time), rates], axis=1)
-        slower, at, faster = evaluate(problem(noisy()), ONE, trials).cost
-        assert at <= min(slower, faster)
 
 
 @pytest.mark.parametrize("structure", [ONE, JUMP, TWO, ZERO])
