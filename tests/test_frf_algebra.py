@@ -212,8 +212,6 @@ def test_frequencies_may_differ_in_their_last_bits(factor):
     assert np.any(asked != frf.omega)
     assert_array_equal(frf.frequency_response(asked).complex, frf.complex)
     assert_array_equal((frf * cr.MeasuredFRF(frf.complex, hz * factor)).complex, frf.complex**2)
-    lines = ct.bode_plot([model, frf], omega=asked).lines
-    assert lines.size == 2
     with pytest.raises(ValueError, match="not all frequencies"):
         frf.frequency_response(frf.omega * 1.001)
 

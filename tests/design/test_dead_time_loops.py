@@ -34,21 +34,6 @@ def test_a_smith_predictor_s_loop_is_the_delay_free_loop_later():
     assert (predictor.name, predictor.input_labels) == ("smith", ["e"])
 
 
-def test_a_sampled_smith_predictor_is_a_controller_with_an_internal_delay():
-    predictor = design.smith_predictor(PLANT, PI)
-    loop = PLANT * predictor
-    assert isinstance(loop, cr.DelaySystem)
-    assert loop.internal_delays == (100, 100)
-    z = np.exp(1j * np.geomspace(0.1, 3000, 25) * DT)
-    assert_allclose(loop(z), PLANT(z) * predictor(z), rtol=1e-8)
-    closed = ct.feedback(loop)
-    free = ct.feedback(PLANT.delay_free * ct.ss(PI))
-    assert_allclose(closed(z), free(z) * z**-100.0, rtol=1e-8, atol=1e-14)
-    assert_allclose(closed.step(600)[100:], cr.DelayedStateSpace(free).step(500), atol=1e-10)
-    assert closed.is_stable()
-    assert_allclose(predictor.feedback(PLANT)(z), predictor(z) / (1 + loop(z)), rtol=1e-8)
-
-
 @pytest.mark.parametrize("length", [10, 100])
 def test_controllers_of_every_design_close_loops_with_the_delay_inside(length):
     plant = cr.delayed_ss(ct.tf([1], [0.08, 1]), dead_time=length * 0.002, dt=0.002)

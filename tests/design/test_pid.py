@@ -49,18 +49,6 @@ def test_rules_give_their_published_parameters(model, rule, kind, expected):
     assert found.name == f"{kind}_{rule}"
 
 
-def test_the_ultimate_rule_starts_from_the_exact_ultimate_gain(valve):
-    plant = valve(37)
-    found = cr.design.pid(plant, "ziegler_nichols_ultimate", "P")
-    ultimate = 2 * found.kp
-    inside = ct.feedback(ct.ss(plant) * (ultimate * (1 - 1e-6)), 1)
-    outside = ct.feedback(ct.ss(plant) * (ultimate * (1 + 1e-6)), 1)
-    assert np.all(np.abs(inside.poles()) < 1)
-    assert np.any(np.abs(outside.poles()) > 1)
-    pid = cr.design.pid(-plant, "ziegler_nichols_ultimate", "PID")
-    assert pid.kp == pytest.approx(-0.6 * ultimate)
-
-
 def test_a_system_is_tuned_half_a_sample_later_than_its_model():
     plant = FOPDT.system(0.5)
     found = cr.design.pid(plant, "ziegler_nichols", "P")

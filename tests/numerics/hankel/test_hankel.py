@@ -7,7 +7,6 @@ from numpy.testing import assert_allclose
 from ctrl_realize.numerics.hankel.lanczos import largest_magnitude, leading_eigenpairs
 from ctrl_realize.numerics.hankel.matrix import (
     BlockHankel,
-    HankelStack,
     hankel_matrix,
     hankel_norm_squared,
 )
@@ -18,16 +17,6 @@ from tests.oracles.plants import modal, valve_pulse
 @pytest.fixture
 def rng():
     return np.random.default_rng(7)
-
-
-@pytest.mark.parametrize("size", [1, 2, 17, 500])
-@pytest.mark.parametrize("missing", [0, 3])
-def test_fft_product_is_the_dense_product(rng, size, missing):
-    h = rng.standard_normal((4, max(1, 2 * size - 1 - missing)))
-    v = rng.standard_normal((4, size))
-    expected = [hankel_matrix(row, size, size) @ x for row, x in zip(h, v, strict=True)]
-    # 500 terms of order one, each rounded at 1e-16
-    assert_allclose(HankelStack(h, size)(v), expected, rtol=0, atol=1e-12)
 
 
 @pytest.mark.parametrize(("p", "m"), [(1, 1), (3, 2), (2, 5)])

@@ -2,8 +2,6 @@
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 from scipy import signal
 
@@ -17,10 +15,7 @@ from ctrl_realize.numerics.rational.model import (
 from ctrl_realize.numerics.rational.sines import fit_sines
 from ctrl_realize.numerics.rational.spectra import (
     independent_segments,
-    period_statistics,
-    segment_sums,
 )
-from ctrl_realize.numerics.rational.starts import relocate_poles, trial_poles
 
 S = 1j * np.geomspace(0.05, 20, 60)
 POLES = {
@@ -88,54 +83,12 @@ def test_full_jacobian_is_that_of_the_weighted_model(order, count):
         assert_allclose(J[:, i], slope, atol=1e-8 * np.abs(J).max())
 
 
-@given(
-    st.lists(st.floats(0.1, 15), min_size=0, max_size=2),
-    st.lists(st.tuples(st.floats(0.2, 10), st.floats(0.03, 0.9)), min_size=0, max_size=2),
-)
-def test_relocated_poles_reach_those_of_an_exact_response(real, pairs):
-    poles = [-complex(w) for w in real]
-    for w, zeta in pairs:
-        p = w * complex(-zeta, np.sqrt(1 - zeta**2))
-        poles += [p, p.conjugate()]
-    gaps = [abs(p - q) / max(abs(p), abs(q)) for i, p in enumerate(poles) for q in poles[:i]]
-    if not poles or min(gaps, default=1) < 0.15:
-        return  # equal poles are no partial fractions, and hardly identifiable
-    response = sum(1 / (S - p) for p in poles) + 0.0
-    weight = 1 / np.abs(response)
-    found = trial_poles(0.05, 20, len(poles), resonant=True)
-    for _ in range(12):
-        found = relocate_poles(S, response, weight, found)
-    # The response is what matters: close poles may be off by more than the response is.
-    fractions = np.stack([1 / (S - p) for p in found], axis=1)
-    fitted = fractions @ np.linalg.lstsq(fractions, response, rcond=None)[0]
-    assert_allclose(fitted, response, rtol=1e-4)
-
-
 N, DT = 300, 0.01
 T = DT * np.arange(N)
 
 
 def sine(omega, phasor, offset=0.0, slope=0.0, time=T):
     return (phasor * np.exp(1j * omega * time)).real + offset + slope * time
-
-
-@given(
-    cycles=st.floats(1.2, 60),
-    amplitude=st.floats(0.01, 100),
-    phase=st.floats(-3.1, 3.1),
-    offset=st.floats(-10, 10),
-    slope=st.floats(-10, 10),
-)
-def test_exact_sine_is_recovered_with_its_frequency(cycles, amplitude, phase, offset, slope):
-    omega = 2 * np.pi * cycles / (N * DT)
-    y = sine(omega, amplitude * np.exp(1j * phase), offset, slope)
-    start = np.array([omega + 0.3 * 2 * np.pi / (N * DT)])  # 0.3 of the width of a line
-    fit = fit_sines(T, y[None, None], start, drift=True)
-    size = amplitude + abs(offset) + abs(slope) * N * DT
-    # Rounding of the data, grown by the conditioning of little more than one period (< 1e3).
-    assert_allclose(fit.omega * N * DT, [omega * N * DT], atol=1e-10 * size / amplitude)
-    assert_allclose(fit.phasor[0, 0], amplitude * np.exp(1j * phase), atol=1e-10 * size)
-    assert_allclose([fit.offset[0, 0], fit.slope[0, 0]], [offset, slope], atol=1e-10 * size)
 
 
 def test_given_frequency_is_plain_linear_least_squares():
@@ -176,28 +129,7 @@ def test_noisy_estimates_scatter_as_the_stated_standard_deviations_say():
     assert spread == pytest.approx(stated, rel=0.055)
 
 
-def test_segment_sums_are_those_of_scipys_csd():
-    rng = np.random.default_rng(0)
-    u, y = rng.standard_normal((2, 1000))
-    window = signal.get_window("hann", 128)
-    sums = segment_sums(u[None], y[None], window, 64)
-    _, expected = signal.csd(u, y, window=window, noverlap=64, detrend="constant")
-    scale = 2 / (window @ window) / sums.count  # one-sided density, fs = 1
-    assert_allclose(sums.yu[0, 0, 1:-1] * scale, expected[1:-1], rtol=1e-12)
-    assert sums.count == (1000 - 128) // 64 + 1
-
-
 def test_half_overlapped_hann_segments_count_for_19_18_of_their_number():
     # Welch's figure: correlation of neighbours (1/6)^2, so K / (1 + 2/36) for many segments.
     window = signal.get_window("hann", 256)
     assert independent_segments(window, 128, 10_000) / 10_000 == pytest.approx(18 / 19, abs=1e-3)
-
-
-def test_period_covariances_are_numpys():
-    rng = np.random.default_rng(2)
-    u, y = rng.standard_normal((2, 6, 16))
-    stats = period_statistics(u, y)
-    U, Y = np.fft.rfft(u)[:, 3], np.fft.rfft(y)[:, 3]
-    expected = np.cov(Y, U)
-    assert_allclose(stats.cov_yu[3], expected[0, 1], rtol=1e-12)
-    assert_allclose([stats.var_y[3], stats.var_u[3]], np.diag(expected).real, rtol=1e-12)

@@ -7,15 +7,11 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
 from ctrl_realize.numerics.state_space.delay_split import joined_rows, split_delays
-from ctrl_realize.numerics.state_space.process_models import half_rule, process_step
+from ctrl_realize.numerics.state_space.process_models import half_rule
 from ctrl_realize.numerics.state_space.responses import markov
 from ctrl_realize.numerics.state_space.sampling import (
-    sample_with_dead_time,
     split_dead_time,
-    zero_order_hold,
 )
-
-LAG = (np.array([[-2.0]]), np.array([[2.0]]), np.array([[1.0]]))
 
 
 @pytest.mark.parametrize(
@@ -36,25 +32,6 @@ def test_a_dead_time_is_whole_samples_and_a_rest(samples, whole, rest):
     found = split_dead_time(samples, 1.0)
     assert found[0] == whole
     assert_allclose(found[1], rest, rtol=0, atol=1e-12)
-
-
-@pytest.mark.parametrize("fraction", [1e-6, 0.2, 0.5, 0.999])
-def test_a_fractional_dead_time_samples_the_delayed_exponential(fraction):
-    dt, count = 0.1, 40
-    A, B, C, D, delay = sample_with_dead_time(*LAG, np.zeros((1, 1)), dt, (2 + fraction) * dt)
-    assert delay == 3
-    markov = [D[0, 0]] + [(C @ np.linalg.matrix_power(A, k) @ B)[0, 0] for k in range(count - 1)]
-    step = np.concatenate([np.zeros(delay), np.cumsum(markov)])
-    time = dt * np.arange(step.size) - (2 + fraction) * dt
-    assert_allclose(step, np.where(time > 0, 1 - np.exp(-2 * time), 0), rtol=0, atol=1e-13)
-
-
-def test_the_hold_integrates_several_inputs_apart():
-    A, B = np.array([[0.0, 1.0], [0.0, 0.0]]), np.array([[0.0, 1.0], [2.0, 0.0]])
-    Phi, Gamma = zero_order_hold(A, B, 0.5)
-    # a double integrator: polynomials in the sample time
-    assert_allclose(Phi, [[1, 0.5], [0, 1]])
-    assert_allclose(Gamma, [[2 * 0.125, 0.5], [1.0, 0.0]])
 
 
 delays_of = st.lists(st.integers(0, 30), min_size=1, max_size=4)
@@ -127,16 +104,3 @@ def test_a_lead_is_cancelled_by_its_rule(lags, leads, dead_time, factor, kept):
     assert found == pytest.approx(factor)
     assert left == pytest.approx(kept)
     assert theta == dead_time
-
-
-@pytest.mark.parametrize(("lag", "second"), [(3.0, 0.0), (3.0, 0.5), (0.5, 3.0), (3.0, 3.0)])
-@pytest.mark.parametrize("integrating", [False, True])
-def test_the_response_obeys_its_differential_equation(lag, second, integrating):
-    # T1 T2 y'' + (T1 + T2) y' + y = u, or its integral, by differences of a fine grid
-    h = 1e-3
-    t = 1.5 + h * np.arange(3, 9000)
-    y = [process_step(t + s, lag, second, 1.5, integrating=integrating) for s in (-h, 0, h)]
-    slope, bend = (y[2] - y[0]) / (2 * h), (y[2] - 2 * y[1] + y[0]) / h**2
-    forced = lag * second * bend + (lag + second) * slope + y[1]
-    # second differences: h^2 / 12 of the fourth derivative, below 1 / 0.5^4
-    assert_allclose(forced, t - 1.5 if integrating else 1.0, atol=1e-5)
