@@ -54,15 +54,6 @@ def test_std_of_single_records_agrees_with_the_scatter_of_many():
     assert np.mean([frf.std[0] for frf in single]) == pytest.approx(scatter, rel=0.1)
 
 
-def test_circles_of_five_repeats_hold_the_truth_as_often_as_they_say():
-    rng = np.random.default_rng(8)
-    points = [[sine_record(3.3, 0.5, noise=0.1, rng=rng) for _ in range(5)] for _ in range(300)]
-    frf = cr.stepped_sine_frf(points, settle=0.0)
-    assert frf.repeats == 5
-    # 300 times 95 %: 1.3 % of scatter; taken for known the deviations would make 89 %
-    assert np.mean(np.abs(frf.complex - 0.5) <= frf.circle()) > 0.925
-
-
 @pytest.mark.parametrize("hz", [0.6, 4.0, 20.0])
 def test_std_of_single_records_counts_slow_noise_where_it_is_strong(hz):
     rng = np.random.default_rng(6)

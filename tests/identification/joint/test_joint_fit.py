@@ -1,6 +1,5 @@
 """Time records and a frequency response together: simulated plants with known truth."""
 
-import pickle
 import re
 from functools import cache
 
@@ -190,11 +189,10 @@ def test_gains_that_differ_between_records_make_the_common_one_uncertain():
     assert any("gains (9." in reason for reason in several.choices)  # 0.183 / sqrt(4)
 
 
-@pytest.mark.parametrize("structure", [(1, 1), (2, 1)])
-def test_a_plant_that_still_moves_before_the_step_is_followed_from_the_first_sample(structure):
+def test_a_plant_that_still_moves_before_the_step_is_followed_from_the_first_sample():
     record = step()
     moving = cr.Record(TIME, record.input, record.output + 2.0 * np.exp(-TIME / LAG))
-    fit = fit_joint(moving, response(), structures=[structure]).fit
+    fit = fit_joint(moving, response(), structures=[(2, 1)]).fit
     assert fit.estimate.relaxing or fit.record_fit.estimate.relaxing
     # six standard deviations, and what a bin of some samples does not show of the decay
     assert np.abs(fit.measured - fit.fitted).max() < 6 * NOISE + 0.1
@@ -212,8 +210,6 @@ def test_identify_delegates_and_its_result_has_what_all_fits_have():
     assert_allclose(fit.estimate.followed.complete, 100 * (1 - left / spread), rtol=1e-9)
     assert_allclose(fit.estimate.followed.simulated, fit.fit_percent, atol=0.01)  # a level alone
     assert "agreement" in fit.report()
-    assert repr(fit).startswith("<JointFit 0.12")
-    assert pickle.loads(pickle.dumps(fit)).dead_time == fit.dead_time
     poles = 1 / (LAG * 2j * np.pi * HZ + 1)
     assert_allclose(
         fit.response(2 * np.pi * HZ), GAIN * poles * np.exp(-2j * np.pi * HZ * 0.125), atol=0.1

@@ -87,16 +87,6 @@ def test_a_beginning_that_a_zero_imitates_is_left_open():
     assert high >= fit.onset / TS + 1 - 1e-9
 
 
-def test_a_plant_with_a_zero_is_covered_and_one_without_is_not_called_open(quiet_valve):
-    w = 2 * np.pi * 4.0
-    zero = cr.fit_output_error(rigs.step_record(rigs.R3 * ct.tf([1 / w, 1], [1]), noise=0.001)).fit
-    assert zero.structure == (3, 2)
-    assert "onset_open" in codes(zero)
-    assert zero.delay_interval[0] <= 37 <= zero.delay_interval[1]
-    assert zero.delay_interval[1] - zero.delay_interval[0] < 25  # onset: five samples after it
-    assert "onset_open" not in codes(quiet_valve.fit)
-
-
 DELAY = 37.0
 
 

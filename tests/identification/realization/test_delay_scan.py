@@ -27,17 +27,6 @@ def test_truncated_scan_is_the_dense_scan(kind, seed, noise):
     assert_allclose(scan.singular_values[delays], values, rtol=0, atol=1e-10 * values[:, :1].max())
 
 
-def test_returned_model_is_the_realization_at_the_best_delay():
-    pulse = valve_pulse("zero-phase")
-    sys = cr.estimate_delay(pulse, 3, max_delay=100, samples=1000, dt=TS)
-    again = cr.realize(pulse, 3, delay=sys.fit.delay, samples=1000, dt=TS)
-    assert sys.delay == sys.fit.delay
-    assert np.array_equal(sys.delay_free.A, again.delay_free.A)
-    assert np.array_equal(sys.delay_free.C, again.delay_free.C)
-    assert sys.fit.realization.iae == again.fit.iae
-    assert_allclose(sys.delay_free.A, sys.fit.candidates[sys.delay].delay_free.A, atol=1e-7)
-
-
 @settings(max_examples=15)
 @given(delay=st.integers(0, 40), seed=st.integers(0, 1000), order=st.integers(1, 4))
 def test_a_delay_of_d_samples_is_found_as_d(delay, seed, order):

@@ -57,17 +57,6 @@ def test_random_input_and_frequency_response_are_seen_in_five_ways_that_agree(bo
     assert "yes, on" in both.report()
 
 
-def test_frequency_response_of_another_plant_does_not_agree(both):
-    other = cr.validation.compare_delay_estimates(frf=frequency_response(dead_time=0.4))
-    views = (*both.estimates[:3], *other.estimates)
-    common, conflicts = common_dead_time(list(views))
-    assert common is None
-    assert ("output error", "FRF fit") in conflicts
-    check = replace(both, estimates=views, agree=False, common=None, conflicts=conflicts)
-    assert "no: " in check.report()
-    assert "do not agree" in repr(check)
-
-
 def test_a_view_in_doubt_is_shown_and_does_not_count():
     views = [view("a", 1.0, 3.0), view("b", 0.5, 4.0), view("c", 0.0, 2.5, "upper bound")]
     doubted = [*views, replace(view("d", 8.0, 9.0), doubt="says so itself")]
@@ -125,14 +114,14 @@ def bound(method, high):
 A, B = view("a", 1.0, 3.0), view("b", 2.5, 3.5)
 
 
-def check(views, common=(2.5, 3.0), conflicts=(), dt=0.5, flags=()):
-    return DelayComparison(tuple(views), common is not None, common, tuple(conflicts), dt, flags)
-
-
 def test_only_pairs_that_rule_each_other_out_are_in_conflict():
     late = view("late", 4.0, 5.0)
-    common, pairs = common_dead_time([A, B, late, bound("p", 2.0), bound("q", 4.5)])
+    views = [A, B, late, bound("p", 2.0), bound("q", 4.5)]
+    common, pairs = common_dead_time(views)
     assert common is None
+    told = DelayComparison(tuple(views), False, None, pairs, 0.5)
+    assert "no: " in told.report()
+    assert "do not agree" in repr(told)
     assert pairs == (("a", "late"), ("b", "late"), ("b", "p"), ("late", "p"))
     # those that touch do not
     touching = [A, view("b", 3.0, 3.5), view("c", 3.5, 4.0)]
