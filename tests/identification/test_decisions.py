@@ -38,30 +38,21 @@ def random_levels(seed, n=600, held=5):
 # --- one step record: deviation, interval, structure
 
 
-@pytest.fixture(scope="module")
-def forty():
-    return [cr.fit_output_error(lag_record(seed), **ONE).fit for seed in range(40)]
-
-
-def test_the_standard_deviation_is_the_scatter_over_forty_records(forty):
-    scatter = np.std([fit.dead_time for fit in forty], ddof=1)
+def test_intervals_and_deviations_are_those_of_forty_records():
+    forty = [cr.fit_output_error(lag_record(seed), **ONE).fit for seed in range(40)]
     # forty values tell a deviation to 11 %; a third is three of them
-    assert scatter == pytest.approx(np.mean([fit.std_given_structure for fit in forty]), rel=0.33)
-
-
-def test_errors_of_gain_and_total_delay_are_those_of_the_noise(forty):
-    claimed = np.mean([fit.gain_std_given_structure for fit in forty])
-    assert claimed == pytest.approx(np.std([fit.gain for fit in forty], ddof=1), rel=0.33)
-    intervals = [(fit.gain_interval, fit.total_delay_interval) for fit in forty]
-    for held in zip(
-        *[(g[0] <= 3 <= g[1], t[0] <= 1.73 <= t[1]) for g, t in intervals], strict=True
+    for name, std in (
+        ("dead_time", "std_given_structure"),
+        ("gain", "gain_std_given_structure"),
     ):
-        assert sum(held) >= 34
-
-
-def test_intervals_of_95_percent_hold_the_truth_in_35_of_forty_records_or_more(forty):
-    inside = sum(fit.interval[0] <= 0.73 <= fit.interval[1] for fit in forty)
-    assert inside >= 35  # fewer than that have a chance of 5 in 1000
+        scatter = np.std([getattr(fit, name) for fit in forty], ddof=1)
+        claimed = np.mean([getattr(fit, std) for fit in forty])
+        assert claimed == pytest.approx(scatter, rel=0.33)
+    # fewer than 35 of forty intervals of 95 % hold with a chance of 5 in 1000
+    for name, truth, least in (("interval", 0.73, 35), ("gain_interval", 3.0, 34),
+                               ("total_delay_interval", 1.73, 34)):  # fmt: skip
+        ends = [getattr(fit, name) for fit in forty]
+        assert sum(low <= truth <= high for low, high in ends) >= least
     widths = [np.diff(fit.interval)[0] / fit.std_given_structure for fit in forty]
     assert np.mean(widths) == pytest.approx(2 * 1.96, rel=0.05)
 

@@ -1,14 +1,12 @@
-"""Pulse responses from any input, and the regressions behind them against plain least squares."""
+"""Pulse responses from any input."""
 
 import control as ct
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from scipy.signal import lfilter
 
 import ctrl_realize as cr
 from ctrl_realize.errors import DataError
-from ctrl_realize.identification.impulse.regression import OKID_ORDERS, through_arx, without_prior
 from tests import measured
 from tests.rigs import DT, TWO_STATES
 
@@ -128,83 +126,3 @@ def test_a_response_that_begins_behind_the_first_window_is_found(delay):
     # the largest value is 0.1 behind the delay, its noise 0.05 / sqrt(700)
     assert abs(int(np.argmax(g.markov)) - delay - 1) <= 1
     assert np.abs(g.markov[: delay - 5]).max() < 0.02
-
-
-STEP = 0.1
-
-
-def series(n=80, m=1, p=1, seed=0, follows=1.0, noise=0.3, level=5.0):
-    """Outputs that follow every input at lags 1 and 2, about levels; `noise` is white."""
-    rng = np.random.default_rng(seed)
-    u = rng.standard_normal((m, n))
-    drive = sum((j + 1) * u[j] for j in range(m))
-    one = lfilter([0, 1.0, 0.5], [1], drive)
-    y = np.stack([(a + 1) * follows * one for a in range(p)])
-    y = y + noise * rng.standard_normal(y.shape) + level
-    return cr.Record(STEP * np.arange(n), u, y)
-
-
-def tall(one, first, lags, of_output=0):
-    """Rows from sample `first` on: a one, lags 0... of every input, lags 1... of every output."""
-    u, y = np.atleast_2d(one.input), np.atleast_2d(one.output)
-    k = np.arange(first, one.n_samples)
-    columns = [np.ones(k.size)]
-    columns += [y[a, k - i] for i in range(1, of_output + 1) for a in range(y.shape[0])]
-    columns += [u[j, k - i] for j in range(u.shape[0]) for i in range(lags)]
-    return np.stack(columns, axis=1), y[:, k]
-
-
-def plain(X, y):
-    """Coefficients, their std and noise variance of ordinary least squares."""
-    theta, *_ = np.linalg.lstsq(X, y.T, rcond=None)
-    variance = ((y.T - X @ theta) ** 2).sum(axis=0) / (X.shape[0] - X.shape[1])
-    spread = np.diag(np.linalg.inv(X.T @ X))
-    return theta, np.sqrt(np.outer(spread, variance)), variance
-
-
-@pytest.mark.parametrize(("m", "p"), [(1, 1), (2, 3)])
-def test_without_a_prior_it_is_least_squares_with_a_free_level(m, p):
-    one = series(m=m, p=p)
-    found = without_prior((one,), 4, "unknown")
-    theta, std, variance = plain(*tall(one, 3, 4))
-    # normal equations by FFT beside a decomposition of the tall matrix
-    assert_allclose(found.markov, theta[1:].T.reshape(p, m, 4), rtol=0, atol=1e-12)
-    assert_allclose(found.std, std[1:].T.reshape(p, m, 4), rtol=1e-10)
-    assert_allclose(found.noise_std, np.sqrt(variance), rtol=1e-10)
-    assert (found.rows, found.method, found.flags) == (77, "least squares", ())
-
-
-@pytest.mark.parametrize(("m", "p"), [(1, 1), (2, 2)])
-def test_an_arx_model_is_least_squares_and_its_first_markov_parameters_are_its_own(m, p):
-    one = series(n=150, m=m, p=p, noise=0.3)
-    found = through_arx((one,), 5, "unknown", 3)
-    theta, std, variance = plain(*tall(one, 3, 4, of_output=3))
-    direct = [1 + 3 * p + j * 4 for j in range(m)]  # lag 0 of every input
-    assert_allclose(found.markov[:, :, 0], theta[direct].T, rtol=0, atol=1e-11)
-    assert_allclose(found.std[:, :, 0], std[direct].T, rtol=1e-8)
-    assert_allclose(found.noise_std, np.sqrt(variance), rtol=1e-10)
-    # G_1 = B_1 - A_1 G_0
-    past = theta[1 : 1 + p]
-    second = theta[[at + 1 for at in direct]] + theta[direct] @ past
-    assert_allclose(found.markov[:, :, 1], second.T, rtol=0, atol=1e-11)
-    assert (found.rows, found.method) == (147, "OKID, ARX order 3")
-    assert found.arx.a.shape == (3, p, p)
-
-
-def test_the_order_of_arx_is_that_of_the_least_criterion():
-    rng = np.random.default_rng(0)
-    n, u = 400, np.random.default_rng(1).standard_normal((1, 400))
-    y = lfilter([0, 1.0], [1, -1.2, 0.8, -0.3], u + 0.2 * rng.standard_normal((1, n)))
-    one = cr.Record(STEP * np.arange(n), u, y)
-    tried = [q for q in OKID_ORDERS if q <= 19]
-    top = tried[-1]
-
-    def criterion(order):
-        # all over the rows of the longest
-        X, z = tall(one, top, order + 1, of_output=order)
-        _, _, variance = plain(X, z)
-        return z.size * np.log(variance[0]) + (2 * order + 1) * np.log(z.size)
-
-    best = min(tried, key=criterion)
-    assert best > tried[0]
-    assert through_arx((one,), 20, "unknown", None).method == f"OKID, ARX order {best}"
