@@ -95,22 +95,22 @@ def test_noise_disturbance_and_rounding_are_those_asked_for():
 
 
 @pytest.mark.parametrize(
-    ("attempt", "error", "match"),
+    ("error", "match", "attempt"),
     [
-        (lambda: bench.heater(dead_time=-1), OptionError, "dead_time=-1; expected a value >= 0"),
-        (lambda: bench.tank(rate=0), OptionError, "rate=0; expected a value other than 0"),
-        (lambda: bench.flow_loop(resolution=0), OptionError, "resolution=0"),
-        (lambda: bench.heater(noise=-1), OptionError, "noise=-1"),
-        (lambda: bench.heater().step_record(90), OptionError, "from 20 to a value within 0-100 %"),
-        (lambda: bench.heater().step_record(0), OptionError, "a step other than 0"),
+        (OptionError, "dead_time=-1; expected a value >= 0", lambda: bench.heater(dead_time=-1)),
+        (OptionError, "rate=0; expected a value other than 0", lambda: bench.tank(rate=0)),
+        (OptionError, "resolution=0", lambda: bench.flow_loop(resolution=0)),
+        (OptionError, "noise=-1", lambda: bench.heater(noise=-1)),
+        (OptionError, "from 20 to a value within 0-100 %", lambda: bench.heater().step_record(90)),
+        (OptionError, "a step other than 0", lambda: bench.heater().step_record(0)),
         (
-            lambda: bench.tank().record([50, 101, 50]),
             DataError,
             "101 % at sample 1; expected 0-100",
+            lambda: bench.tank().record([50, 101, 50]),
         ),
-        (lambda: bench.tank().record(np.ones((2, 4))), DataError, "expected N >= 3 real numbers"),
+        (DataError, "expected N >= 3 real numbers", lambda: bench.tank().record(np.ones((2, 4)))),
     ],
 )
-def test_unusable_choices_are_refused(attempt, error, match):
+def test_unusable_choices_are_refused(error, match, attempt):
     with pytest.raises(error, match=match):
         attempt()

@@ -97,18 +97,3 @@ def test_any_record_has_a_step_or_is_refused(rng):
             step_functions(record)
     np.testing.assert_array_equal(u, before[0])
     np.testing.assert_array_equal(y, before[1])
-
-
-@fuzz(100)
-def test_a_clean_step_is_found_where_it_is(rng):
-    n = rng.randint(30, 120)
-    onset, size = rng.randint(5, n - 10), rng.choice([1.0, -16.0, 1e-12, 1e60, 3e-40])
-    rest = rng.choice([0.0, 4.0, -1.5]) * abs(size)
-    u = np.where(np.arange(n) < onset, rest, rest + size)
-    noise = rng.choice([0.0, 1e-3]) * abs(size)
-    y = np.cumsum(u - rest) * 0.01 + noise * generator(rng).standard_normal(n)
-    with good_end() as edges:
-        edges.append(cr.detect_step(cr.Record(np.arange(n) * 0.1, u, y)))
-    (edge,) = edges
-    assert edge.index == onset
-    np.testing.assert_allclose(edge.amplitude, size, rtol=1e-9)

@@ -298,30 +298,25 @@ def test_noise_spikes_and_drives_in_milliamperes_leave_the_parts_as_they_are():
     assert "travel range" in report.choices[0]
 
 
+PLANNED = {"dead_time": 1, "time_constant": 1}
+
+
 @pytest.mark.parametrize(
-    ("call", "error", "match"),
+    ("error", "match", "call"),
     [
-        (lambda r: valves.valve_report([]), DataError, "at least one"),
-        (lambda r: valves.valve_report(r, limits={"t87": 1}), OptionError, "'t87'"),
-        (lambda r: valves.valve_report(r, limits={"t86": "1"}), OptionError, "largest"),
-        (lambda r: valves.valve_report(r, limits={"linearity": {2: 1}}), OptionError, "by step"),
-        (lambda r: valves.valve_report(r, command_range=(1, 1)), OptionError, "positive"),
-        (lambda r: valves.valve_report(r, **QUICK).metric("x"), OptionError, "expected one of"),
-        (lambda r: valves.valve_test_plan(), OptionError, "dead_time=None"),
-        (lambda r: valves.valve_test_plan(r[0:2]), NoStepError, "no step"),
-        (
-            lambda r: valves.valve_test_plan(dead_time=1, time_constant=1, sizes=(60,)),
-            OptionError,
-            "leave the range",
-        ),
-        (
-            lambda r: valves.valve_test_plan(dead_time=1, time_constant=1).record([1.0, 2.0]),
-            DataError,
-            "position has shape",
-        ),
+        (DataError, "at least one", lambda r: valves.valve_report([])),
+        (DataError, "position has", lambda r: valves.valve_test_plan(**PLANNED).record([1.0, 2])),
+        (OptionError, "'t87'", lambda r: valves.valve_report(r, limits={"t87": 1})),
+        (OptionError, "largest", lambda r: valves.valve_report(r, limits={"t86": "1"})),
+        (OptionError, "by step", lambda r: valves.valve_report(r, limits={"linearity": {2: 1}})),
+        (OptionError, "positive", lambda r: valves.valve_report(r, command_range=(1, 1))),
+        (OptionError, "expected one of", lambda r: valves.valve_report(r, **QUICK).metric("x")),
+        (OptionError, "dead_time=None", lambda r: valves.valve_test_plan()),
+        (OptionError, "the range", lambda r: valves.valve_test_plan(**PLANNED, sizes=(60,))),
+        (NoStepError, "no step", lambda r: valves.valve_test_plan(r[0:2])),
     ],
 )
-def test_unusable_choices_are_refused(call, error, match):
+def test_unusable_choices_are_refused(error, match, call):
     command = command_of([50, 55], 4.0)
     with pytest.raises(error, match=match):
         call(record_of(command, command, 0.0, 0))

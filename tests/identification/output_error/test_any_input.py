@@ -208,21 +208,6 @@ def test_steps_and_random_inputs_go_together():
     assert fit.repeatability.amplitudes.tolist() == [2.0, 2.0]
 
 
-def test_the_interval_of_a_structure_does_not_depend_on_which_is_chosen():
-    # A zero takes the place of dead time to first order: the profile is far from a parabola.
-    rng = np.random.default_rng(1000)
-    u = np.repeat(rng.choice([-1.0, 1.0], 60), 10)
-    plant = lag(2.2) * lag(11.0)
-    y = cr.delayed_ss(plant, dead_time=0.0289, dt=0.005).simulate(u)
-    record = cr.Record(0.005 * np.arange(600), u, y + 0.01 * rng.standard_normal(600))
-    beside = cr.fit_output_error(record, structures=[(2, 2), (2, 1)]).fit
-    assert beside.structure == (2, 2)
-    zero = next(line for line in beside.structures if line.relative_degree == 1)
-    alone = cr.fit_output_error(record, structures=[(2, 1)]).fit.structures[0]
-    # the noise is that of the chosen structure, which differs by a percent
-    assert_allclose(np.diff(zero.interval), np.diff(alone.interval), rtol=0.05)
-
-
 def test_a_small_move_before_the_first_step_is_not_taken_for_its_response():
     # a twelfth of the step, too small for an edge; the output moves 20 samples before it
     t, rng = np.arange(600.0), np.random.default_rng(1)

@@ -1,13 +1,11 @@
 """From a measured step to an impulse response."""
 
 import numpy as np
-import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
 import ctrl_realize as cr
-from ctrl_realize.errors import DataError, OptionError
 from ctrl_realize.numerics.signals.filters import low_pass
 from tests.rigs import R3, TS, exact_step, step_record
 
@@ -123,18 +121,6 @@ def test_noise_is_the_rest_treated_as_the_response():
     smooth = cr.impulse_from_step(one, cutoff_hz=10.0, filter_order=3, zero_phase=False)
     expected = low_pass(differences, 3, 10.0, DT, zero_phase=False)
     assert_allclose(smooth.noise, expected, rtol=0, atol=1e-15)
-
-
-def test_what_is_no_step_response_is_named():
-    with pytest.raises(DataError, match="step is a list; expected a StepResponse, see unit_step"):
-        cr.impulse_from_step([1.0, 2.0])
-    for order in (1, 10):
-        assert (
-            cr.impulse_from_step(step(), cutoff_hz=10.0, filter_order=order).filter.order == order
-        )
-    for order in (0, 11):
-        with pytest.raises(OptionError, match="filter_order"):
-            cr.impulse_from_step(step(), cutoff_hz=10.0, filter_order=order)
 
 
 def test_measured_records_have_one_step_where_it_is(shared_data):
