@@ -32,7 +32,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..arrays import FloatArray
+from ..arrays import BoolArray, FloatArray, IntArray
+
+_IN_CACHE = 30_000
+"""Positions that are worked on at once."""
 
 
 def backlash(position: FloatArray, width: float, start: float = 0.0) -> FloatArray:
@@ -134,33 +137,61 @@ def kano_rows(
 
     `stops` tells at which samples, of which the first is one, the stem is known to have stopped
     after a move up (1) or down (-1): a stem whose last move was another one is put there.
+
+    A stem at rest moves once the command is more than (S + J) / 2 away from it, and then follows
+    until the command turns or pauses: only the ends of its runs decide, and few of them.
     """
-    half = (stick - jump) / 2
-    last, slope = float(position[0]), 0.0
-    side, rest = np.ones(stick.shape), np.full(stick.shape, last)
-    stem, moving = last - half, np.zeros(stick.shape, dtype=bool)
-    out = np.empty((position.size, stick.size))
-    # `kano_step` for all pairs at once: a command turns, or pauses, for all of them alike
-    for k, command in enumerate(position.tolist()):
-        change = command - last
+    half, reach = (stick - jump) / 2, (stick + jump) / 2
+    first, rising, turning = _runs(position, stops)
+    lengths = np.diff(first, append=position.size)
+    ends = position[first + lengths - 1]
+    stem, up = position[0] - stops[0] * half, np.full(stick.shape, stops[0] > 0)
+    stems, last = [stem], []  # at rest, and which of these is at the beginning of every run
+    highest, lowest = float((stem + reach).min()), float((stem - reach).max())
+    for k, end, rises, turns in zip(
+        first.tolist(), ends.tolist(), rising.tolist(), turning.tolist(), strict=True
+    ):
         if k in stops:
-            missed = (side != stops[k]) | (k == 0)
-            side[missed], rest[missed], moving[missed] = stops[k], command, False
-            stem = np.where(missed, command - side * half, stem)
-        if change * slope <= 0:
-            rest[moving] = last
-            moving[:] = False
-        away = side * (command - rest)
-        turns = away < -stick
-        turns &= ~moving
-        if turns.any():
-            side[turns] *= -1
-        moving |= turns
-        moving |= away > jump
-        np.copyto(stem, command - side * half, where=moving)
-        last, slope = command, change
-        out[k] = stem
+            missed = up != (stops[k] > 0)
+            up[missed] = stops[k] > 0
+            stem = np.where(missed, position[k] - stops[k] * half, stem)
+            stems.append(stem)
+            highest, lowest = float((stem + reach).min()), float((stem - reach).max())
+        last.append(len(stems) - 1)
+        if lowest <= end <= highest:
+            continue
+        moved = end - stem > reach if rises else stem - end > reach
+        up[moved] = rises
+        if turns:
+            stem = np.where(moved, end - half if rises else end + half, stem)
+            stems.append(stem)
+            highest, lowest = float((stem + reach).min()), float((stem - reach).max())
+    out, rests = np.empty((position.size, stick.size)), np.stack(stems)
+    rest = np.repeat(last, lengths)
+    few = max(_IN_CACHE // stick.size, 1)
+    for k in range(0, position.size, few):
+        followed, command = rests[rest[k : k + few]], position[k : k + few, None]
+        away = command - followed
+        np.copyto(followed, command - np.copysign(half, away), where=np.abs(away) > reach)
+        out[k : k + few] = followed
     return out.T
+
+
+def _runs(
+    position: FloatArray, stops: Mapping[int, float]
+) -> tuple[IntArray, BoolArray, BoolArray]:
+    """Runs of a command in one direction, with the pauses after them, cut at `stops`.
+
+    First samples, whether the command rises, and whether it turns, or has paused, at the end.
+    """
+    change = np.diff(position, prepend=position[0])
+    begins = change != 0
+    begins[1:] &= np.sign(change[1:]) != np.sign(change[:-1])
+    turns = np.flatnonzero(begins)
+    first = np.unique(np.concatenate([turns, list(stops)])).astype(np.int64)
+    run = np.searchsorted(turns, first, side="right") - 1
+    rising = np.append(change[turns] > 0, False)[run]
+    return first, rising, np.diff(run, append=turns.size) > 0
 
 
 def choudhury_step(

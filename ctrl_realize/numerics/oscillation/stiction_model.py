@@ -20,7 +20,7 @@ import numpy as np
 from scipy.signal import lfilter
 
 from ..actuators.friction import kano_rows
-from ..arrays import FloatArray
+from ..arrays import FloatArray, IntArray
 from .cycles import crossings, smoothed, without_drift
 
 _LONGEST_DELAY = 0.6
@@ -29,8 +29,8 @@ _HALF_CYCLES = 3
 """At whose extremes of the output the stem is tried at rest."""
 _SMOOTHED = 0.25
 """Part of a period over which the output is averaged before its half cycles are told apart."""
-_AT_ONCE = 3_000_000
-"""Samples that are simulated at once: some tens of megabytes."""
+_AT_ONCE = 1_500_000
+"""Samples that are simulated at once: some megabytes."""
 
 
 class Trial(NamedTuple):
@@ -68,6 +68,7 @@ class StickingLoop:
         self.once = range(len(cycles), len(self.starts))
         self.longest = max(int(_LONGEST_DELAY * self.period), 1)
         self._first = self.longest + -(-_HALF_CYCLES * half // every)
+        self._half = round(self.period) // 2
         self.value = without_drift(self._thinned(value[None]), self.period)[0, self._first :]
         self.power = float(self.value @ self.value)
 
@@ -103,7 +104,7 @@ class StickingLoop:
             if trial.stick == 0
             else self._positions(np.array([trial.stick]), np.array([trial.jump]), trial.start)
         )
-        late = self._lagged(position, trial.lag)[0]
+        late = self._lagged(self._level(position), trial.lag)[0]
         first = self._first - trial.delay
         return np.asarray(self.value - trial.gain * late[first : first + self.value.size])
 
@@ -116,15 +117,12 @@ class StickingLoop:
         delays: Sequence[int],
         start: int = 0,
     ) -> list[Trial]:
-        rows, n = np.arange(sticks.size), self.value.size
+        rows = np.arange(sticks.size)
         error, gain = np.ones(rows.size), np.zeros(rows.size)
         lag, delay = np.full(rows.size, lags[0]), np.full(rows.size, delays[0])
+        level = self._level(positions)
         for each in lags:
-            late = self._lagged(positions, each)
-            squares = np.cumsum(np.pad(late * late, ((0, 0), (1, 0))), axis=1)
-            first = self._first - np.asarray(delays)
-            power = squares[:, first + n] - squares[:, first]
-            product = np.stack([late[:, k : k + n] @ self.value for k in first], axis=1)
+            power, product = self._sums(self._lagged(level, each), self._first - np.array(delays))
             good = (power > 1e-12 * self.power) & (self.sign * product > 0)
             factor = np.where(good, product / np.where(good, power, 1.0), 0.0)
             left = 1 - factor * product / self.power
@@ -141,25 +139,53 @@ class StickingLoop:
         ]
 
     def _positions(self, sticks: FloatArray, jumps: FloatArray, start: int) -> FloatArray:
-        first = min(self.starts[start])
-        stops = {place - first: side for place, side in self.starts[start].items()}
-        moved = kano_rows(self.output[first:], sticks, jumps, stops)
-        return self._thinned(np.pad(moved, ((0, 0), (first, 0)), mode="edge"))
+        stops = self.starts[start]
+        first, ahead = min(stops), min(stops) // self.every
+        begin = ahead * self.every
+        command = np.append(np.full(first - begin, self.output[first]), self.output[first:])
+        moved = kano_rows(
+            command, sticks, jumps, {0: stops[first]} | {k - begin: stops[k] for k in stops}
+        )
+        return np.pad(self._thinned(moved), ((0, 0), (ahead, 0)), mode="edge")
 
     def _thinned(self, rows: FloatArray) -> FloatArray:
         count = rows.shape[1] // self.every
-        cut = rows[:, : count * self.every]
-        return np.asarray(cut.reshape(-1, count, self.every).mean(axis=2))
+        total = rows[:, : count * self.every : self.every].copy()
+        for k in range(1, self.every):
+            total += rows[:, k : count * self.every : self.every]
+        return np.ascontiguousarray(total / self.every)
 
-    def _lagged(self, positions: FloatArray, lag: float) -> FloatArray:
-        """Response of the lag, or of an integrator, without drift."""
-        late = positions - positions[:, :1]
+    def _level(self, positions: FloatArray) -> FloatArray:
+        """Positions without drift, from half a period before the first, at rest until then."""
+        begin = ((0, 0), (2 * self._half, 0))
+        return without_drift(np.pad(positions - positions[:, :1], begin), self.period)
+
+    def _lagged(self, level: FloatArray, lag: float) -> FloatArray:
+        """Response of the lag, or of an integrator, without drift.
+
+        Both are linear, so that the drift of all lags can be removed at once before them.
+        """
+        late = level
         if np.isinf(lag):
-            late = np.cumsum(positions - positions.mean(axis=1, keepdims=True), axis=1)
+            late = np.cumsum(level, axis=1)
         elif lag > 0:
             decay = np.exp(-1 / lag)
-            late = lfilter([1 - decay], [1, -decay], late, axis=1)
-        return without_drift(late, self.period)
+            late = lfilter([1 - decay], [1, -decay], level, axis=1)
+        return np.asarray(late[:, 2 * self._half :])
+
+    def _sums(self, late: FloatArray, first: IntArray) -> tuple[FloatArray, FloatArray]:
+        """Power of rows (M, ...) from each of `first` on, and products with the value (M, D)."""
+        low, n = int(first.min()), self.value.size
+        high = int(first.max())
+        shifted = np.zeros((high - low + n, first.size))
+        for k, place in enumerate((first - low).tolist()):
+            shifted[place : place + n, k] = self.value
+        part = late[:, low : low + n]
+        change = late[:, low + n : high + n] ** 2 - late[:, low:high] ** 2
+        power = np.einsum("ij,ij->i", part, part)[:, None] + np.cumsum(
+            np.pad(change, ((0, 0), (1, 0))), axis=1
+        )
+        return power[:, first - low], late[:, low : high + n] @ shifted
 
 
 def _stops_of_cycles(output: FloatArray, period: float) -> tuple[dict[int, float], ...]:
