@@ -248,13 +248,15 @@ def _inverse(fit: OutputErrorEstimate) -> Flag | None:
         # Right half-plane zeros delay the onset, as dispersion does.
         return None
     zeros = np.roots(fit.numerator[::-1])
-    right = zeros[zeros.real > 0]
-    if not right.size or np.abs(right).min() > 3 * np.abs(fit.poles).max():
+    right = np.sort(zeros[(zeros.imag == 0) & (zeros.real > 0)].real)
+    right = right[right <= 3 * np.abs(fit.poles).max()]
+    # A response begins in the wrong direction if the number of its real zeros there is odd.
+    if right.size % 2 == 0:
         return None
     return Flag(
         "inverse_response",
         "inverse response: the model first moves in the wrong direction (right half-plane "
-        f"zero at {right[np.argmin(abs(right))]:.3g} rad/s); the dead time ends where that "
+        f"zero at {right[0]:.3g} rad/s); the dead time ends where that "
         "initial motion begins",
     )
 

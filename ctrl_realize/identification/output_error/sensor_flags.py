@@ -6,6 +6,7 @@ import numpy as np
 
 from ..._wording import in_time
 from ...numerics.arrays import FloatArray
+from ...numerics.signals.noise import winsorised_sigma
 from ...numerics.validation.held_output import (
     held_share,
     longest_hold,
@@ -24,6 +25,9 @@ _WILD = 5.0  # standard deviations: Gaussian noise has none of a million samples
 _MANY = 0.002  # of the samples beyond, from which on they are named
 _GAP = 3.0  # usual distances of samples that a gap has at least
 _OF_THE_ONSET = 0.2  # part of the time to the first sample of the response that it takes at least
+_STAYS = 0.5  # part of a lead that the next sample keeps; what a switch radiates is gone by then
+_REST = 8  # samples that noise before a lead is taken from at least
+_LEAD = 5  # samples next to the step that are looked at, and do not count as rest
 
 
 def sensor_flags(fit: OutputErrorFit, output: FloatArray, fitted: FloatArray) -> list[Flag]:
@@ -32,7 +36,7 @@ def sensor_flags(fit: OutputErrorFit, output: FloatArray, fitted: FloatArray) ->
     if not flags:
         flags += _stuck(fit, output, fitted)
     if np.isfinite(fit.onset):
-        return flags + _onset_in_gap(fit)
+        return flags + _onset_in_gap(fit) + _lead(fit, output, fitted)
     return flags + outliers(output, fitted, fit.residual if fit.at_noise_level else None)
 
 
@@ -138,5 +142,38 @@ def _onset_in_gap(fit: OutputErrorFit) -> list[Flag]:
             "onset_in_gap",
             f"there are no samples between {ends} after the step, where the response begins: the "
             "record does not tell the dead time any closer",
+        )
+    ]
+
+
+def _lead(fit: OutputErrorFit, output: FloatArray, fitted: FloatArray) -> list[Flag]:
+    """Report an output that moves no later than in the sample in which its input steps.
+
+    An input that is held from that sample on acts on the next one at the earliest.
+    """
+    data = fit.data
+    if data.motion is None:
+        return []
+    step = data.edges[0][0]
+    k = data.before(step)
+    if k < _REST + _LEAD or k + 1 >= output.size or data.rows[k] != step:
+        return []
+    moved = (output - fitted) * data.motion.sign
+    moved = moved[: k + 2] - np.median(moved[: k - _LEAD + 1])
+    rest = moved[: k - _LEAD + 1]
+    # A rest may be padded, or quieter than what follows.
+    least = _WILD * max(winsorised_sigma(rest, data.quantum), data.sigma, fit.residual)
+    goes_on = (output[k + 1] - fitted[k]) * data.motion.sign
+    if moved[k] <= least or goes_on < _STAYS * moved[k]:
+        return []
+    samples = next((n for n in range(1, _LEAD) if moved[k - n] <= least), _LEAD)
+    return [
+        Flag(
+            "noncausal",
+            f"the output has moved by {100 * moved[k] / data.motion.span:.2g} % of the response in "
+            "the sample in which the input steps, which an input that is held from there on "
+            f"cannot do: it leads the input by {samples} sample(s) or more. Mostly the "
+            "input is stored after the output; advance it by so many samples, or remove a filter "
+            "that uses later samples: dead time and fast lags are not those of the plant",
         )
     ]

@@ -95,3 +95,22 @@ def test_a_resonance_is_seen_through_slow_noise_and_a_coarse_encoder():
     assert np.std(error) < 0.04 * np.std(clean)
     assert abs(system.fit.delay - 2.5) < 0.5
     assert system.fit.delay_interval[0] <= 2.5 <= system.fit.delay_interval[1]
+
+
+def late(samples: float, *, radiated: float = 0.0) -> cr.Record:
+    """A lag of 8 samples whose input is stored some samples late; a switch may radiate."""
+    k = np.arange(-60, 140)
+    y = -np.expm1(-np.maximum(k + samples, 0) / 8)
+    y[k == 0] += radiated
+    noise = 0.01 * np.random.default_rng(0).standard_normal(k.size)
+    return cr.Record(0.02 * k, (k >= 0).astype(float), y + noise)
+
+
+def test_an_output_that_moves_with_the_sample_of_its_input_is_reported():
+    for samples in (1, 2):
+        fit = cr.fit_output_error(late(samples)).fit
+        said = next(str(flag) for flag in fit.flags if flag.code == "noncausal")
+        assert f"leads the input by {samples} sample" in said
+    assert "noncausal" not in codes(cr.fit_output_error(late(0)))
+    # What is gone in the next sample is no response.
+    assert "noncausal" not in codes(cr.fit_output_error(late(-5, radiated=0.4)))

@@ -135,6 +135,15 @@ def test_an_inverse_response_is_found_with_its_zero():
     assert fit.zeros[0].real == pytest.approx(w, rel=0.1)
 
 
+def test_a_pair_of_zeros_on_the_right_does_not_begin_the_wrong_way():
+    # s^2 leads the numerator, so that the response begins upwards, as it ends.
+    plant = rigs.R3 * ct.tf([1, -10, 400], [400])
+    fit = cr.fit_output_error(rigs.step_record(plant, noise=0.001), structures=[(3, 1)]).fit
+    assert np.all(fit.zeros.real > 0)
+    assert covers(fit, 37)
+    assert "inverse_response" not in codes(fit)
+
+
 def test_an_integrating_plant_gets_an_exact_integrator():
     # 1/s times R2: the ramp lags by the lags of R2, 1/w1 + 1/w2.
     record = rigs.step_record(rigs.R2, noise=0.0, before=1000, after=1500)
