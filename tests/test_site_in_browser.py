@@ -55,39 +55,49 @@ def site(tmp_path_factory) -> Path:
     return folder
 
 
-@pytest.mark.browser
-@pytest.mark.skipif(browser.missing() is not None, reason=str(browser.missing()))
+@pytest.fixture(scope="module")
+def window(tmp_path_factory):
+    with browser.Browser(tmp_path_factory.mktemp("profile"), 1280, 900) as opened:
+        yield opened
+
+
+pytestmark = [
+    pytest.mark.browser,
+    pytest.mark.skipif(browser.missing() is not None, reason=str(browser.missing())),
+]
+
+
 @pytest.mark.parametrize(("width", "height", "dark"), [(1280, 900, False), (390, 844, True)])
-def test_pages_fit_the_window_and_complain_of_nothing(tmp_path, site, width, height, dark):
-    with browser.Browser(tmp_path, width, height, dark=dark) as window:
-        for page in PAGES:
-            window.open(site / f"{page}.html")
-            seen = window.run(MEASURE)
-            assert window.complaints() == [], page
-            assert seen["title"], page
-            assert seen["scroll"] <= width, page
-            assert seen["missing"] == [], page
-            assert (seen["background"] == WHITE) is not dark, page
+def test_pages_fit_the_window_and_complain_of_nothing(window, site, width, height, dark):
+    window.show(width, height, dark=dark)
+    for page in PAGES:
+        window.open(site / f"{page}.html")
+        seen = window.run(MEASURE)
+        assert window.complaints() == [], page
+        assert seen["title"], page
+        assert seen["scroll"] <= width, page
+        assert seen["missing"] == [], page
+        assert (seen["background"] == WHITE) is not dark, page
 
 
-@pytest.mark.browser
-@pytest.mark.skipif(browser.missing() is not None, reason=str(browser.missing()))
-def test_the_slider_of_the_front_page_shows_the_best_model_of_the_assumed_dead_time(tmp_path):
+def test_the_slider_of_the_front_page_shows_the_best_model_of_the_assumed_dead_time(
+    window, tmp_path
+):
     picture = runpy.run_path(str(DOCS / "_ext" / "front_picture.py"))
     drawn = picture["html"](picture["candidates"](np.arange(0.0, 41.0, 10.0)))
     script = (DOCS / "_static" / "front.js").read_text(encoding="utf-8")
     page = tmp_path / "front.html"
     page.write_text(f"<meta charset='utf-8'><script>{script}</script>{drawn}", encoding="utf-8")
-    with browser.Browser(tmp_path, 1280, 900) as window:
-        window.open(page)
-        assert not window.run(SLIDER)["outside"]  # it begins at the estimate
-        window.click(".front-picture input")
-        for key, at in (("Home", 0), ("End", 4), ("ArrowLeft", 3)):
-            window.press(key)
-            seen = window.run(SLIDER)
-            assert seen["at"] == seen["curve"] == at
-            low, high = seen["interval"]
-            assert seen["outside"] is not (low <= 10 * at <= high)
-            assert f"With {10 * at} s" in seen["said"]
-            assert ("rule it out" in seen["said"]) is seen["outside"]
-        assert window.complaints() == []
+    window.show(1280, 900)
+    window.open(page)
+    assert not window.run(SLIDER)["outside"]  # it begins at the estimate
+    window.click(".front-picture input")
+    for key, at in (("Home", 0), ("End", 4), ("ArrowLeft", 3)):
+        window.press(key)
+        seen = window.run(SLIDER)
+        assert seen["at"] == seen["curve"] == at
+        low, high = seen["interval"]
+        assert seen["outside"] is not (low <= 10 * at <= high)
+        assert f"With {10 * at} s" in seen["said"]
+        assert ("rule it out" in seen["said"]) is seen["outside"]
+    assert window.complaints() == []

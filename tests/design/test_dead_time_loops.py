@@ -34,26 +34,6 @@ def test_a_smith_predictor_s_loop_is_the_delay_free_loop_later():
     assert (predictor.name, predictor.input_labels) == ("smith", ["e"])
 
 
-@pytest.mark.parametrize("length", [10, 100])
-def test_controllers_of_every_design_close_loops_with_the_delay_inside(length):
-    plant = cr.delayed_ss(ct.tf([1], [0.08, 1]), dead_time=length * 0.002, dt=0.002)
-    z = np.exp(1j * np.geomspace(0.1, 1000, 20) * 0.002)
-    pid = design.pid(plant)
-    lqg = design.lqg(plant, 1.0, 0.1, 1.0, 0.01)
-    for controller in (pid, lqg):
-        loop = ct.feedback(plant, controller)
-        assert isinstance(loop, cr.DelaySystem)
-        assert loop.is_stable()
-        expected = plant(z) / (1 + plant(z) * controller(z))
-        assert_allclose(loop(z), expected, rtol=1e-7, atol=1e-10 * np.abs(expected).max())
-        opposite = ct.feedback(controller, plant)
-        assert_allclose(
-            opposite(z), controller(z) / (1 + plant(z) * controller(z)), rtol=1e-6, atol=1e-9
-        )
-    difference = pid - plant
-    assert_allclose(difference(z), pid(z) - plant(z), rtol=1e-9)
-
-
 @pytest.mark.parametrize(
     ("plant", "controller", "points"),
     [

@@ -168,11 +168,6 @@ def test_a_controller_remembers_what_its_loop_does():
     assert "stable on the design model" in repr(made.check)
 
 
-def test_a_smith_predictor_of_a_loop_that_is_unstable_is_refused():
-    with pytest.raises(UnsuitableSystemError, match="does not stabilize the model"):
-        cr.design.smith_predictor(quick(), cr.design.PIDController(-3.0, 0.08, dt=0.001))
-
-
 def test_a_process_model_is_checked_in_continuous_time():
     model = cr.design.ProcessModel(gain=1.0, lag=0.08, dead_time=0.029)
     made = cr.design.pid(model)

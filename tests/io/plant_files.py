@@ -7,8 +7,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pandas as pd
-import scipy.io
 
 START = datetime.datetime(2025, 2, 1, 8, 15)
 
@@ -198,41 +196,6 @@ def labview(path):
     path.write_text(head + "\n".join(rows) + "\n")
 
 
-def heated_rod(seed):
-    t = 2.0 * np.arange(350)
-    u = steps(t, [(0, 2.0), (100, 3.5)])
-    rng = np.random.default_rng(seed)
-    return t, u, 20 + response(t, u, 4.0, 23, (90,)) + 0.02 * rng.standard_normal(t.size)
-
-
-def matlab_struct(path):
-    t, u, y = heated_rod(10)
-    scipy.io.savemat(path, {"run": {"time": t, "u": u, "y": y, "note": "heater 3"}})
-
-
-def day_numbers(path):
-    t, u, y = heated_rod(11)
-    rows = [f"{45689.34375 + a / 86400:.9f};{b:.1f};{c:.3f}".replace(".", ",")
-            for a, b, c in zip(t, u, y, strict=True)]  # fmt: skip
-    path.write_bytes(("Zeit;Eingang;Ausgang\n" + "\n".join(rows) + "\n").encode("utf-16"))
-
-
-def date_and_time(path):
-    """Two columns of time, an input in percent signs, and a pump that is on."""
-    t, u, y = heated_rod(12)
-    halves = (stamps(t, "%m/%d/%Y"), stamps(t, "%I:%M:%S %p"))
-    rows = [f"{a},{b},{20 * c:.0f}%,{d:.3f},ON" for a, b, c, d in zip(*halves, u, y, strict=True)]
-    path.write_text("Date,Time,CO,PV,Pump\n" + "\n".join(rows) + "\n")
-
-
-def excel(path):
-    t, u, y = heated_rod(13)
-    when = [START + datetime.timedelta(seconds=float(s)) for s in t]
-    table = pd.DataFrame({"Date": when, "MV [%]": u, "Istwert [°C]": y, "Remark": ""})
-    table.loc[50, "Remark"] = "step"
-    table.to_excel(path, index=False, startrow=2, sheet_name="Run 1")
-
-
 _HOLD = {"missing": "hold"}
 FILES = [
     PlantFile("german.csv", german_logger, 0.8, 45, 12, {"output": "Ablufttemperatur"}),
@@ -248,8 +211,4 @@ FILES = [
     PlantFile("level.csv", level, 0.02, 7.0, 0.5, {"input": "Pump", "output": "Level"}),
     PlantFile("arduino.csv", arduino, 0.1, 0.314, 0.03, {"resample": True}),
     PlantFile("labview.lvm", labview, 1.2, 0.08, 0.01, {"input": "Command", "output": "Position"}),
-    PlantFile("struct.mat", matlab_struct, 4.0, 23, 1.5),
-    PlantFile("day_numbers.txt", day_numbers, 4.0, 23, 1.5, {"time_unit": "day"}),
-    PlantFile("date_and_time.csv", date_and_time, 0.2, 23, 1.5),
-    PlantFile("workbook.xlsx", excel, 4.0, 23, 1.5),
 ]  # fmt: skip

@@ -72,11 +72,14 @@ CONTENT = {
 }
 
 
-@pytest.mark.parametrize("content", CONTENT.values(), ids=CONTENT.keys())
-@pytest.mark.parametrize("ending", [".csv", ".mat"])
-def test_no_content_leads_to_anything_but_our_errors(tmp_path, content, ending):
+AS_MAT = ("nothing", "junk", "a mat that is none", "HDF5", "words", "two rows", "brackets")
+CASES = [(name, ".csv") for name in CONTENT] + [(name, ".mat") for name in AS_MAT]
+
+
+@pytest.mark.parametrize(("name", "ending"), CASES)
+def test_no_content_leads_to_anything_but_our_errors(tmp_path, name, ending):
     file = tmp_path / f"a{ending}"
-    file.write_bytes(content)
+    file.write_bytes(CONTENT[name])
     for read in READERS:
         with pytest.raises(CtrlRealizeError) as caught:
             read(file)

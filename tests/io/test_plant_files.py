@@ -3,7 +3,6 @@
 import inspect
 import json
 import shlex
-from importlib.util import find_spec
 
 import numpy as np
 import pandas as pd
@@ -18,21 +17,18 @@ from tests.io.plant_files import FILES, historian_signals
 
 AMBIGUOUS = {"german.csv": "output", "four_tests.csv": "input", "level.csv": "input"}
 """Files with several columns that could be a signal."""
-NEEDED = {"workbook.xlsx": "openpyxl"}
 
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
     folder = tmp_path_factory.mktemp("plants")
     for file in FILES:
-        if find_spec(NEEDED.get(file.name, "numpy")):
-            file.write(folder / file.name)
+        file.write(folder / file.name)
     return folder
 
 
 @pytest.mark.parametrize("file", FILES, ids=lambda file: file.name)
 def test_a_file_becomes_a_stable_loop_in_two_calls(folder, file):
-    pytest.importorskip(NEEDED.get(file.name, "numpy"))
     path = folder / file.name
     if (signal := AMBIGUOUS.get(file.name)) is not None:
         options = {} if file.many else {"missing": "keep"}

@@ -61,23 +61,6 @@ def test_it_is_the_end_of_the_likelihood_of_two_modes_that_begin_late(seed):
     assert end > loose - 1
 
 
-def test_behind_two_lags_it_is_kept_while_it_fits_as_well_and_behind_one_if_it_fits_better():
-    ends = []
-    for seed in range(8):
-        data, _ = stepped(0.0, 0.01, seed)
-        whole = fitted(data)
-        ends.append(latest_slip(whole, whole.candidates[TWO_LAGS]))
-    # the demand is 3 % of the step, three deviations of the noise, 6 samples after the dead time
-    assert max(end for end in ends if end is not None) < DEAD + 9
-    k, kept = np.arange(-200, 500, dtype=float), 0
-    for seed in range(8):
-        noise = 0.01 * np.random.default_rng(seed).standard_normal(k.size)
-        y = 1 - np.exp(-np.clip(k - DEAD, 0, None) / SLOW) + noise
-        whole = fitted(step_data(y, (k >= 0).astype(float), 1.0, [(200, 1)]), ONE_LAG)
-        kept += latest_slip(whole, whole.candidates[ONE_LAG]) is not None
-    assert kept <= 1
-
-
 def test_the_interval_of_a_record_holds_the_moment_at_which_a_stem_comes_loose():
     data, loose = stepped(0.06, 0.008, 3)
     fit = fit_step_record(data)

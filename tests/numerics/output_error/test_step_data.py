@@ -13,7 +13,6 @@ from ctrl_realize.numerics.output_error.step_data import (
     stop_at,
     window,
 )
-from ctrl_realize.numerics.regression.normal_equations import normal_equations
 from ctrl_realize.numerics.separable.profile_ends import profile_limits
 from ctrl_realize.numerics.separable.varpro import KnownFactor
 
@@ -157,17 +156,6 @@ def test_the_condensed_misfit_differs_from_that_of_all_samples_by_a_constant():
     assert abs(found.noise / 0.1 - 1) < 0.01
 
 
-def test_coloured_noise_is_made_white_and_leaves_the_response_as_it_is():
-    y, u = record(60_000, noise=0.0)
-    noise = lfilter([1.0], [1.0, -0.95], 0.1 * np.random.default_rng(3).standard_normal(y.size))
-    found = condensed([y + noise], [u], FINE, LAGS, huber=False)
-    assert found.noise_lags >= 1
-    assert abs(found.noise / 0.1 - 1) < 0.02
-    left = found.data - found.drive.factor @ 0.9 ** np.arange(LAGS)
-    # chi-square of as many rows as there are
-    assert abs(np.mean(left**2) / found.noise**2 - 1) < 5 * np.sqrt(2 / left.size)
-
-
 def test_outliers_count_for_little_with_hubers_loss():
     y, u = record(30_000)
     spikes = np.random.default_rng(4).integers(0, y.size, 300)
@@ -178,19 +166,6 @@ def test_outliers_count_for_little_with_hubers_loss():
         size[huber] = found.noise
     assert size[False] > 10 * 0.1
     assert size[True] < 1.2 * 0.1
-
-
-def test_directions_that_are_not_excited_have_no_row():
-    # two lines: four directions
-    k = np.arange(20_000)
-    u = np.sin(0.3 * k) + np.sin(0.8 * k)
-    y = lfilter(0.9 ** np.arange(LAGS), [1.0], u) + 0.1 * np.random.default_rng(0).standard_normal(
-        k.size
-    )
-    found = condensed([y], [u], FINE, LAGS, huber=False)
-    assert found.data.size == 4
-    sums = normal_equations(u[None], y[None], LAGS)
-    assert_allclose(found.drive.factor.T @ found.drive.factor, sums.gram, atol=1e-6 * sums.rows)
 
 
 @pytest.mark.parametrize(("samples", "lags"), [(500, LAGS), (30_000, MOST_LAGS + 1), (3000, 1)])

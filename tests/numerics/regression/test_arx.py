@@ -25,16 +25,6 @@ def test_arx_of_the_hairdryer_has_the_published_coefficients(shared_data):
     assert_allclose(fit.b.ravel(), [0.06662, 0.04448], rtol=0, atol=6e-6)
 
 
-def test_pulse_response_of_an_arx_model_is_b_over_a():
-    rng = np.random.default_rng(0)
-    u = rng.normal(size=200)
-    y = lfilter([0, 0, 0.5, 0.2], [1, -1.2, 0.5], u)
-    fit = solve_arx(arx_equations(u[None], y[None], 2, 2, 2), 2, 2, 2)
-    pulse = lfilter([0, 0, 0.5, 0.2], [1, -1.2, 0.5], np.eye(1, 40)[0])
-    # exact data; the normal equations square a condition number of 10
-    assert_allclose(arx_markov(fit, 40)[0, 0], pulse, rtol=0, atol=1e-11)
-
-
 def test_std_of_the_pulse_response_is_the_scatter_over_many_records():
     a = np.array([[[-0.8, 0.1], [0.2, -0.5]]])
     b = np.array([[0.9, 0.2], [0.3, 0.7]])

@@ -9,14 +9,11 @@ from scipy.stats import invgauss
 
 from ctrl_realize.numerics.output_error.step_data import step_data, step_scales, window
 from ctrl_realize.numerics.separable.batch_search import fit_batch
-from ctrl_realize.numerics.separable.dispersion.fit import fit_flows, flow_profile
 from ctrl_realize.numerics.separable.dispersion.residence import flow_modes
-from ctrl_realize.numerics.separable.lag_chains import LagChain, fit_chains, fit_diffusion
+from ctrl_realize.numerics.separable.lag_chains import fit_diffusion
 from ctrl_realize.numerics.separable.poles import parameters_from_poles
-from ctrl_realize.numerics.separable.profile_ends import profile_limits
-from ctrl_realize.numerics.separable.responses import StepSequence
-from ctrl_realize.numerics.separable.structures import Candidate, Scales, parameter_bounds, search
-from ctrl_realize.numerics.separable.varpro import KnownFactor, Problem, Structure
+from ctrl_realize.numerics.separable.structures import Candidate, parameter_bounds
+from ctrl_realize.numerics.separable.varpro import KnownFactor, Structure
 
 SIGMA = 1e-3
 
@@ -35,22 +32,6 @@ def problem():
     bounds = parameter_bounds(Structure(3, 3), scales)
     parameters, cost = fit_batch(problem, structure, start[None], bounds)
     return problem, Candidate(structure, parameters[0], float(cost[0])), scales
-
-
-def fitted(problem, penalty: float = 7.0) -> list[LagChain]:
-    data, like, scales = problem
-    return fit_chains(data, like, scales, SIGMA**2, penalty)
-
-
-def test_the_chain_of_the_right_length_fits_best_and_has_the_dead_time(problem):
-    chains = fitted(problem)
-    best = min(chains, key=lambda chain: chain.criterion)
-    assert best.candidate.structure == Structure(6, 6)
-    assert abs(best.candidate.dead_time - 20) < 3 * best.error
-    assert best.error < 0.5
-    rates = -best.candidate.poles.real
-    # As far as the dead time is off, the six lags make up for it: 1.5 samples in 72.
-    assert np.mean(1 / rates) == pytest.approx(12.0, rel=0.02)
 
 
 @pytest.mark.parametrize("shift", [0.0, 0.5])
@@ -121,42 +102,3 @@ def test_derivatives_of_a_mode_behind_a_flow_are_limits_of_differences(pole, spr
         slope = (moved(**{f"by_{name}": size}) - moved(**{f"by_{name}": -size})) / (2 * size)
         close = 1e-6 * np.abs(slope).max()  # third derivatives and rounding of the differences
         assert_allclose(getattr(found, f"by_{name}"), slope, rtol=0, atol=close)
-
-
-def flow_problem(
-    *, known: KnownFactor | None = None, lag: float = 0.0, noise: float = 1e-3
-) -> tuple[Problem, Scales, Candidate]:
-    """Two moves through a flow of 80 ms behind 37.3 ms, and what two lags make of the record."""
-    dt = 1e-3
-    time = dt * np.arange(1200.0)
-    flow, size = residence(0.08, 0.6), np.array([1.0, -0.4])
-    fine = np.arange(0.0, 1.6, 1e-4)
-    step = flow.cdf(fine)
-    if lag:
-        kernel = np.exp(-fine / lag) * 1e-4 / lag
-        step = np.convolve(step, kernel)[: fine.size] - 0.5 * (step * kernel[0])
-    y = sum(
-        s * np.interp(time - at - 0.0373, fine, step, left=0.0)
-        for s, at in zip(size, (0.1, 0.6), strict=True)
-    )
-    y = 5 + 2 * y + noise * np.random.default_rng(3).standard_normal(y.size)
-    train = StepSequence(time, np.ones(time.size, dtype=np.int64), dt, np.array([0.1, 0.6]), size)
-    factor = known or KnownFactor()
-    problem = Problem(y, np.ones(y.size), train, np.ones((y.size, 1)), factor)
-    scales = Scales(onset=0.05, rise=0.1, length=1.1, dt=dt, latest=0.08)
-    lags = Structure(2, 2)
-    return problem, scales, search(problem, [lags], scales)[lags]
-
-
-def test_a_flow_is_found_behind_its_dead_time():
-    problem, scales, like = flow_problem()
-    flow = min(fit_flows(problem, like, scales, 1e-6, 7.0, np.inf), key=lambda f: f.criterion)
-    assert flow.lag == 0.0
-    # Means over residence times of 48 ms at a noise of 0.05 %: a tenth of a millisecond.
-    assert_allclose(
-        [flow.dead_time, flow.mean, flow.spread], [0.0373, 0.08, 0.6], rtol=0, atol=1.5e-3
-    )
-    assert flow.peclet == pytest.approx(2 / 0.36, rel=0.02)
-    low, high = profile_limits(*flow_profile(problem, flow, scales, 1e-6))
-    assert low < 0.0373 < high
-    assert high - low < 2e-3

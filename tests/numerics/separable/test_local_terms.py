@@ -6,16 +6,14 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from ctrl_realize.numerics.separable.compared_fits import at_dead_time
 from ctrl_realize.numerics.separable.local_terms import FixedTerms, LocalTerms, Segments
 from ctrl_realize.numerics.separable.poles import poles_from_parameters
-from ctrl_realize.numerics.separable.responses import SampledInput, SeveralInputs, StepSequence
-from ctrl_realize.numerics.separable.structures import Candidate, Scales
+from ctrl_realize.numerics.separable.responses import StepSequence
+from ctrl_realize.numerics.separable.structures import Candidate
 from ctrl_realize.numerics.separable.varpro import (
     KnownFactor,
     Problem,
     Structure,
-    evaluate,
     respond,
 )
 from ctrl_realize.numerics.separable.window import Window
@@ -75,39 +73,8 @@ def test_nothing_else_disappears_and_records_do_not_mix():
     assert_allclose(left[:70], expected, rtol=0, atol=1e-10)
 
 
-@pytest.mark.parametrize(("n", "r"), [(1, 1), (2, 1), (3, 3)])
-def test_at_the_optimum_the_jacobian_is_minus_the_derivative_of_the_residual(n, r):
-    theta = {1: [np.log(0.05)], 2: np.log([0.05, 0.7]), 3: np.log([0.03, 0.2, 0.3])}[n]
-    rng = np.random.default_rng(n)
-    parts = tuple(SampledInput(rng.normal(size=size // 10).repeat(10), 1.0) for size in (90, 130))
-    drive = SeveralInputs(parts, (20, 20))
-    walk = rng.normal(size=180).cumsum()
-    nothing, weight = np.empty((180, 0)), np.linspace(0.5, 2.0, 180)
-    x = np.concatenate([[7.3], theta])[None]
-
-    def problem(data):
-        return Problem(data, weight, drive, nothing, KnownFactor(), STRETCHES)
-
-    structure = Structure(n, r)
-    data = walk - evaluate(problem(walk), structure, x).residual[0] / weight
-    exact = problem(data)
-    state = evaluate(exact, structure, x)
-    assert np.abs(state.residual).max() < 1e-9 * np.abs(data).max()
-    for q in range(n + 1):
-        step = np.zeros_like(x)
-        step[0, q] = 1e-5
-        ahead = evaluate(exact, structure, x + step).residual
-        behind = evaluate(exact, structure, x - step).residual
-        derivative = (behind - ahead)[0] / 2e-5
-        # central differences of step 1e-5: 1e-10 from curvature, 1e-7 from rounding
-        scale = np.abs(derivative).max()
-        assert_allclose(state.jacobian[0, :, q], derivative, rtol=0, atol=5e-6 * scale)
-    assert exact.local_count(n) == 2 * (2 + n)
-
-
 ONE, TWO, ZERO = Structure(1, 1), Structure(2, 2), Structure(2, 1)
 SIZE, EDGE, DT = 120, 20, 0.5
-SCALES = Scales(onset=4.0, rise=5.0, length=50.0, dt=DT, latest=6.0)
 TRUTH = np.array([3.7, np.log(0.2)])  # dead time and rate, in s and 1/s
 
 
@@ -168,22 +135,3 @@ def test_a_free_response_is_predicted_at_every_sample():
     window = replace(means, problem=problem, columns=np.ones((SIZE, 0)), own=own)
     found = window.predict(problem, Candidate(ONE, TRUTH, 0.0))
     assert found == pytest.approx(means.output + free, abs=1e-10)
-
-
-def test_a_model_with_a_given_dead_time_is_the_best_one_with_it():
-    window, _ = windows()
-    kept = Candidate(ONE, TRUTH, 0.0)
-    moved = at_dead_time(window.problem, kept, SCALES, 4.7)
-    assert moved.structure == ONE
-    assert moved.dead_time == 4.7
-    assert TRUTH[0] == 3.7
-    # less dead time, less lag: a second later the response must be faster
-    assert moved.poles[0].real < -0.2
-    left = window.predict(window.problem, moved) - window.output
-    assert moved.cost == pytest.approx(
-        np.sum(window.bins.width * window.bins.average(left) ** 2), rel=1e-9
-    )
-    rates = -moved.poles[0].real * np.array([0.99, 1.0, 1.01])
-    starts = np.stack([np.full(3, 4.7), np.log(rates)], axis=1)
-    slower, best, faster = evaluate(window.problem, ONE, starts).cost
-    assert best < min(slower, faster)

@@ -9,7 +9,6 @@ from scipy.signal import lfilter
 
 from ctrl_realize.numerics.signals.baseline import relaxation, rest_line
 from ctrl_realize.numerics.signals.onset import correlation_onset, first_motion, phase_slope
-from tests import rigs
 
 EDGE = 300
 K = np.arange(1000)
@@ -40,15 +39,6 @@ def test_a_clean_straight_rise_begins_where_it_begins(delay, length, gain, up, o
     assert found.sign == (1 if up else -1)
     assert found.rest == pytest.approx(offset, abs=1e-9 * (gain + abs(offset)))
     assert found.span == pytest.approx(gain, rel=1e-6)
-
-
-def test_a_plant_of_third_order_is_seen_to_move_after_its_delay():
-    time = rigs.TS * np.arange(-400, 1200)
-    output = rigs.exact_step(rigs.R3, time - 60 * rigs.TS)
-    found = first_motion(output, 400, 1e-6, 0.0, 0.0)
-    # it begins like t^3: 0.5 % is reached after 29 samples
-    assert 60 < found.onset < 60 + 29
-    assert found.crossing == np.flatnonzero(output[400:] > 0.005 * found.span)[0]
 
 
 @pytest.mark.parametrize("colour", [0.0, 0.95])
