@@ -8,7 +8,6 @@ import mpmath
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from scipy.optimize import brentq
 from scipy.special import lambertw
 
 import ctrl_realize as cr
@@ -101,17 +100,6 @@ def test_right_most_poles_are_those_of_lamberts_w(k, tau):
         assert np.abs(poles - pole).min() < 1e-10 * (1 + abs(pole))
     # stable as long as k tau < pi / 2
     assert retarded(k, tau).is_stable() == (k * tau < np.pi / 2)
-
-
-def test_a_lag_with_delay_is_stable_up_to_its_critical_gain():
-    # K exp(-s) / (s + 1): w + tan(w) = 0 in (pi/2, pi), K = sqrt(1 + w^2)
-    w = brentq(lambda x: x * np.cos(x) + np.sin(x), np.pi / 2 + 1e-6, np.pi)
-    critical = np.hypot(1, w)
-    P = LAG * cr.delay(1.0)
-    assert ct.feedback(0.999 * critical * P).is_stable()
-    assert not ct.feedback(1.001 * critical * P).is_stable()
-    assert_allclose(ct.feedback(critical * P).dominant_poles(2), [1j * w, -1j * w], atol=1e-9)
-    assert cr.design.margins(1 * P).gain_margin == pytest.approx(critical, rel=1e-9)
 
 
 @pytest.mark.parametrize(

@@ -8,8 +8,6 @@ from scipy.signal import lfilter
 
 import ctrl_realize as cr
 from ctrl_realize.errors import DataError, OptionError, TimeAxisError
-from ctrl_realize.numerics.separable.responses import StepSequence
-from ctrl_realize.numerics.signals.bins import response_bins
 
 RNG = np.random.default_rng(20261123)
 SOME = np.sort(RNG.choice(1000, 700, replace=False))
@@ -167,20 +165,6 @@ def test_methods_that_need_every_sample_name_the_one_that_does_not(method):
     record = stored("missing", np.random.default_rng(0), 0.01, False)
     with pytest.raises(DataError, match="identify\\(record\\) and fit_output_error use"):
         cr.identify(record, method=method)
-
-
-def test_means_over_bins_of_the_samples_that_there_are_match_their_single_responses():
-    rows = SOME[SOME > 40]
-    bins = response_bins(1000, [41, 200], 30).holding(rows)
-    moves, sizes = np.array([4.1, 20.0]), np.array([1.0, -0.4])
-    single = StepSequence(0.1 * rows, np.ones(rows.size, np.int64), 0.1, moves, sizes)
-    times = single.first[bins.first]
-    binned = StepSequence(times, bins.width, 0.1, moves, sizes, samples=single.first)
-    tau, poles = np.array([2.95, 0.0]), np.array([[-0.8, -0.1], [-0.3, -0.05]]) + 0j
-    for found, each in zip(binned.modes(tau, poles), single.modes(tau, poles), strict=True):
-        means = np.stack([bins.average(values) for values in np.real(each)])
-        # two samples for a bin: 1e-6 for responses, more for their derivatives by the poles
-        assert_allclose(np.real(found), means, rtol=0, atol=5e-5 * np.abs(means).max())
 
 
 def test_dead_sensors_and_outliers_of_operating_data_are_named():

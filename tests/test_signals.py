@@ -1,8 +1,5 @@
 """Records and responses: what they accept, keep and refuse."""
 
-import pickle
-
-import control as ct
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
@@ -91,18 +88,6 @@ def test_frf_is_sorted_with_all_that_belongs_to_it():
     assert_allclose(F.complex, 1 / (1 + 1j * F.frequency_hz))
 
 
-def test_frf_goes_into_python_control_beside_a_model():
-    F = frf()
-    assert isinstance(F, ct.FrequencyResponseData)
-    assert F.dt is None
-    model = ct.ss([[0.9]], [[1.0]], [[0.1]], [[0.0]], 0.01)
-    plot = ct.bode_plot(model, np.geomspace(0.1, 100, 20), Hz=True)
-    ct.bode_plot(F, Hz=True, ax=plot.axes)
-    assert_allclose((2 * F).complex, 2 * F.complex)
-    twin = pickle.loads(pickle.dumps(F))
-    assert_array_equal(twin.frequency_hz, F.frequency_hz)
-
-
 @pytest.mark.parametrize("repeats", [3, 5.5, None])
 def test_circles_hold_the_truth_as_often_as_they_say(repeats):
     rng = np.random.default_rng(4)
@@ -134,17 +119,6 @@ def test_circles_hold_the_truth_as_often_as_they_say(repeats):
 def test_unusable_frfs_are_refused(arguments, match):
     with pytest.raises(DataError, match=match):
         cr.MeasuredFRF(*arguments)
-
-
-def test_what_lies_under_a_mask_is_missing_and_never_a_sample():
-    values = np.array([0.0, 1.0, 7.0, 3.0])
-    masked = np.ma.array(values, mask=[False, False, True, False])
-    with pytest.raises(DataError, match="output has 1 non-finite sample, the first at index 2"):
-        cr.Record(np.arange(4.0), values, masked)
-    kept = cr.Record(np.arange(4.0), values, masked, missing="keep")
-    np.testing.assert_array_equal(kept.output, [0.0, 1.0, np.nan, 3.0])
-    with pytest.raises(DataError, match="time has 1 non-finite sample"):
-        cr.Record(np.ma.array(np.arange(4), mask=[0, 1, 0, 0]), values, values)
 
 
 @pytest.mark.parametrize("kind", ["i1", "u1", "f2", "f4", ">f4", ">f8", ">i4", "g"])

@@ -195,13 +195,7 @@ def test_a_mat_file_that_is_too_large_when_unpacked_is_refused(tmp_path):
         read_record(file, max_bytes=1e6)
 
 
-def test_hdf5_of_others_is_named_with_the_way_out(tmp_path):
-    (tmp_path / "b.h5").write_bytes(b"\x89HDF\r\n\x1a\n" + bytes(100))
-    with pytest.raises(FileFormatError, match=r"HDF5.*\.mat, \.npz"):
-        read_record(tmp_path / "b.h5")
-
-
-@pytest.mark.parametrize(("cut", "packed"), [(20, False), (135, True), (400, False)])
+@pytest.mark.parametrize(("cut", "packed"), [(135, True), (400, False)])
 def test_damaged_mat_files_are_refused(tmp_path, cut, packed):
     file = tmp_path / "a.mat"
     scipy.io.savemat(file, {"t": T, "u": U, "y": Y}, do_compression=packed)

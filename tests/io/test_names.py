@@ -12,7 +12,6 @@ import pytest
 
 import ctrl_realize as cr
 from ctrl_realize import report
-from ctrl_realize.cli import main
 from ctrl_realize.cli.results import file_name
 from ctrl_realize.io.text.csv_files import write_csv
 from ctrl_realize.plots.names import wrapped
@@ -113,19 +112,6 @@ def test_tags_with_dots_stay_with_the_record_and_are_allowed_in_the_model(method
 
 def test_a_dollar_sign_at_the_end_of_a_line_is_no_formula():
     assert wrapped("a" * 17 + "$ and $b", 18).split("\n")[0] == "a" * 17 + r"\$"
-
-
-def test_the_command_line_takes_units_in_brackets_and_tags_with_dots(tmp_path):
-    t, u, y = step_samples()
-    path = tmp_path / r"Ofen \1 {2} % $3$ [°C].csv"
-    table = pd.DataFrame({"time [s]": t, "FIC101.OP [%]": u, r"TIC101.PV [°C] \u00b0": y})
-    table.to_csv(path, index=False)
-    words = ["identify", str(path), "--input", "1", "--response", "2", "-o", str(tmp_path / "out")]
-    options = ["--method", "scan", "--order", "1", "--max-delay", "40", "--no-report"]
-    assert main([*words, *options]) == 0
-    model = cr.load_model(tmp_path / "out" / "model.json")
-    assert model.input_labels == ["FIC101_OP [%]"]
-    assert cr.read_record(path, input=1, output=2).input_labels == ("FIC101.OP [%]",)
 
 
 def test_tags_that_differ_in_a_dot_alone_stay_apart_in_the_model():

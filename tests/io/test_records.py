@@ -15,7 +15,6 @@ import ctrl_realize as cr
 from ctrl_realize.errors import DataError, DataWarning, FileFormatError, OptionError, TimeAxisError
 from ctrl_realize.io import read_record
 from ctrl_realize.io.text.csv_files import as_text, write_csv
-from ctrl_realize.io.units import split_unit, to_seconds
 
 U = np.array([0.0, 0.0, 1.5, 1.5, -1.5])
 Y = np.array([10.25, 10.0, 9.75, 12.5, 12.0])
@@ -39,6 +38,7 @@ def table(delimiter=",", decimal=".", header=None, end="\n", last_end=True, colu
 PLAIN = "time,input,output"
 GERMAN = "Zeit [s];Eingang [mA];Ausgang [V]"
 
+LAST = "t,u,y\n0,0,10.2500\n0.5,0,10.0000\n1,1.5,9.7500\n1.5,1.5,12.5000\n2,-1.5,12.0000"
 WRITTEN = {
     "plain": table(header=PLAIN),
     "no header": table(),
@@ -81,6 +81,9 @@ WRITTEN = {
     "a column of text": "t,u,y,remark\n"
     + "".join(f"{t:g},{u:g},{y:g},good\n" for t, u, y in zip(T, U, Y, strict=True)),
     "one signal by its name": table(header="t,u,pressure"),
+    "digits up to the end, which is no line end": LAST,
+    "an empty line at the end": LAST + "\n\n",
+    "a last number as short as others": LAST.replace("00", ""),
     "exponents": "t,u,y\n"
     + "".join(f"{t:.3e},{u:+.2E},{y:.4e}\n" for t, u, y in zip(T, U, Y, strict=True)),
 }  # fmt: skip
@@ -111,11 +114,14 @@ def test_columns_are_chosen_by_name_or_number(tmp_path, choice):
     check(read_record(file, **choice))
 
 
-def test_a_file_without_time_takes_dt(tmp_path):
+def test_a_file_without_time_takes_dt_and_rows_are_left_out_on_request(tmp_path):
     file = tmp_path / "a.csv"
     file.write_text(table(columns=(U, Y)))
     check(read_record(file, dt=0.5))
     check(read_record(file, dt=0.5, input=0, output=1))
+    file.write_text("9,9,9\n1,2,3\n" + table())
+    check(read_record(file, skip_rows=2))
+    check(read_record(file, skip_rows=1, header=True, time=0, input=1, output=2))
 
 
 @pytest.mark.parametrize(
@@ -316,30 +322,6 @@ def test_names_and_numbers_are_read_as_they_were_written(tmp_path):
     np.testing.assert_array_equal(again["delay"], values)
 
 
-@pytest.mark.parametrize(
-    ("name", "parts"),
-    [
-        ("time", ("time", "")),
-        ("time_ms", ("time", "ms")),
-        ("t [µs]", ("t", "us")),
-        ("Zeit/ms", ("Zeit", "ms")),
-        ("Time (Seconds)", ("Time", "s")),
-        ("frequency_hz", ("frequency", "hz")),
-        ("omega [rad/s]", ("omega", "rad/s")),
-        ("w_rad_s", ("w", "rad/s")),
-        ("phase deg", ("phase", "deg")),
-        ("|G| [dB]", ("|G|", "db")),
-        ("output_1", ("output_1", "")),
-        ("u[0]", ("u", "0")),
-        ("position (V)", ("position", "v")),
-        ("[s]", ("[s]", "s")),
-        ("", ("", "")),
-    ],
-)
-def test_a_name_splits_into_what_and_unit(name, parts):
-    assert split_unit(name) == parts
-
-
 CHOSEN = {
     "mimo.csv": ("heater_1 heater_2", "temperature_1 temperature_2"),
     "prbs_irregular.csv": ("heater_percent", "temperature_degC"),
@@ -382,14 +364,6 @@ def test_measured_time_stamps_that_are_not_uniform_are_refused_with_the_place(sh
         columns = {name: names.split() for name, names in columns.items()}
         with pytest.raises(TimeAxisError, match=r"\(line \d+\): time"):
             read_record(file, **columns)
-
-
-@pytest.mark.parametrize(
-    ("unit", "seconds"),
-    [("s", 7.0), ("ms", 7e-3), ("µs", 7e-6), ("ns", 7e-9), ("min", 420.0), ("Hours", 25200.0)],
-)
-def test_scaled_time_is_the_double_nearest_to_the_decimal_number(unit, seconds):
-    assert to_seconds(np.array([7.0]), unit)[0] == seconds
 
 
 def test_a_stray_quote_that_swallows_lines_is_told(tmp_path):
@@ -521,27 +495,6 @@ def test_dates_whose_day_and_month_cannot_be_told_apart_are_asked_about(tmp_path
         read_record(file, time_format="%")
     record = read_record(file, time_format="%d/%m/%Y %H:%M:%S")
     assert_array_equal(record.time, 86400 * np.arange(4.0))
-
-
-LAST = "t,u,y\n0,0,10.2500\n0.5,0,10.0000\n1,1.5,9.7500\n1.5,1.5,12.5000\n2,-1.5,12.0000"
-BELOW = "9,9,9\n1,2,3\n" + table()
-TEXTS = {  # whole tables that look as if something were cut off or wrong
-    "no end of line": (LAST, {}),
-    "an empty line at the end": (LAST + "\n\n", {}),
-    "numbers as short as others": (LAST.replace("00", ""), {}),
-    "a header further down": (BELOW, {"skip_rows": 2}),
-    "a header that is told": (
-        BELOW,
-        {"skip_rows": 1, "header": True, "time": 0, "input": 1, "output": 2},
-    ),
-}
-
-
-@pytest.mark.parametrize("name", TEXTS)
-def test_a_whole_table_is_read_without_a_word(tmp_path, name):
-    text, options = TEXTS[name]
-    (tmp_path / "a.csv").write_text(text)
-    check(read_record(tmp_path / "a.csv", **options))
 
 
 def test_bad_cells_are_named_by_their_line_and_only_where_they_are_used(tmp_path):

@@ -4,7 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from numpy.testing import assert_allclose
 from scipy.optimize import least_squares
 
 from ctrl_realize.numerics.output_error.step_data import step_data, step_scales, window
@@ -13,7 +12,6 @@ from ctrl_realize.numerics.separable.compared_fits import (
     at_dead_time,
     converged,
     on_new_data,
-    settled,
 )
 from ctrl_realize.numerics.separable.newton import settle, solve_level
 from ctrl_realize.numerics.separable.poles import parameters_from_poles
@@ -170,18 +168,6 @@ def test_what_is_compared_has_no_slope_and_the_cost_of_the_data_of_now():
         assert candidate.cost == pytest.approx(float(state.cost[0]), rel=1e-12)
 
 
-def test_the_unit_of_time_changes_dead_time_and_lags_and_nothing_else():
-    structure, found = Structure(2, 2), []
-    for unit in (1.0, 1e-3, 60.0):
-        problem, scales = problem_of(unit=unit)
-        bounds = parameter_bounds(structure, scales)
-        first = start(18.0 * unit, 10.0 * unit, 40.0 * unit)
-        near = polish(problem, structure, first[None], bounds, scales.dt)[0][0]
-        x, cost = settle(problem, structure, near, bounds, scales.dt)
-        found.append([x[0] / unit, x[1] + np.log(unit), x[2], cost])
-    assert_allclose(found[1:], [found[0]] * 2, rtol=1e-7)
-
-
 @pytest.mark.parametrize("dead_time", [0.0, 1.0])
 def test_no_random_start_beats_the_model_at_a_dead_time_far_from_the_best(dead_time):
     # what creeps as a logarithm is of no finite order: at other dead times other poles are best
@@ -198,23 +184,3 @@ def test_no_random_start_beats_the_model_at_a_dead_time_far_from_the_best(dead_t
     starts[:, 0] = dead_time
     cost = fit_batch(problem, structure, starts, box, dead_time_fixed=True, most_iterations=60)[1]
     assert at_dead_time(problem, best, scales, dead_time).cost <= cost.min()
-
-
-def test_three_lags_are_the_same_model_whichever_two_of_them_are_a_pair():
-    k = np.arange(-100, 400, dtype=float)
-    late, lags = np.clip(k - DEAD, 0, None), np.array([4.0, 15.0, 50.0])
-    parts = [lag**2 / np.prod(lag - lags[lags != lag]) for lag in lags]
-    y = 1 - sum(part * np.exp(-late / lag) for part, lag in zip(parts, lags, strict=True))
-    y = y + 1e-4 * np.random.default_rng(5).standard_normal(k.size)
-    data = step_data(y, (k >= 0).astype(float), 1.0, [(100, 1)])
-    scales = step_scales(data, k.size, None)
-    problem = window(data, k.size, KnownFactor()).problem
-    structure, rates, ends = Structure(3, 3), 1 / lags, []
-    bounds = parameter_bounds(structure, scales)
-    for one in range(3):
-        a, b = np.delete(rates, one)
-        pair = np.log([np.sqrt(a * b), (a + b) / (2 * np.sqrt(a * b))])
-        start = np.array([DEAD, np.log(rates[one]), *pair])
-        near, cost = polish(problem, structure, start[None], bounds, scales.dt)
-        ends.append(settled(problem, Candidate(structure, near[0], float(cost[0])), scales))
-    assert_allclose([end.parameters for end in ends[1:]], [ends[0].parameters] * 2, rtol=1e-5)

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 
-from ctrl_realize.numerics.signals.edges import Edge, despike, difference_noise, find_edges
+from ctrl_realize.numerics.signals.edges import despike, difference_noise, find_edges
 from ctrl_realize.numerics.signals.excitation import lively_start
 from ctrl_realize.numerics.signals.step_sequence import input_moves
 
@@ -38,11 +38,6 @@ def test_spikes_up_to_the_given_length_go_and_edges_stay():
     assert_array_equal(despike(levels((0, 1), (5, 20)), 3), levels((0, 1), (5, 20)))
     assert despike(values, 0) is values
     assert_array_equal(despike(levels((1, 9), (7, 1), (1, 9)), 1), np.ones(19))
-
-
-def test_one_clean_edge_is_described_in_full():
-    assert find_edges(levels((2, 30), (5, 70)), 3, 0.5) == [Edge(30, 3.0, 2.0, 1, 0, 100)]
-    assert find_edges(levels((2, 30), (-5, 70)), 0, 0.5) == [Edge(30, -7.0, 2.0, 1, 0, 100)]
 
 
 @given(length=st.integers(1, 60), up=st.booleans(), spike=st.integers(0, 6))
@@ -105,14 +100,6 @@ def test_a_drooping_input_is_followed_by_means_that_grow():
     assert written(index, size)[start] == pytest.approx(
         clean[start:stop].mean(), abs=4 * NOISE / np.sqrt(stop - start)
     )
-
-
-def test_no_more_edges_are_looked_for_than_are_wanted():
-    signal = np.repeat(np.random.default_rng(0).permutation(np.arange(300) % 2), 20).astype(float)
-    whole = find_edges(signal, 3, 0.1)
-    some = find_edges(signal, 3, 0.1, most=12)
-    assert len(whole) > 100
-    assert [edge.index for edge in some] == [edge.index for edge in whole[:13]]
 
 
 def moving(samples: int) -> np.ndarray:
