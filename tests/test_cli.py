@@ -286,16 +286,7 @@ def test_the_demo_does_the_paper_from_end_to_end(tmp_path, capsys):
     assert np.abs(ratio * np.exp(2j * np.pi * hz * late) - 1).max() < 0.01
 
 
-@pytest.mark.usefixtures("without_figures")
-def test_columns_and_units_can_be_told(valve, folder, first, tmp_path, capsys):
-    record = valve.step_record(16.0, rng=0)
-    table = pd.DataFrame({"ms": 1e3 * record.time, "x": record.output, "i": record.input})
-    table.to_csv(tmp_path / "log.txt", sep=";", decimal=",", index=False)
-    out = tmp_path / "out"
-    words = ["--time", "0", "--time-unit", "ms", "--input", "i", "--response", "x", *FAST]
-    assert main(["identify", str(tmp_path / "log.txt"), "-o", str(out), *words]) == 0
-    assert cr.load_model(out / "model.json").dt == pytest.approx(record.dt, rel=1e-9)
-    capsys.readouterr()
+def test_units_of_a_frequency_response_can_be_told(folder, first, tmp_path, capsys):
     frf = cr.read_frf(folder / "frf.csv")
     columns = {
         "f": 2 * np.pi * frf.frequency_hz,

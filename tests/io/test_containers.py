@@ -88,14 +88,18 @@ def test_npy_files_and_structured_arrays_are_read(tmp_path):
     check(read_record(tmp_path / "named.npy"))
 
 
-def test_cells_and_arrays_of_structs_are_numbered(tmp_path):
+def test_cells_and_structs_of_matlab_are_read_field_by_field(tmp_path):
     file = tmp_path / "a.mat"
     runs = np.array([(T, U, Y), (T, U, 2 * Y)], dtype=[("t", "O"), ("u", "O"), ("y", "O")])
     cells = np.empty(2, dtype=object)
     cells[:] = [Y, 3 * Y]
-    scipy.io.savemat(file, {"runs": runs, "cells": cells})
+    simulink = {"time": T, "signals": {"values": Y, "label": "level"}}
+    scipy.io.savemat(file, {"runs": runs, "cells": cells, "scope": simulink})
     check(read_record(file, variable="runs[1]"), output=2 * Y)
-    check(read_record(file, time="runs[0].t", input="runs[0].u", output="cells[1]"), output=3 * Y)
+    check(read_record(file, time="scope.time", input="runs[0].u", output="cells[1]"), output=3 * Y)
+    check(read_record(file, time="scope.time", input="runs[0].u", output="scope.signals.values"))
+    with pytest.raises(OptionError, match=r"3 columns that could be time.*'runs.*'scope.time'"):
+        read_record(file)
 
 
 def write_v73(h5py, file, arrays):
@@ -296,16 +300,6 @@ def test_only_the_wanted_columns_of_a_parquet_file_are_read(tmp_path):
     assert peak < 5e6  # N texts of a million letters would be 200 MB
     with pytest.raises(FileFormatError, match=r"column 'matrix' holds list"):
         read_record(path, output="matrix")
-
-
-def test_structs_of_matlab_are_read_field_by_field(tmp_path):
-    file = tmp_path / "a.mat"
-    simulink = {"time": T, "signals": {"values": Y, "label": "level"}}
-    scipy.io.savemat(file, {"run": {"t": T, "u": U, "y": Y}, "scope": simulink})
-    check(read_record(file, variable="run"))
-    check(read_record(file, time="scope.time", input="run.u", output="scope.signals.values"))
-    with pytest.raises(OptionError, match=r"2 columns that could be time.*'run.t'.*'scope.time'"):
-        read_record(file)
 
 
 @pytest.mark.parametrize(

@@ -93,10 +93,9 @@ def test_complex_arrays_are_read(tmp_path):
     for name in ("G", "H", "frf", "response"):
         np.savez(tmp_path / "a.npz", f=F, **{name: G})
         check(read_frf(tmp_path / "a.npz"))
-    for packed in (False, True):
-        struct = {"freq": F, "H": G[:, None]}
-        scipy.io.savemat(tmp_path / "a.mat", {"meas": struct}, do_compression=packed)
-        check(read_frf(tmp_path / "a.mat"))
+    struct = {"freq": F, "H": G[:, None]}
+    scipy.io.savemat(tmp_path / "a.mat", {"meas": struct}, do_compression=True)
+    check(read_frf(tmp_path / "a.mat"))
 
 
 def test_coherence_and_std_come_along_and_a_cut_last_line_does_not(tmp_path):

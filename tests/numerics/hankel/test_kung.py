@@ -8,7 +8,7 @@ from numpy.testing import assert_allclose
 
 from ctrl_realize.numerics.hankel.delay_models import realize_at
 from ctrl_realize.numerics.hankel.iae import integrated_absolute_error, markov_stack
-from ctrl_realize.numerics.hankel.kung import realize_block, realize_symmetric, tail_bound
+from ctrl_realize.numerics.hankel.kung import realize_block, realize_symmetric
 from ctrl_realize.numerics.hankel.matrix import hankel_matrix
 from ctrl_realize.numerics.state_space.responses import markov
 from tests.oracles import dense
@@ -87,17 +87,6 @@ def test_block_formulas_agree_with_the_textbook():
     want = markov(A, B, C, g[:, :, 0], 80)
     assert_allclose(markov(*fast, g[:, :, 0], 80), want, atol=1e-12)
     assert_allclose(values, s, rtol=0, atol=1e-12 * s[0])
-
-
-def test_tail_bound_is_exact_for_equal_values_and_never_too_small():
-    rng = np.random.default_rng(2)
-    values = np.r_[5.0, 3.0, np.full(20, 0.5)]
-    assert tail_bound(float(values @ values), values[:2], 22) == pytest.approx(2 * 20 * 0.5)
-    for _ in range(20):
-        values = np.sort(rng.exponential(size=30) ** 3)[::-1]
-        assert tail_bound(float(values @ values), values[:4], 30) >= 2 * values[4:].sum()
-    assert tail_bound(1.0, np.ones(1), 1) == 0
-    assert tail_bound(1.25, np.ones(1), 2) == pytest.approx(2 * 0.5)  # a single value is left
 
 
 def test_signs_of_singular_vectors_do_not_matter():
