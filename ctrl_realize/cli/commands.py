@@ -17,9 +17,8 @@ from threadpoolctl import threadpool_limits
 from typer.main import get_command
 
 from ..errors import CtrlRealizeError
-from .signatures import compare, demo, identify, valve
+from .signatures import compare, demo, identify, loop, valve
 from .terminal import EXIT_CODES, complain, one_line, plain_warning
-from .valve.signatures import loop
 
 app = typer.Typer(
     name="ctrl-realize",
@@ -29,11 +28,8 @@ app = typer.Typer(
     rich_markup_mode=None,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-app.command(epilog=EXIT_CODES)(identify)
-app.command(epilog=EXIT_CODES)(compare)
-app.command(epilog=EXIT_CODES)(valve)
-app.command(epilog=EXIT_CODES)(loop)
-app.command(epilog=EXIT_CODES)(demo)
+for command in (identify, compare, valve, loop, demo):
+    app.command(epilog=EXIT_CODES)(command)
 
 
 def _version(asked: bool) -> None:

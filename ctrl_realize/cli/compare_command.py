@@ -23,7 +23,8 @@ def run_compare(
     frf: Path,
     output: Path | None,
     *,
-    choices: Mapping[str, Any],
+    trusted: Mapping[str, Any],
+    hold: str,
     reading: Mapping[str, Any],
     report: bool,
     overwrite: bool,
@@ -31,26 +32,14 @@ def run_compare(
     """Compare, write the results if a folder is given, and return the exit code."""
     system = load_model(model)
     measured = read_frf(frf, **reading)
-    hold = choices["hold"]
-    comparison = compare_frf(
-        system,
-        measured,
-        min_coherence=choices["min_coherence"],
-        band_hz=choices["band_hz"],
-        hold=None if hold == "none" else hold,
-    )
+    method: Any = None if hold == "none" else hold
+    comparison = compare_frf(system, measured, hold=method, **trusted)
     say(printable(f"{model}: {system!r}"))
     say(comparison.report())
     names = ["frf_comparison.csv"]
     if output is not None:
         words = [str(model), str(frf)]
-        if choices["min_coherence"] is not None:
-            words += ["--min-coherence", f"{choices['min_coherence']:g}"]
-        if choices["band_hz"] is not None:
-            words += ["--band", *(f"{edge:.12g}" for edge in choices["band_hz"])]
-        if hold != "auto":
-            words += ["--hold", hold]
-        words += words_of(reading)
+        words += words_of({**trusted, **({} if hold == "auto" else {"hold": hold}), **reading})
         run = Run(typed_call("compare", words), (model, frf), overwrite)
         words += ["--output", str(output)]
         with appearing(output, run) as folder:

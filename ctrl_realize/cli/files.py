@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import inspect
+from collections.abc import Callable, Sequence
 from enum import Enum
+from functools import wraps
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args, get_type_hints
 
 from ..errors import MissingFileError, OptionError
+from .options import GROUPS, Given
 
 _COLUMNS = ("time", "input", "output", "quality", "by", "frequency", "magnitude", "phase", "real",
             "imag")  # fmt: skip
@@ -27,7 +30,36 @@ def check_files(paths: Sequence[Path]) -> None:
             raise OptionError(f"{path} is a folder; give the files in it")
 
 
-def given(**options: Any) -> dict[str, Any]:
+def with_options(command: Callable[..., int]) -> Callable[..., int]:
+    """Give a command the options of each group that it has as an argument.
+
+    The command receives a group as the arguments of Python that were given.
+    """
+    signature, hints = inspect.signature(command), get_type_hints(command, include_extras=True)
+    groups = [name for name in signature.parameters if name in GROUPS]
+
+    @wraps(command)
+    def run(**values: Any) -> int:
+        found = {
+            group: given(**{name: values.pop(name) for name in GROUPS[group]}) for group in groups
+        }
+        return command(**values, **found)
+
+    parameters = []
+    for name, one in signature.parameters.items():
+        if name not in groups:
+            parameters.append(one.replace(annotation=hints[name], kind=one.KEYWORD_ONLY))
+        for option, kind in GROUPS[name].items() if name in groups else ():
+            default = False if get_args(kind)[0] is bool else None
+            parameters.append(
+                inspect.Parameter(option, one.KEYWORD_ONLY, default=default, annotation=kind)
+            )
+    run.__signature__ = signature.replace(parameters=parameters)  # type: ignore[attr-defined]
+    run.__annotations__ = {one.name: one.annotation for one in parameters}
+    return run
+
+
+def given(**options: Any) -> Given:
     r"""Arguments of Python for the options that were given; the others keep their defaults.
 
     Examples

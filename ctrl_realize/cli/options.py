@@ -6,7 +6,7 @@ import re
 from collections.abc import Mapping
 from enum import Enum
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, TypeAlias
 
 import typer
 
@@ -219,7 +219,8 @@ MinCoherence = Annotated[
     float | None, _OPTION(help="Smallest coherence of a trusted point. Default: 0.95.")
 ]
 Band = Annotated[
-    tuple[float, float] | None, _OPTION(metavar="LOW HIGH", help="Compare in this band, in Hz.")
+    tuple[float, float] | None,
+    _OPTION("--band", metavar="LOW HIGH", help="Compare in this band, in Hz."),
 ]
 HoldOption = Annotated[
     Hold,
@@ -229,14 +230,45 @@ HoldOption = Annotated[
     ),
 ]
 
+Given: TypeAlias = dict[str, Any]
+"""Arguments of Python for the options of a group that were given, see `files.with_options`."""
+
+_FREQUENCY_RESPONSE: dict[str, Any] = {
+    "frequency": Frequency, "magnitude": Magnitude, "phase": Phase, "real": Real, "imag": Imag,
+    "frequency_unit": FrequencyUnit, "magnitude_unit": MagnitudeUnit, "phase_unit": PhaseUnit,
+}  # fmt: skip
+_ANY_FILE: dict[str, Any] = {
+    "delimiter": Delimiter, "decimal": Decimal, "encoding": Encoding, "comment": Comment,
+    "no_header": NoHeader, "skip_rows": SkipRows, "variable": Variable, "max_bytes": MaxBytes,
+}  # fmt: skip
+_RECORD: dict[str, Any] = {
+    "time": Time, "input": Input, "output": OutputColumn, "dt": Dt, "time_unit": TimeUnit,
+    "time_format": TimeFormat, "start": From, "stop": To, "missing": MissingOption,
+    "na_values": NaValues, "quality": Quality, "good": Good, "resample": Resample, "rest": Rest,
+    **_ANY_FILE,
+}  # fmt: skip
+GROUPS: dict[str, dict[str, Any]] = {
+    "chosen": {
+        "order": Order, "max_delay": MaxDelay, "structures": Structures, "samples": Samples,
+        "cutoff_hz": CutoffHz, "gains": GainsOption, "actuator": ActuatorOption,
+    },
+    "tests": {"by": By, "split": Split},
+    "record": _RECORD,
+    "valve_test": {name: one for name, one in _RECORD.items() if name != "missing"},
+    "trend": {name: one for name, one in _RECORD.items() if name not in ("missing", "rest")},
+    "response": _FREQUENCY_RESPONSE,
+    "response_file": {**_FREQUENCY_RESPONSE, **_ANY_FILE},
+    "trusted": {"min_coherence": MinCoherence, "band_hz": Band},
+    "ranges": {"command_range": CommandRange, "travel_range": TravelRange},
+}  # fmt: skip
+"""Options that several commands share, or that go together to one function of Python."""
+
 ARGUMENTS = frozenset(
-    {"time", "input", "output", "dt", "time_unit", "time_format", "start", "stop", "missing",
-     "na_values", "quality", "good", "resample", "rest", "delimiter", "decimal", "encoding",
-     "comment", "header", "skip_rows", "variable", "max_bytes", "by", "method", "order",
-     "max_delay", "gains", "actuator", "structures", "samples", "cutoff_hz", "frequency",
-     "magnitude", "phase", "real", "imag", "frequency_unit", "magnitude_unit", "phase_unit",
-     "min_coherence", "band_hz", "hold"}
-)  # fmt: skip
+    name.removeprefix("no_")
+    for group in ("chosen", "tests", "record", "response", "trusted")
+    for name in GROUPS[group]
+    if name != "split"
+) | {"method", "hold"}
 """Arguments of Python that have an option."""
 
 _COLUMNS = ("time", "input", "output", "quality", "by")
@@ -310,7 +342,7 @@ def words_of(keywords: Mapping[str, Any]) -> list[str]:
         option = option_of(name)
         if isinstance(value, bool):
             words.append(option)
-        elif name == "rest":
+        elif isinstance(value, tuple):
             words += [option, *map(str, value)]
         elif isinstance(value, list):
             words += [word for one in value for word in (option, _word(name, one))]

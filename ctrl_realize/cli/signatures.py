@@ -7,61 +7,28 @@ misspelt option need not wait for.
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 
 from . import options as o
-from .files import check_files, given
+from .files import check_files, with_options
 from .loading import loading
 
 
+@with_options
 def identify(
     files: o.Files,
-    output: o.Folder,
+    folder: o.Folder,
     method: o.MethodOption = o.Method.output_error,
-    order: o.Order = None,
-    max_delay: o.MaxDelay = None,
-    structures: o.Structures = None,
-    samples: o.Samples = None,
-    cutoff_hz: o.CutoffHz = None,
+    *,
     frf: o.Frf = None,
     joint: o.Joint = False,
-    gains: o.GainsOption = None,
-    actuator: o.ActuatorOption = None,
     separate: o.Separate = False,
-    by: o.By = None,
-    split: o.Split = False,
-    time: o.Time = None,
-    input_column: o.Input = None,
-    output_column: o.OutputColumn = None,
-    dt: o.Dt = None,
-    time_unit: o.TimeUnit = None,
-    time_format: o.TimeFormat = None,
-    start: o.From = None,
-    stop: o.To = None,
-    missing: o.MissingOption = None,
-    na_values: o.NaValues = None,
-    quality: o.Quality = None,
-    good: o.Good = None,
-    resample: o.Resample = False,
-    rest: o.Rest = None,
-    delimiter: o.Delimiter = None,
-    decimal: o.Decimal = None,
-    encoding: o.Encoding = None,
-    comment: o.Comment = None,
-    no_header: o.NoHeader = False,
-    skip_rows: o.SkipRows = None,
-    variable: o.Variable = None,
-    max_bytes: o.MaxBytes = None,
-    frequency: o.Frequency = None,
-    magnitude: o.Magnitude = None,
-    phase: o.Phase = None,
-    real: o.Real = None,
-    imag: o.Imag = None,
-    frequency_unit: o.FrequencyUnit = None,
-    magnitude_unit: o.MagnitudeUnit = None,
-    phase_unit: o.PhaseUnit = None,
+    chosen: o.Given,
+    tests: o.Given,
+    record: o.Given,
+    response: o.Given,
     jobs: o.Jobs = None,
     no_report: o.NoReport = False,
     overwrite: o.Overwrite = False,
@@ -87,67 +54,22 @@ def identify(
     with loading():
         from .identify_command import run_identify
 
-    any_file = given(
-        delimiter=delimiter, decimal=decimal, encoding=encoding, comment=comment,
-        no_header=no_header, skip_rows=skip_rows, variable=variable, max_bytes=max_bytes,
-    )  # fmt: skip
-    reading = given(
-        time=time, input=input_column, output=output_column, dt=dt, time_unit=time_unit,
-        time_format=time_format, start=start, stop=stop, missing=missing, na_values=na_values,
-        quality=quality, good=good, resample=resample, rest=rest,
-    )  # fmt: skip
-    response = given(
-        frequency=frequency, magnitude=magnitude, phase=phase, real=real, imag=imag,
-        frequency_unit=frequency_unit, magnitude_unit=magnitude_unit, phase_unit=phase_unit,
-    )  # fmt: skip
     return run_identify(
-        files,
-        output,
-        method=method.value,
-        choices=given(
-            order=order,
-            max_delay=max_delay,
-            structures=structures,
-            samples=samples,
-            cutoff_hz=cutoff_hz,
-            gains=gains,
-            actuator=actuator,
-        ),
-        frf=frf,
-        joint=joint or gains is not None,
-        separate=separate,
-        tests=given(by=by, split=split),
-        reading=reading | any_file,
-        response=response,
-        jobs=jobs,
-        report=not no_report,
-        overwrite=overwrite,
-    )
+        files, folder, method=method.value, choices=chosen, frf=frf,
+        joint=joint or "gains" in chosen, separate=separate, tests=tests, reading=record,
+        response=response, jobs=jobs, report=not no_report, overwrite=overwrite,
+    )  # fmt: skip
 
 
+@with_options
 def compare(
     model: Annotated[Path, typer.Argument(help="Model file written by identify: model.json.")],
     frf: Annotated[Path, typer.Argument(help="Measured frequency response: CSV, TSV, .mat, .npz.")],
-    output: o.MaybeFolder = None,
-    min_coherence: o.MinCoherence = None,
-    band: o.Band = None,
+    folder: o.MaybeFolder = None,
+    *,
+    trusted: o.Given,
     hold: o.HoldOption = o.Hold.auto,
-    frequency: o.Frequency = None,
-    magnitude: o.Magnitude = None,
-    phase: o.Phase = None,
-    real: o.Real = None,
-    imag: o.Imag = None,
-    frequency_unit: o.FrequencyUnit = None,
-    magnitude_unit: o.MagnitudeUnit = None,
-    phase_unit: o.PhaseUnit = None,
-    delimiter: o.Delimiter = None,
-    decimal: o.Decimal = None,
-    encoding: o.Encoding = None,
-    comment: o.Comment = None,
-    no_header: o.NoHeader = False,
-    skip_rows: o.SkipRows = None,
-    variable: o.Variable = None,
-    max_bytes: o.MaxBytes = None,
+    response_file: o.Given,
     no_report: o.NoReport = False,
     overwrite: o.Overwrite = False,
 ) -> int:
@@ -165,49 +87,22 @@ def compare(
     with loading():
         from .compare_command import run_compare
 
-    reading = given(
-        frequency=frequency, magnitude=magnitude, phase=phase, real=real, imag=imag,
-        frequency_unit=frequency_unit, magnitude_unit=magnitude_unit, phase_unit=phase_unit,
-        delimiter=delimiter, decimal=decimal, encoding=encoding, comment=comment,
-        no_header=no_header, skip_rows=skip_rows, variable=variable, max_bytes=max_bytes,
-    )  # fmt: skip
-    choices: dict[str, Any] = {"min_coherence": min_coherence, "band_hz": band, "hold": hold.value}
     return run_compare(
-        model, frf, output,
-        choices=choices, reading=reading, report=not no_report, overwrite=overwrite,
+        model, frf, folder, trusted=trusted, hold=hold.value, reading=response_file,
+        report=not no_report, overwrite=overwrite,
     )  # fmt: skip
 
 
+@with_options
 def valve(
     files: o.Files,
-    output: o.Folder,
-    command_range: o.CommandRange = None,
-    travel_range: o.TravelRange = None,
+    folder: o.Folder,
+    *,
+    ranges: o.Given,
     limit: o.Limit = None,
     no_fit: o.NoFit = False,
-    by: o.By = None,
-    split: o.Split = False,
-    time: o.Time = None,
-    input_column: o.Input = None,
-    output_column: o.OutputColumn = None,
-    dt: o.Dt = None,
-    time_unit: o.TimeUnit = None,
-    time_format: o.TimeFormat = None,
-    start: o.From = None,
-    stop: o.To = None,
-    na_values: o.NaValues = None,
-    quality: o.Quality = None,
-    good: o.Good = None,
-    resample: o.Resample = False,
-    rest: o.Rest = None,
-    delimiter: o.Delimiter = None,
-    decimal: o.Decimal = None,
-    encoding: o.Encoding = None,
-    comment: o.Comment = None,
-    no_header: o.NoHeader = False,
-    skip_rows: o.SkipRows = None,
-    variable: o.Variable = None,
-    max_bytes: o.MaxBytes = None,
+    tests: o.Given,
+    valve_test: o.Given,
     no_report: o.NoReport = False,
     overwrite: o.Overwrite = False,
 ) -> int:
@@ -230,23 +125,46 @@ def valve(
     with loading():
         from .valve.command import run_valve
 
-    reading = given(
-        time=time, input=input_column, output=output_column, dt=dt, time_unit=time_unit,
-        time_format=time_format, start=start, stop=stop, na_values=na_values, quality=quality,
-        good=good, resample=resample, rest=rest, delimiter=delimiter, decimal=decimal,
-        encoding=encoding, comment=comment, no_header=no_header, skip_rows=skip_rows,
-        variable=variable, max_bytes=max_bytes,
-    )  # fmt: skip
-    choices: dict[str, Any] = given(command_range=command_range, travel_range=travel_range)
     return run_valve(
-        files, output, choices=choices | ({"fit": False} if no_fit else {}), limits=limit or (),
-        tests=given(by=by, split=split), reading=reading, report=not no_report,
-        overwrite=overwrite,
+        files, folder, choices=ranges | ({"fit": False} if no_fit else {}), limits=limit or (),
+        tests=tests, reading=valve_test, report=not no_report, overwrite=overwrite,
+    )  # fmt: skip
+
+
+@with_options
+def loop(
+    files: o.Files,
+    folder: o.Folder,
+    process: o.ProcessOption = o.LoopKind.self_regulating,
+    set_point: o.SetPoint = None,
+    *,
+    trend: o.Given,
+    no_report: o.NoReport = False,
+    overwrite: o.Overwrite = False,
+) -> int:
+    """Tell from operating data whether the valve makes a control loop oscillate.
+
+    The input is the controller output, the output the process value. Methods of the literature
+    tell whether the loop oscillates, and whether its valve sticks; the verdict may be "cannot
+    tell". The output contains report.html, methods.csv and figures/.
+
+    \b
+    Examples:
+      ctrl-realize loop trend.csv -o loop
+      ctrl-realize loop trend.csv -o loop --input op --output-column pv --process flow
+    """  # noqa: D301  # \b keeps the lines of the examples apart
+    check_files(files)
+    with loading():
+        from .valve.loop import run_loop
+
+    return run_loop(
+        files, folder, process=process.value, set_point=set_point, reading=trend,
+        report=not no_report, overwrite=overwrite,
     )  # fmt: skip
 
 
 def demo(
-    output: o.Folder,
+    folder: o.Folder,
     seed: Annotated[int, typer.Option(min=0, help="Seed of the random numbers.")] = 1,
     jobs: Annotated[int, typer.Option(help="Number of processes; -1: all cores.")] = 1,
     no_report: o.NoReport = False,
@@ -267,4 +185,4 @@ def demo(
     with loading():
         from .demo_command import run_demo_command
 
-    return run_demo_command(output, seed, jobs, report=not no_report, overwrite=overwrite)
+    return run_demo_command(folder, seed, jobs, report=not no_report, overwrite=overwrite)

@@ -34,9 +34,7 @@ def run_valve(
     bounds = _limits(limits)
     options = {**choices, **({"limits": bounds} if bounds else {})}
     words = [str(file) for file in files]
-    for name, value in choices.items():
-        if isinstance(value, tuple):
-            words += [f"--{name.replace('_', '-')}", *(f"{end:.12g}" for end in value)]
+    words += words_of({name: value for name, value in choices.items() if name != "fit"})
     words += ["--no-fit"] if choices.get("fit") is False else []
     words += [word for one in limits for word in ("--limit", one)]
     words += words_of({**tests, **reading})
