@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import html
 import sys
 from collections.abc import Sequence
-from typing import Any
+from html import escape
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -69,18 +69,57 @@ def html_card(
         f"<tr><th style='{cell};font-weight:500;padding:2px 16px 2px 0;"
         # On a narrow screen the values wrap first.
         f"white-space:{'nowrap' if len(label) <= SHORT_LABEL else 'normal'}'>"
-        f"{html.escape(label)}</th>"
-        f"<td style='{cell};padding:2px 0'>{html.escape(value)}</td></tr>"
+        f"{escape(label)}</th>"
+        f"<td style='{cell};padding:2px 0'>{escape(value)}</td></tr>"
         for label, value in rows
     )
-    lines = "".join(f"<div style='margin-top:4px'>{html.escape(text)}</div>" for text in choices)
-    lines += "".join(f"<div style='margin-top:4px'>⚠ {html.escape(text)}</div>" for text in flags)
+    lines = "".join(f"<div style='margin-top:4px'>{escape(text)}</div>" for text in choices)
+    lines += "".join(f"<div style='margin-top:4px'>⚠ {escape(text)}</div>" for text in flags)
     return (
         "<div style='display:inline-block;border:1px solid #8886;border-radius:6px;"
         "padding:8px 14px;max-width:46em'>"
-        f"<div style='font-weight:600;margin-bottom:4px'>{html.escape(title)}</div>"
+        f"<div style='font-weight:600;margin-bottom:4px'>{escape(title)}</div>"
         f"<table style='border-collapse:collapse;margin:0'>{body}</table>{lines}</div>"
     )
+
+
+class Card(NamedTuple):
+    """Title, (label, value) rows, choices and flags, as for `text_card`."""
+
+    title: str
+    rows: Sequence[tuple[str, str]]
+    choices: Sequence[str] = ()
+    flags: Sequence[str] = ()
+
+
+class ShownSystem:
+    """How systems of this toolbox are shown: one line, which is `_line`, or their `_card`.
+
+    python-control shows all matrices: of systems with delays too many, and as LaTeX, which not
+    every page renders.
+    """
+
+    def _line(self) -> str:
+        raise NotImplementedError
+
+    def _card(self) -> Card:
+        raise NotImplementedError
+
+    def __repr__(self) -> str:
+        return as_asked(self)
+
+    def __str__(self) -> str:
+        return self._line()
+
+    def _repr_info_(self, html: bool = False) -> str:
+        line = self._line()
+        return escape(line) if html else line
+
+    def _repr_html_(self) -> str:
+        return html_card(*self._card())
+
+    def _repr_markdown_(self) -> None:
+        return None
 
 
 def as_asked(system: Any) -> str:

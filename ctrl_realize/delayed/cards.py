@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from html import escape
-
+import control as ct
 import numpy as np
 
-from .._shown import as_asked, as_code, html_card
+from .._shown import Card, ShownSystem, as_code
 from .._wording import in_time
 from ..numerics.arrays import ComplexArray
 from .parts import CoreAndDelays
@@ -14,7 +13,7 @@ from .parts import CoreAndDelays
 _MOST_POLES = 8
 
 
-class DelayedCards(CoreAndDelays):
+class DelayedCards(ShownSystem, CoreAndDelays):
     """Shows core and delay, not the augmented matrices."""
 
     def _shift(self) -> str:
@@ -30,19 +29,12 @@ class DelayedCards(CoreAndDelays):
     def _fit_line(self) -> str:
         return "" if self.fit is None else f"{self.fit!r}"
 
-    def __repr__(self) -> str:
-        return as_asked(self)
-
     def _repr_eval_(self) -> str:
         core = as_code(self.delay_free)
         delays = [f"delay={self.input_delays!r}"]
         if any(self.output_delays):
             delays.append(f"output_delay={self.output_delays!r}")
         return f"DelayedStateSpace(\n{core},\n{', '.join(delays)}, name={self.name!r})"
-
-    def _repr_info_(self, html: bool = False) -> str:
-        line = self._line()
-        return escape(line) if html else line
 
     def _line(self) -> str:
         name = "" if self._generic_name_check() else f" {self.name!r}"
@@ -54,15 +46,10 @@ class DelayedCards(CoreAndDelays):
         )
 
     def __str__(self) -> str:
-        lines = [self._line(), "", "core:"]
-        core = self._core
-        for letter, matrix in (("A", core.A), ("B", core.B), ("C", core.C), ("D", core.D)):
-            lines.append(f"{letter} =")
-            lines += [f"    {row}" for row in str(matrix).splitlines()]
-        return "\n".join([*lines, f"times {self._shift()}"])
+        lines = [self._line(), "", "core:", *matrix_lines(self._core), f"times {self._shift()}"]
+        return "\n".join(lines)
 
-    def _repr_html_(self) -> str:
-        # Not python-control's card of the core: it is LaTeX, which not every page renders.
+    def _card(self) -> Card:
         name = "" if self._generic_name_check() else f" {self.name}"
         signals = f"{', '.join(self.input_labels)} → {', '.join(self.output_labels)}"
         rows = [
@@ -79,10 +66,15 @@ class DelayedCards(CoreAndDelays):
             )
         if self.fit is not None:
             rows.append(("fit", self._fit_line().strip("<>")))
-        return html_card(f"DelayedStateSpace{name}", rows)
+        return Card(f"DelayedStateSpace{name}", rows)
 
-    def _repr_markdown_(self) -> None:
-        return None
+
+def matrix_lines(core: ct.StateSpace) -> list[str]:
+    """Write the matrices of a core."""
+    lines = []
+    for letter, matrix in (("A", core.A), ("B", core.B), ("C", core.C), ("D", core.D)):
+        lines += [f"{letter} =", *(f"    {row}" for row in str(matrix).splitlines())]
+    return lines
 
 
 def _few(poles: ComplexArray) -> str:

@@ -6,13 +6,12 @@ outputs u[k-1] ... u[k-d], which have not yet acted on the plant.
 
 from __future__ import annotations
 
-from html import escape
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .._shown import as_asked, html_card, text_card
+from .._shown import Card, ShownSystem, text_card
 from .._wording import in_time
 from ..delayed.operators import DelayOperators
 from ..numerics.arrays import ComplexArray, FloatArray, read_only
@@ -27,7 +26,7 @@ DIES_OUT = 0.999999
 """Largest pole of a response that may be computed as the difference of two infinite ones."""
 
 
-class DelayLineController(DelayOperators):
+class DelayLineController(ShownSystem, DelayOperators):
     """Discrete controller with a delay line of its past outputs; a `control.StateSpace`.
 
     States ``[x; u[k-1] ... u[k-d]]``; with v the line::
@@ -154,25 +153,13 @@ class DelayLineController(DelayOperators):
         full_B[n:] += B_p @ row[1]
         return DelayForm(full_A, full_B, np.vstack([row[0]] * 2), np.vstack([row[1]] * 2), (d,))
 
-    def __repr__(self) -> str:
-        return as_asked(self)
-
-    def _repr_info_(self, html: bool = False) -> str:
-        line = self._line()
-        return escape(line) if html else line
-
     def _line(self) -> str:
-        # python-control's representation lists the matrices, with as many states as the line is
-        # long.
         return (
             f"<{type(self).__name__} {self.name!r}: order {self.inner_poles.size}, line of "
             f"{self.line_length} samples, dt = {self.dt:.6g} s>"
         )
 
-    def __str__(self) -> str:
-        return self._line()
-
-    def _card(self) -> tuple[str, list[tuple[str, str]], list[str]]:
+    def _card(self) -> Card:
         largest = float(np.abs(self.inner_poles).max(initial=0.0))
         rows = [
             ("signals", f"{self.input_labels[0]} → {self.output_labels[0]}"),
@@ -183,19 +170,11 @@ class DelayLineController(DelayOperators):
             ),
             ("sample time", in_time(self.dt, 6)),
         ]
-        return f"Controller {self.name} with a delay line", rows, []
+        return Card(f"Controller {self.name} with a delay line", rows)
 
     def report(self) -> str:
         """Describe the controller and its closed loop as plain text."""
-        title, rows, flags = self._card()
-        return text_card(title, rows, flags=flags)
-
-    def _repr_html_(self) -> str:
-        title, rows, flags = self._card()
-        return html_card(title, rows, flags=flags)
-
-    def _repr_markdown_(self) -> None:
-        return None
+        return text_card(*self._card())
 
     def __reduce__(self) -> tuple[Any, ...]:
         settings = {

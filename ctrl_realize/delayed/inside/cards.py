@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from html import escape
-
 import control as ct
 
-from ..._shown import as_asked, as_code, html_card
+from ..._shown import Card, ShownSystem, as_code
 from ..._wording import in_time
+from ..cards import matrix_lines
 from ..deferred import DeferredMatrices
 
 
-class InsideCards(DeferredMatrices):
+class InsideCards(ShownSystem, DeferredMatrices):
     """Shows core and delays, not the augmented matrices."""
 
     _core: ct.StateSpace
@@ -34,9 +33,6 @@ class InsideCards(DeferredMatrices):
             f"{self._delays()}, {base}>"
         )
 
-    def __repr__(self) -> str:
-        return as_asked(self)
-
     def _repr_eval_(self) -> str:
         core = as_code(self._core)
         count = len(self.internal_delays)
@@ -47,17 +43,11 @@ class InsideCards(DeferredMatrices):
             f"inputs={labels[0]!r}, outputs={labels[1]!r})"
         )
 
-    def _repr_info_(self, html: bool = False) -> str:
-        return escape(self._line()) if html else self._line()
-
     def __str__(self) -> str:
-        lines = [self._line(), "", "core, the delays' inputs and outputs last:"]
-        for letter in "ABCD":
-            lines.append(f"{letter} =")
-            lines += [f"    {row}" for row in str(getattr(self._core, letter)).splitlines()]
-        return "\n".join(lines)
+        head = [self._line(), "", "core, the delays' inputs and outputs last:"]
+        return "\n".join([*head, *matrix_lines(self._core)])
 
-    def _repr_html_(self) -> str:
+    def _card(self) -> Card:
         name = "" if self._generic_name_check() else f" {self.name}"
         signals = f"{', '.join(self.input_labels)} → {', '.join(self.output_labels)}"
         seconds = [delay * (self.dt or 1.0) for delay in self.internal_delays]
@@ -67,7 +57,4 @@ class InsideCards(DeferredMatrices):
             ("time", f"samples of {in_time(self.dt, 6)}" if self.dt else "continuous"),
             ("core", f"order {self._core.nstates}"),
         ]
-        return html_card(f"{type(self).__name__}{name}", rows)
-
-    def _repr_markdown_(self) -> None:
-        return None
+        return Card(f"{type(self).__name__}{name}", rows)

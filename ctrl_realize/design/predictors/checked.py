@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from ..._shown import Card
 from ...delayed import DelayedStateSpace
 from ..delay_line import DelayLineController
 from ..loops.delay_robustness_result import DelayRobustness
@@ -40,8 +41,9 @@ class CheckedController(DelayLineController):
     def _design(self) -> dict[str, Any]:
         return {"model": self.model, "check": self.check}
 
-    def _card(self) -> tuple[str, list[tuple[str, str]], list[str]]:
-        title, rows, flags = super()._card()
+    def _card(self) -> Card:
+        card = super()._card()
         if self.check is None:
-            return title, rows, flags
-        return title, [*rows, *self.check.rows()], [str(flag) for flag in self.check.flags]
+            return card
+        rows = [*card.rows, *self.check.rows()]
+        return Card(card.title, rows, flags=[str(flag) for flag in self.check.flags])

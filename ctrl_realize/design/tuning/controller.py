@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from html import escape
 from typing import Any
 
 import numpy as np
 
 from ..._checks import one_of, positive, real, system_name
 from ..._parameters import SECONDS, checked_time_unit, slope_unit
-from ..._shown import as_asked, html_card, text_card
+from ..._shown import Card, ShownSystem, text_card
 from ..._wording import in_time, times_in
 from ...data.shown_units import in_shown_units
 from ...delayed.operators import BesideDelays
@@ -21,7 +20,7 @@ from .algorithm import DISCRETIZATIONS as DISCRETIZATIONS
 from .delivery import Delivered
 
 
-class PIDController(Delivered, BesideDelays):
+class PIDController(ShownSystem, Delivered, BesideDelays):
     """PID controller in ideal form, continuous or discrete; a `control.StateSpace`.
 
     Continuous: ``kp (1 + 1/(ti s) + td s / (tf s + 1))`` from error to plant input. Discrete: the
@@ -159,8 +158,7 @@ class PIDController(Delivered, BesideDelays):
 
     def report(self) -> str:
         """List the parameters and the loop check as plain text."""
-        title, rows, flags = self._card()
-        return text_card(title, rows, flags=flags)
+        return text_card(*self._card())
 
     def _again(self, **changes: Any) -> PIDController:
         settings = {**self._settings(), **changes}
@@ -185,9 +183,6 @@ class PIDController(Delivered, BesideDelays):
     def __deepcopy__(self, memo: dict[int, Any]) -> PIDController:
         return self._again()
 
-    def __repr__(self) -> str:
-        return as_asked(self)
-
     def _repr_eval_(self) -> str:
         parameters = ", ".join(
             f"float('{value!r}')" if np.isinf(value) else repr(value)
@@ -197,10 +192,6 @@ class PIDController(Delivered, BesideDelays):
         settings = self._settings()
         words = ", ".join(f"{key}={settings[key]!r}" for key in ("dt", "method", "rule", "name"))
         return f"PIDController({parameters}, {words})"
-
-    def _repr_info_(self, html: bool = False) -> str:
-        line = self._line()
-        return escape(line) if html else line
 
     def _line(self) -> str:
         words = [f"kp = {self.kp:.4g}"]
@@ -228,7 +219,7 @@ class PIDController(Delivered, BesideDelays):
         return ", ".join(gains)
 
     @in_shown_units
-    def _card(self) -> tuple[str, list[tuple[str, str]], list[str]]:
+    def _card(self) -> Card:
         gain = f"{self.kp:.4g} {self.gain_unit}".rstrip()
         rows = [("type", self.kind), ("rule", self.rule), ("gain kp", gain)]
         if "I" in self.kind:
@@ -246,14 +237,7 @@ class PIDController(Delivered, BesideDelays):
             rows += self.check.rows()
             flags = [str(flag) for flag in self.check.flags]
         rows.append(("to enter it", ".as_form(name), .forms(); .algorithm() has limits and code"))
-        return f"PID controller {self.name}", rows, flags
-
-    def _repr_html_(self) -> str:
-        title, rows, flags = self._card()
-        return html_card(title, rows, flags=flags)
-
-    def _repr_markdown_(self) -> None:
-        return None
+        return Card(f"PID controller {self.name}", rows, flags=flags)
 
 
 def _rebuild(parameters: tuple[float, ...], settings: dict[str, Any]) -> PIDController:
