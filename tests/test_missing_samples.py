@@ -134,7 +134,7 @@ def test_rows_without_samples_change_nothing(pole):
     fine[::3] = y
     finer = cr.Record(DT / 3 * np.arange(1798), np.repeat(u, 3)[:1798], fine, missing="keep")
     other = cr.identify(finer, structures=[(2, 2)]).fit
-    assert other.estimate.whitened == plain.estimate.whitened == bool(pole)
+    assert other.estimate.residual.whitened == plain.estimate.residual.whitened == bool(pole)
     # bins are chosen on the grid, so that they are not the same
     assert_allclose(other.dead_time, plain.dead_time, atol=0.1 * plain.std_given_structure)
     assert_allclose(other.interval, plain.interval, atol=0.2 * plain.std_given_structure)

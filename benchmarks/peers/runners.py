@@ -59,7 +59,7 @@ def reasons(fit: Any) -> tuple[str, ...]:
     if followed.by_closest - followed.complete > WORTH_A_WORD:
         order, degree = followed.closest.order, followed.closest.relative_degree
         words.append(f"order {order}, relative degree {degree}: {followed.by_closest:.1f} %")
-    if fit.estimate.noise_lags:
+    if fit.estimate.residual.noise_lags:
         words.append("the residual is coloured, and slow errors weigh less")
     words.append("residual at noise level" if fit.at_noise_level else "no structure is adequate")
     return tuple(words)

@@ -153,9 +153,11 @@ def fit_joint(
     estimate = replace(
         estimate,
         adequate=first.at_noise_level and not agreed.contradicts,
-        residual=first.residual * growth,
-        correlation=first.correlation,
-        normalized_rms=first.normalized_rms * growth,
+        residual=estimate.residual._replace(
+            std=first.residual * growth,
+            normalized_rms=first.normalized_rms * growth,
+            correlation=first.correlation,
+        ),
         better=first.better,
     )
     result = JointFit(

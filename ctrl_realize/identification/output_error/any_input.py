@@ -162,7 +162,7 @@ def _summary(
     length = max(y.size for y in data.outputs) * data.dt
     flags = sampled_flags(fit, data.dt, length, limit) + _cut(records, used, found) + flags
     span = sum(data.lengths) * data.dt
-    joined = bare_data(np.concatenate(data.measured), signal, data.dt, fit.residual, span)
+    joined = bare_data(np.concatenate(data.measured), signal, data.dt, fit.residual.std, span)
     fit = replace(fit, fitted=np.concatenate(found.fitted))
     sums = found.condensed
     reasons: tuple[str, ...] = ()

@@ -78,7 +78,7 @@ def checked(fit: OutputErrorFit, *, alone: bool = True) -> OutputErrorFit:
             low = max(low - hold, 0.0)
         if stepped:
             flags += _earlier_input(fit, codes)
-        white = bool(fit.estimate.noise_lags)
+        white = bool(fit.estimate.residual.noise_lags)
         coloured = alone and complete and (white or "coloured_residual" in codes)
         step = generalised_step(fit, shown.output, shown.drive) if coloured else None
         if step is not None:

@@ -40,7 +40,7 @@ def sampled_flags(
         found.append(
             Flag(
                 "coloured_residual",
-                f"{fit.correlation:.3g} neighbouring samples of the residual carry the "
+                f"{fit.residual.correlation:.3g} neighbouring samples of the residual carry the "
                 "information of one independent sample: coloured disturbances, or unmodelled "
                 "dynamics; the interval is widened accordingly",
             )
@@ -113,7 +113,11 @@ def _apparent(fit: OutputErrorEstimate) -> Flag | None:
 
 def _parameter_bound(fit: OutputErrorEstimate) -> Flag | None:
     """Report that parameters of a process model ended at a bound that was asked for."""
-    asked = () if fit.form is None else tuple(n for n in fit.at_bound if n in fit.form.bounds)
+    asked = (
+        ()
+        if fit.process.form is None
+        else tuple(n for n in fit.process.at_bound if n in fit.process.form.bounds)
+    )
     if not asked:
         return None
     return Flag(
@@ -140,8 +144,8 @@ def _misfit(fit: OutputErrorEstimate) -> Flag | None:
     return Flag(
         "structured_misfit",
         "no model fits down to the noise level (the residual, averaged over bins, is "
-        f"{plainly(fit.normalized_rms, 2)} times the noise): the plant is nonlinear or has "
-        "unmodelled dynamics; "
+        f"{plainly(fit.residual.normalized_rms, 2)} times the noise): "
+        "the plant is nonlinear or has unmodelled dynamics; "
         + (
             "the dead time is the median of five delay estimates and the interval is their range"
             if fit.delay_estimates
@@ -182,7 +186,9 @@ def _near(fit: OutputErrorEstimate, delay: float) -> bool:
 def _nothing(dt: float, fit: OutputErrorEstimate) -> Flag | None:
     if fit.low > _SAMPLES_BESIDE_NOTHING * dt:
         return None
-    if fit.form is not None and (not fit.form.dead_time or "dead_time" in fit.form.fixed):
+    if fit.process.form is not None and (
+        not fit.process.form.dead_time or "dead_time" in fit.process.form.fixed
+    ):
         return None
     return Flag(
         "no_delay_resolved", f"a model without dead time fits as well (up to {in_time(fit.high)})"
@@ -190,7 +196,7 @@ def _nothing(dt: float, fit: OutputErrorEstimate) -> Flag | None:
 
 
 def _many_lags(fit: OutputErrorEstimate, firm: str) -> Flag | None:
-    if not fit.endless:
+    if not fit.distributed.endless:
         return None
     return Flag(
         "many_lags",
@@ -201,15 +207,15 @@ def _many_lags(fit: OutputErrorEstimate, firm: str) -> Flag | None:
 
 def _dispersed(fit: OutputErrorEstimate) -> Flag | None:
     """Report that axial dispersion explains the response better than lags."""
-    flow = min(fit.flows, key=lambda flow: flow.delta_bic, default=None)
-    if flow is None or (flow.delta_bic >= 0 and not fit.follows_flow):
+    flow = min(fit.distributed.flows, key=lambda flow: flow.delta_bic, default=None)
+    if flow is None or (flow.delta_bic >= 0 and not fit.distributed.follows_flow):
         return None
     behind = f" and a lag of {in_time(flow.lag)}" if flow.lag else ""
     kind = (
         f"an axial-dispersion model (mean residence time {in_time(flow.mean)}, Peclet number "
         f"{flow.peclet:.2g}{behind})"
     )
-    if fit.follows_flow:
+    if fit.distributed.follows_flow:
         return Flag(
             "dispersed_flow",
             f"{kind} fits the response clearly better than a transfer function with lags: the "
@@ -244,7 +250,7 @@ def _only_total(fit: OutputErrorEstimate) -> str:
 
 
 def _inverse(fit: OutputErrorEstimate) -> Flag | None:
-    if fit.follows_flow:
+    if fit.distributed.follows_flow:
         # Right half-plane zeros delay the onset, as dispersion does.
         return None
     zeros = np.roots(fit.numerator[::-1])
@@ -302,5 +308,5 @@ def _disturbances(data: StepData, fit: OutputErrorEstimate) -> list[Flag | None]
                 "noise: averaging does not remove the quantisation error",
             )
         )
-    noise = max(fit.residual, data.sigma) if fit.adequate else None
+    noise = max(fit.residual.std, data.sigma) if fit.adequate else None
     return flags + outliers(data.output, fit.fitted, noise)

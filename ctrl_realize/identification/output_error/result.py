@@ -214,7 +214,7 @@ class OutputErrorFit(FractionalDelayFit):
         fit, and for lags that follow a law (many equal lags, axial dispersion).
         """
         return with_intervals(
-            self.estimate.parameters,
+            self.estimate.process.parameters,
             gain_unit(self.output_unit, self.input_unit),
             gain=(self.gain, self.gain_std_given_structure, self.gain_interval),
             dead_time=(self.std_given_structure, self.interval),
@@ -230,7 +230,7 @@ class OutputErrorFit(FractionalDelayFit):
     @property
     def normalized_rms(self) -> float:
         """Residual divided by noise, for means over bins of samples."""
-        return self.estimate.normalized_rms
+        return self.estimate.residual.normalized_rms
 
     @property
     def noise(self) -> float:
@@ -240,12 +240,12 @@ class OutputErrorFit(FractionalDelayFit):
     @property
     def residual(self) -> float:
         """Standard deviation of the residual."""
-        return self.estimate.residual
+        return self.estimate.residual.std
 
     @property
     def correlation(self) -> float:
         """Number of residual samples that count as one independent sample."""
-        return self.estimate.correlation
+        return self.estimate.residual.correlation
 
     @property
     def delay_estimates(self) -> dict[str, float]:

@@ -72,11 +72,11 @@ def _choices(fit: OutputErrorEstimate) -> tuple[str, ...]:
     s = fit.structure
     simple = " with up to three poles" if fit.robust else ""
     kind = (
-        model_words(fit.chain)
-        if fit.chain
+        model_words(fit.distributed.chain)
+        if fit.distributed.chain
         else f"order {s.order}, relative degree {s.relative_degree}"
     )
-    if fit.follows_flow:
+    if fit.distributed.follows_flow:
         reasons = [
             "dead time: that of an axial-dispersion model, which fits clearly better than "
             f"all {len(fit.structures)} structures; {kind}: approximates it with the fewest "
@@ -89,13 +89,13 @@ def _choices(fit: OutputErrorEstimate) -> tuple[str, ...]:
             if len(fit.structures) > 1
             else f"{kind}: the only structure that was tried"
         ]
-    if fit.form is not None:
-        reasons = [f"{form_words(fit.form)}: as requested"]
+    if fit.process.form is not None:
+        reasons = [f"{form_words(fit.process.form)}: as requested"]
     reasons += _closest(fit)
-    if fit.rounded is not None and not fit.delay_estimates:
+    if fit.residual.rounded is not None and not fit.delay_estimates:
         reasons.append(
             "dead time and model: maximum likelihood of the rounded samples, with noise of "
-            f"{fit.rounded:.3g} before rounding"
+            f"{fit.residual.rounded:.3g} before rounding"
         )
     if fit.delay_estimates:
         why = (
@@ -112,20 +112,20 @@ def _choices(fit: OutputErrorEstimate) -> tuple[str, ...]:
             "interval widened towards the visible onset: with a zero in the model, the onset "
             "of the response is not identifiable"
         )
-    if fit.whitened:
+    if fit.residual.whitened:
         reasons.append(
             "the noise before the step is coloured: generalised least squares with an "
-            f"autoregressive noise model, instead of counting {fit.correlation:.3g} samples "
-            "as one"
+            f"autoregressive noise model, instead of counting {fit.residual.correlation:.3g} "
+            "samples as one"
         )
-    elif fit.noise_lags:
+    elif fit.residual.noise_lags:
         reasons.append(
             "the residual is coloured: generalised least squares with an autoregressive noise "
-            f"model of order {fit.noise_lags}"
+            f"model of order {fit.residual.noise_lags}"
         )
-    elif fit.correlation > 1:
+    elif fit.residual.correlation > 1:
         reasons.append(
-            f"the residual is correlated: {fit.correlation:.3g} samples count as one "
+            f"the residual is correlated: {fit.residual.correlation:.3g} samples count as one "
             "independent sample"
         )
     return tuple(reasons)
@@ -151,14 +151,14 @@ def _closest(fit: OutputErrorEstimate) -> list[str]:
 def _interval_of(fit: OutputErrorEstimate) -> str:
     """Describe the interval: structures, and other models that extend it."""
     ends = [line.interval for line in fit.structures if line.interval is not None]
-    if fit.form is not None:
+    if fit.process.form is not None:
         return "interval: profile likelihood of the process models that the data cannot rule out"
     parts = [f"{len(ends)} structure(s)"] if ends else []
     low = min((end[0] for end in ends), default=np.inf)
     high = max((end[1] for end in ends), default=-np.inf)
     parts += [
         f"{model_words(model)} ({interval_in_time(first, last)})"
-        for model, first, last in fit.other_models
+        for model, first, last in fit.distributed.not_ruled_out
         if first < low or last > high
     ]
     return f"interval: profile likelihood of {', '.join(parts)} that the data cannot rule out"

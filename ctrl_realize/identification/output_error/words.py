@@ -62,7 +62,7 @@ def form_words(form: ProcessForm) -> str:
 def structure_words(fit: OutputErrorEstimate) -> str:
     """Name the structure of a model, or the process model that was prescribed."""
     plain = f"order {fit.structure.order}, relative degree {fit.structure.relative_degree}"
-    return plain if fit.form is None else f"{form_words(fit.form)} ({plain})"
+    return plain if fit.process.form is None else f"{form_words(fit.process.form)} ({plain})"
 
 
 def total_in_words(total: float, interval: tuple[float, float], flags: Iterable[Flag]) -> str:

@@ -80,8 +80,8 @@ def step_part(data: StepData, fit: OutputErrorEstimate, latest: float | None) ->
     calm = fit.fitted + np.clip(data.output - fit.fitted, -limit, limit)
     part = window(replace(data, output=calm), calm.size, KnownFactor())
     rounding = data.quantum / np.sqrt(12) if is_coarse(data.sigma, data.quantum) else 0.0
-    variance = fit.residual**2 + rounding**2
-    variance *= weighted_correlation(fit.correlation, part.counted)
+    variance = fit.residual.std**2 + rounding**2
+    variance *= weighted_correlation(fit.residual.correlation, part.counted)
     problem, own = part.problem, part.own
     if own is not None and problem.segments is not None:
         # Before the middle of the first bin a free response was not seen: that of a fast pole,
@@ -90,7 +90,7 @@ def step_part(data: StepData, fit: OutputErrorEstimate, latest: float | None) ->
     return RecordPart(
         replace(problem, root_weight=problem.root_weight / np.sqrt(variance)),
         step_scales(data, calm.size, latest),
-        (calm.size - part.start) / fit.correlation,
+        (calm.size - part.start) / fit.residual.correlation,
         part.drive,
         part.columns,
         own,

@@ -44,8 +44,8 @@ def pinned(found: OutputErrorEstimate, data: StepData, whole: WindowFit) -> floa
     So it may be where the residual is quantised, or correlated in a way that is not known.
     """
     white = not data.coarse and whole.correlation == 1.0
-    lags = found.chain is None and not found.follows_flow
-    if white or found.whitened or not lags or found.low > whole.scales.earliest:
+    lags = found.distributed.chain is None and not found.distributed.follows_flow
+    if white or found.residual.whitened or not lags or found.low > whole.scales.earliest:
         return np.inf
     return float((found.dead_time - found.low) / max(_PINNED * (found.high - found.low), SMALLEST))
 
@@ -85,7 +85,9 @@ def moved(
         followed=followed_by(whole, fixed, state.numerator[0]),
         static=whole.static(fixed),
         delay_estimates=views,
-        parameters=process_parameters(
-            fixed.poles, state.numerator[0], dead_time, whole.scales.length
+        process=found.process._replace(
+            parameters=process_parameters(
+                fixed.poles, state.numerator[0], dead_time, whole.scales.length
+            )
         ),
     )

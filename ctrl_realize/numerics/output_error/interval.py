@@ -39,7 +39,14 @@ from ..separable.window import WindowFit
 from .friction import latest_slip
 from .margins import CloseDecision, close_choices, close_exclusions
 from .profiles import Profile, curves, laid_profiles, lower_minima, solved_profiles
-from .result import DelayInterval, OtherModel, OutputErrorEstimate, StructureFit, assembled
+from .result import (
+    DelayInterval,
+    DistributedLags,
+    OtherModel,
+    OutputErrorEstimate,
+    StructureFit,
+    assembled,
+)
 from .selection import Choice, choose_model
 
 _UNSEEN = 3.0
@@ -106,19 +113,18 @@ def likelihood_fit(
         own_structure = chosen.structure
         close += close_choices(whole, choice.level, own_structure)
         close += close_exclusions(whole, _charged_level(whole, choice), own_structure)
-    parameters = found.parameters
+    process = found.process
     if choice.chain is not None or choice.flow is not None:
-        parameters = without_errors(parameters)
+        process = process._replace(parameters=without_errors(process.parameters))
+    distributed = DistributedLags(
+        choice.chain,
+        endless,
+        tuple(flow for flow, _ in kept.flows),
+        choice.flow is not None,
+        tuple(others),
+    )
     return replace(
-        found,
-        parameters=parameters,
-        chain=choice.chain,
-        other_models=tuple(others),
-        endless=endless,
-        open_start=open_start,
-        flows=tuple(flow for flow, _ in kept.flows),
-        follows_flow=choice.flow is not None,
-        close=close,
+        found, process=process, distributed=distributed, open_start=open_start, close=close
     )
 
 

@@ -29,7 +29,14 @@ from ..signals.correlation import fit_percent
 from ..signals.noise import correlation_time
 from .interval import likelihood_fit
 from .margins import CloseDecision
-from .result import DelayInterval, Followed, OutputErrorEstimate, StructureFit, assembled
+from .result import (
+    DelayInterval,
+    Followed,
+    OutputErrorEstimate,
+    ProcessEstimate,
+    StructureFit,
+    assembled,
+)
 
 IsNoise = Callable[[float, float], bool]
 """Whether a residual counts as noise: of its normalised rms and its correlation time."""
@@ -64,7 +71,7 @@ def process_fit(
             whole, adequate=adequate, relaxing=relaxing, better=better, near=near
         )
         form = next(form for form in forms if form.structure == found.structure)
-        return replace(found, form=form)
+        return replace(found, process=found.process._replace(form=form))
     fits = [_fitted(whole, form) for form in forms]
     values = [_criterion(whole, fit) for fit in fits]
     best = int(np.argmin(values))
@@ -104,15 +111,13 @@ def process_fit(
         numerator=chosen.numerator,
         fitted=fitted,
         followed=_followed(whole, chosen, fitted),
-        normalized_rms=rms,
-        residual=float(np.sqrt(np.mean(error**2))),
-        correlation=correlation,
+        residual=found.residual._replace(
+            std=float(np.sqrt(np.mean(error**2))), normalized_rms=rms, correlation=correlation
+        ),
         static=_static(whole, chosen),
         alike=(),
         structures=_table(fits, values, ends=dict(zip(map(id, kept), ends, strict=True))),
-        parameters=chosen.parameters,
-        form=chosen.form,
-        at_bound=chosen.at_bound,
+        process=ProcessEstimate(chosen.parameters, chosen.form, chosen.at_bound),
         close=near,
     )
 

@@ -130,29 +130,70 @@ class DelayInterval(NamedTuple):
         )
 
 
+class Residual(NamedTuple):
+    """What the model leaves of the output, and what was assumed about its noise.
+
+    `std` is its standard deviation, `normalized_rms` that over the noise in means over bins,
+    `correlation` the number of samples that count as one. `whitened`: coloured noise was whitened
+    with its model from before the step; `noise_lags` is the order of the noise model of an input
+    other than a step. `rounded` is the noise before rounding, if the model is that of the
+    likelihood of rounded data.
+    """
+
+    std: float
+    normalized_rms: float
+    correlation: float
+    whitened: bool = False
+    noise_lags: int = 0
+    rounded: float | None = None
+
+
+class DistributedLags(NamedTuple):
+    """What models with many lags say: chains of equal lags, and axial dispersion.
+
+    `chain` is the chain of lags that the model is, if it is one; `endless`: chains fit the better
+    the longer they are, so that all of the dead time may be lags. `flows` are dispersion models
+    that are not ruled out; with `follows_flow` the dead time is that of the best of them, and the
+    model approximates it. `not_ruled_out` are models with their intervals that are not in the table
+    of structures.
+    """
+
+    chain: LagChain | None = None
+    endless: bool = False
+    flows: tuple[DispersedFlow, ...] = ()
+    follows_flow: bool = False
+    not_ruled_out: tuple[OtherModel, ...] = ()
+
+
+_PLAIN_LAGS = DistributedLags()
+
+
+class ProcessEstimate(NamedTuple):
+    """The model as a process model: its parameters, with standard errors if they are known.
+
+    `form` is the form that was prescribed, if it is not a plain structure, and `at_bound` lists its
+    parameters that are at a bound.
+    """
+
+    parameters: tuple[ProcessParameter, ...]
+    form: ProcessForm | None = None
+    at_bound: tuple[str, ...] = ()
+
+
 @dataclass(frozen=True, eq=False)
 class OutputErrorEstimate:
     """Dead time and model of one record; see the rule in `output_error`.
 
     ``low <= dead_time <= high``. `delay_estimates` are (key, dead time), empty where the dead time
     is that of the likelihood. The model is exp(-L s) b(s) / a(s), L the dead time: `numerator`
-    lists b from the lowest power on, `poles` are the roots of the monic a. `normalized_rms` is
-    residual over noise in means over bins; `adequate` tells that the residual counts as noise.
-    `chain`: the chain of lags that the model is, if it is one; `endless`: chains of lags fit the
-    better the longer they are, so that all of it may be lags; `open_start`: how smoothly the
-    response begins is open; `relaxing`: the plant was moving before the step, and its free response
-    was fitted along. `flows` that disperse are not ruled out; with `follows_flow` the dead time is
-    that of the best of them, and the lags behind it follow it. `other_models` are those that are
-    not in the table of structures and not ruled out. `std` is that of the chosen structure.
-    `whitened`: coloured noise was made white, by what it is at rest. `static` is the gain of the
-    model, `alike` those of the other structures that are not ruled out and resolve one, each with
-    its evidence over the model's. `better` is a structure that rules out those that were asked for;
-    `close` are decisions that rounding may turn. `parameters` are those of the model as a process
-    model, with standard errors where they are those of a likelihood. `rounded` is the noise before
-    rounding, if the model is that of the likelihood of rounded data. `form` is the form that was
-    prescribed, if it is no plain structure, and `at_bound` its parameters that are at a bound.
-    `noise_lags` is the order of the noise model by which the residual of an input other than a step
-    was made white, and `unweighted` the least-squares model before.
+    lists b from the lowest power on, `poles` are the roots of the monic a. `std` is the standard
+    error of the dead time for the chosen structure. `adequate`: the residual is at noise level.
+    `open_start`: the relative degree, and with it the onset, is not identifiable; `relaxing`: the
+    plant was moving before the step, and its free response was fitted as well. `static` is the gain
+    of the model, `alike` those of the other structures that are not ruled out and resolve one, each
+    with its evidence over the model's. `better` is a structure that rules out those that were
+    requested; `close` are decisions that rounding errors may reverse. `unweighted` is the model of
+    plain least squares, if the residual was whitened.
     """
 
     dead_time: float
@@ -163,32 +204,21 @@ class OutputErrorEstimate:
     poles: ComplexArray
     numerator: FloatArray
     adequate: bool
-    normalized_rms: float
-    residual: float
-    correlation: float
+    residual: Residual
     structures: tuple[StructureFit, ...]
     delay_estimates: tuple[tuple[RobustKey, float], ...]
     fitted: FloatArray
     followed: Followed
     profile: Profile
     latest: float
-    chain: LagChain | None = None
-    endless: bool = False
+    process: ProcessEstimate
     open_start: bool = False
     relaxing: bool = False
-    flows: tuple[DispersedFlow, ...] = ()
-    other_models: tuple[OtherModel, ...] = ()
-    follows_flow: bool = False
-    whitened: bool = False
+    distributed: DistributedLags = _PLAIN_LAGS
     static: StaticGain | None = None
     alike: tuple[tuple[StaticGain, float], ...] = ()
     better: StructureFit | None = None
     close: tuple[CloseDecision, ...] = ()
-    rounded: float | None = None
-    parameters: tuple[ProcessParameter, ...] = ()
-    form: ProcessForm | None = None
-    at_bound: tuple[str, ...] = ()
-    noise_lags: int = 0
     unweighted: UnweightedModel | None = None
 
     @property
@@ -279,9 +309,9 @@ def assembled(
         poles=chosen.poles,
         numerator=numerator,
         adequate=adequate,
-        normalized_rms=whole.normalized_rms,
-        residual=whole.sigma,
-        correlation=whole.correlation,
+        residual=Residual(
+            whole.sigma, whole.normalized_rms, whole.correlation, whole.colour is not None
+        ),
         structures=_table(whole, profiles),
         delay_estimates=delay_estimates,
         fitted=whole.window.predict(whole.problem, chosen),
@@ -289,11 +319,10 @@ def assembled(
         profile=profile,
         latest=whole.scales.latest,
         relaxing=relaxing,
-        whitened=whole.colour is not None,
         static=static,
         alike=tuple((other, weight) for other, weight in alike if other.resolved),
         better=better,
-        parameters=fitted_parameters(
-            whole.problem, chosen, numerator, whole.variance, whole.scales.length
+        process=ProcessEstimate(
+            fitted_parameters(whole.problem, chosen, numerator, whole.variance, whole.scales.length)
         ),
     )

@@ -53,7 +53,8 @@ def in_rounded_data(
     time for its structure.
     """
     window, scales = whole.window, whole.scales
-    special = found.chain is not None or found.follows_flow or found.whitened
+    many = found.distributed
+    special = many.chain is not None or many.follows_flow or found.residual.whitened
     special |= found.structure.zeros > 0
     if special or window.own is not None or window.output.size > _LONGEST:
         return found
@@ -73,9 +74,11 @@ def in_rounded_data(
         fitted=best.model,
         static=whole.static(best.candidate),
         followed=followed_by(whole, best.candidate, numerator),
-        rounded=best.noise,
-        parameters=fitted_parameters(
-            whole.problem, best.candidate, numerator, whole.variance, scales.length
+        residual=found.residual._replace(rounded=best.noise),
+        process=found.process._replace(
+            parameters=fitted_parameters(
+                whole.problem, best.candidate, numerator, whole.variance, scales.length
+            )
         ),
     )
 

@@ -287,7 +287,9 @@ def _robust_fit(
     interval = DelayInterval(low, high, (high - low) / (2 * Z_95))
     own = profiles[chosen.structure]
     found = assembled(whole, fixed, False, views, profiles, interval, own, relaxing=relaxing)
-    return replace(found, parameters=without_errors(found.parameters))
+    return replace(
+        found, process=found.process._replace(parameters=without_errors(found.process.parameters))
+    )
 
 
 def _fit_until(

@@ -61,6 +61,6 @@ def test_the_dead_time_of_a_coarse_converter_is_known_to_a_third_of_a_sample():
         fit = cr.fit_output_error(record, structures=[(2, 2)]).fit
         assert any("rounded samples" in choice for choice in fit.choices)
         assert fit.interval[0] <= truth <= fit.interval[1]
-        assert fit.estimate.rounded == pytest.approx(0.1 * STEP, rel=0.3)
+        assert fit.estimate.residual.rounded == pytest.approx(0.1 * STEP, rel=0.3)
         errors.append(fit.dead_time - truth)
     assert np.sqrt(np.mean(np.square(errors))) < 0.3

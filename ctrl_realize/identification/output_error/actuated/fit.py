@@ -15,7 +15,13 @@ from ....numerics.actuated.errors import Errors, propagated
 from ....numerics.actuated.records import MOST_MOVES, ActuatedRecord, actuated_record
 from ....numerics.arrays import FloatArray, IntArray
 from ....numerics.output_error.any_input.fit import WHITE
-from ....numerics.output_error.result import Followed, OutputErrorEstimate, StructureFit
+from ....numerics.output_error.result import (
+    DistributedLags,
+    Followed,
+    OutputErrorEstimate,
+    Residual,
+    StructureFit,
+)
 from ....numerics.output_error.step_data import bare_data, own_regressors
 from ....numerics.output_error.step_fit import ADEQUATE
 from ....numerics.separable.local_terms import Segments, local_columns
@@ -245,28 +251,19 @@ def _estimate(
         poles=found.poles,
         numerator=found.numerator,
         adequate=bool(adequate),
-        normalized_rms=misfit,
-        residual=mad_sigma(measured - fitted),
-        correlation=found.correlation,
+        residual=Residual(mad_sigma(measured - fitted), misfit, found.correlation),
         structures=(row,),
         delay_estimates=(),
         fitted=fitted,
         followed=Followed(complete, complete, structure, complete),
         profile=profile,
-        chain=None,
-        endless=False,
         open_start=False,
-        flows=(),
-        other_models=(),
-        follows_flow=False,
-        whitened=False,
+        distributed=DistributedLags(),
         static=errors.static,
         alike=(),
         better=None,
         close=(),
-        rounded=None,
-        parameters=errors.parameters,
-        noise_lags=0,
+        process=result.estimate.process._replace(parameters=errors.parameters),
         unweighted=None,
     )
 

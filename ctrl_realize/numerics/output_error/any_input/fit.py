@@ -164,12 +164,14 @@ def fit_sampled(
         fit = replace(fit, fitted=_on_stretch(data, fit, factor))
     elif part.noise.size > 1:
         fit = replace(_of_measured(part, fit), unweighted=unweighted)
-    elif fit.chain:
+    elif fit.distributed.chain:
         left = correlation_time(whole.window.output - fit.fitted)
-        fit = replace(fit, correlation=left, adequate=left <= WHITE)
-    fit = replace(fit, close=fit.close + close_to("adequate", fit.correlation, WHITE))
+        fit = replace(fit, residual=fit.residual._replace(correlation=left), adequate=left <= WHITE)
+    correlation = fit.residual.correlation
     # There is no baseline for the noise; correlation is estimated from means over bins.
-    fit = replace(fit, normalized_rms=float(np.sqrt(fit.correlation)))
+    residual = fit.residual._replace(normalized_rms=float(np.sqrt(correlation)))
+    close = fit.close + close_to("adequate", correlation, WHITE)
+    fit = replace(fit, residual=residual, close=close)
     parts = np.split(fit.fitted, data.edges[1:-1])
     return SampledFit(
         fit,
@@ -194,8 +196,9 @@ def _of_measured(part: SampledWindow, fit: OutputErrorEstimate) -> OutputErrorEs
         fit,
         fitted=fitted,
         followed=followed._replace(complete=complete),
-        residual=winsorised_sigma(window.output - fitted, 0.0),
-        noise_lags=part.noise.size - 1,
+        residual=fit.residual._replace(
+            std=winsorised_sigma(window.output - fitted, 0.0), noise_lags=part.noise.size - 1
+        ),
     )
 
 
