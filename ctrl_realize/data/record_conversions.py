@@ -1,0 +1,227 @@
+"""Records from other objects and back: tables of pandas, responses of python-control, samples."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any, Self
+
+import control as ct
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..errors import DataError
+from ..numerics.arrays import FloatArray
+from ..results import Drawable
+from .frames import frame_of_signals, signals_of_frame
+from .irregular import on_one_axis
+from .resampling import resampled
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+
+class RecordConversions(Drawable):
+    """Constructors of a record, and what it can be converted to."""
+
+    __slots__ = ()
+
+    time: FloatArray
+    input: FloatArray
+    output: FloatArray
+    name: str
+    input_labels: tuple[str, ...]
+    output_labels: tuple[str, ...]
+
+    def __init__(self, time: ArrayLike, input: ArrayLike, output: ArrayLike, **labels: Any) -> None:
+        raise NotImplementedError
+
+    @classmethod
+    def from_frame(
+        cls,
+        frame: pd.DataFrame,
+        *,
+        input: str | Sequence[str],
+        output: str | Sequence[str],
+        time: str | None = None,
+        **options: Any,
+    ) -> Self:
+        """Make a record from a pandas table.
+
+        Parameters
+        ----------
+        frame : pandas.DataFrame
+        input, output : str or sequence of str
+            Columns of the signals; their names become the labels.
+        time : str, optional
+            Column of time; default: the index. Dates (a `DatetimeIndex`) and durations are
+            counted in s from the first row, numbers are s.
+        **options
+            Further arguments of `Record`. With ``missing="keep"``, missing values are kept.
+
+        Raises
+        ------
+        OptionError
+            The table has no such column.
+        DataError, TimeAxisError
+            As for `Record`.
+
+        Examples
+        --------
+        >>> import pandas as pd
+        >>> import ctrl_realize as cr
+        >>> when = pd.date_range("2025-02-01 08:15", periods=5, freq="10s")
+        >>> frame = pd.DataFrame({"OP": [0, 0, 1, 1, 1], "PV": [5.0, 5, 5, 6, 7]}, index=when)
+        >>> cr.Record.from_frame(frame, input="OP", output="PV").dt
+        10.0
+        """
+        *signals, inputs, outputs = signals_of_frame(frame, input, output, time)
+        labels = {"input_labels": inputs, "output_labels": outputs}
+        return cls(*signals, **labels | options)
+
+    def to_frame(self, start: Any = None) -> pd.DataFrame:
+        """Convert the record to a pandas table with a column for each signal.
+
+        Parameters
+        ----------
+        start : str, datetime or pandas.Timestamp, optional
+            Date and time of time 0. The index is then a `DatetimeIndex`; default: time in s.
+
+        Examples
+        --------
+        >>> import ctrl_realize as cr
+        >>> print(cr.Record([0, 1, 2], [0, 1, 1], [5, 5, 6]).to_frame())
+                u    y
+        time
+        0.0   0.0  5.0
+        1.0   1.0  5.0
+        2.0   1.0  6.0
+        """
+        rows = np.concatenate([np.atleast_2d(self.input), np.atleast_2d(self.output)])
+        return frame_of_signals(self.time, rows, (*self.input_labels, *self.output_labels), start)
+
+    @classmethod
+    def resampled(
+        cls,
+        time: ArrayLike,
+        input: ArrayLike,
+        output: ArrayLike,
+        *,
+        dt: float | None = None,
+        max_jitter: float = 0.5,
+        **labels: Any,
+    ) -> Self:
+        """Make a record from samples with time jitter, by linear interpolation.
+
+        An input that holds its levels (most of its values repeat the one before) is not
+        interpolated: it has the value of the nearest time stamp.
+
+        Parameters
+        ----------
+        time, input, output : array_like
+            As for `Record`, but the time stamps only need to increase.
+        dt : float, optional
+            Sample time of the new axis in s; default: the mean step.
+        max_jitter : float, optional
+            Largest time step, as a relative excess over the median step; a longer step is a gap,
+            across which the signals are not interpolated.
+        **labels
+            Further arguments of `Record`.
+
+        Raises
+        ------
+        TimeAxisError
+            Time that repeats or decreases, or a gap.
+        """
+        return cls(*resampled(time, input, output, dt, max_jitter), **labels)
+
+    @classmethod
+    def from_samples(
+        cls,
+        time: ArrayLike,
+        input: ArrayLike,
+        output: ArrayLike,
+        *,
+        input_time: ArrayLike | None = None,
+        dt: float | None = None,
+        **labels: Any,
+    ) -> Self:
+        """Make a record from samples with gaps or irregular time stamps, without interpolation.
+
+        The time axis is a uniform grid on which each sample has its own row. The output is NaN
+        (missing) in rows without a sample, the input holds its last value.
+
+        Parameters
+        ----------
+        time, input, output : array_like
+            As for `Record`, but the time stamps only need to increase. NaN in the output is
+            missing; where the input is NaN it holds its last value.
+        input_time : array_like, optional
+            Time stamps of the input in s, if they are others than those of the output: a fast
+            input with a slow output, or an input that is stored when it changes.
+        dt : float, optional
+            Step of the grid in s; each sample goes to the nearest row. Default: regular samples
+            keep their step; otherwise the greatest common divisor of the distances between the
+            stamps, or a fiftieth of the usual distance if that would be too fine.
+        **labels
+            Further arguments of `Record`.
+
+        Returns
+        -------
+        Record
+            With ``missing="keep"``. It starts with the first sample of the input.
+
+        Raises
+        ------
+        TimeAxisError
+            Time that repeats or decreases, or two samples in one step.
+
+        Examples
+        --------
+        >>> import ctrl_realize as cr
+        >>> record = cr.Record.from_samples([0, 10, 30, 40], [0, 0, 1, 1], [5, 5, 5, 6])
+        >>> record.dt, record.input.tolist(), record.output.tolist()
+        (10.0, [0.0, 0.0, 0.0, 1.0, 1.0], [5.0, 5.0, nan, 5.0, 6.0])
+        """
+        labels = {"missing": "keep", **labels}
+        return cls(*on_one_axis(time, input, output, input_time, dt), **labels)
+
+    @classmethod
+    def from_response(cls, response: ct.TimeResponseData, *, name: str | None = None) -> Self:
+        """Make a record from a simulated response of python-control that includes its input.
+
+        Examples
+        --------
+        >>> import control as ct
+        >>> import numpy as np
+        >>> import ctrl_realize as cr
+        >>> plant = ct.tf([1], [1, -0.9], 0.1)
+        >>> response = ct.forced_response(plant, 0.1 * np.arange(50), np.ones(50))
+        >>> cr.Record.from_response(response).dt
+        0.1
+        """
+        if response.inputs is None:
+            raise DataError("the response has no input; simulate with ct.forced_response")
+        many = {} if response.issiso else {"input": response.u, "output": response.y}
+        for what, values in many.items():
+            if np.ndim(values) > 2:
+                raise DataError(f"the {what} of the response has several traces; pass one of them")
+        return cls(
+            response.time,
+            many.get("input", np.ravel(response.u)),
+            many.get("output", np.ravel(response.y)),
+            name=(response.sysname or "") if name is None else name,
+            input_labels=response.input_labels,
+            output_labels=response.output_labels,
+        )
+
+    def to_response(self) -> ct.TimeResponseData:
+        """Convert the record to time-response data of python-control."""
+        return ct.TimeResponseData(
+            self.time,
+            self.output,
+            inputs=self.input,
+            issiso=len(self.input_labels) == len(self.output_labels) == 1,
+            sysname=self.name or "record",
+            input_labels=list(self.input_labels),
+            output_labels=list(self.output_labels),
+        )
