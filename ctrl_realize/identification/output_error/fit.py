@@ -11,26 +11,22 @@ import control as ct
 import numpy as np
 
 from ..._checks import one_of, positive
-from ..._wording import named
-from ...data import Record, StepEdge
-from ...data.given import as_records, check_input
+from ...data import Record
 from ...data.shown_units import in_shown_units
 from ...delayed import DelayedStateSpace
-from ...errors import DataError, NoStepError, OptionError
+from ...errors import DataError, OptionError
 from ...numerics.arrays import FloatArray
 from ...numerics.blas_threads import single_threaded
-from ...numerics.constants import SMALLEST
 from ...numerics.output_error.result import OutputErrorEstimate
-from ...numerics.output_error.step_data import StepData, own_regressors, step_data
+from ...numerics.output_error.step_data import own_regressors, step_data
 from ...numerics.output_error.step_fit import fit_step_record
 from ...numerics.parameters.process_form import ProcessForm
 from ...numerics.separable.varpro import KnownFactor, Structure
-from ...numerics.signals.edges import despike, difference_noise
 from ..process_structures import Structures, requested
-from ..step.steps import found_step
 from .actuated.alternatives import ASKED, Asked
 from .actuated.fit import with_actuator
 from .any_input import UnrelatedError, fit_any_input
+from .arguments import checked_records, edges_of, known_factor, step_data_of
 from .averaging import (
     aligned_steps,
     delay_outliers,
@@ -42,7 +38,6 @@ from .averaging import (
 )
 from .checks import checked
 from .flags import fit_flags
-from .known import known_factor
 from .own_gains import fit_own_gains, unlike_records
 from .repeat_flags import repeat_flags, same_record_flags
 from .result import OutputErrorFit
@@ -51,15 +46,6 @@ from .summary import fitted_core, fitted_model, summarise
 Loss = Literal["huber", "least_squares"]
 Noise = Literal["auto", "white"]
 Gains = Literal["common", "own"]
-
-_LAST = 5  # a first step in the last samples of a record has no response to fit
-
-FEWEST_SAMPLES = 20  # four for each of lag, gain, dead time, level and drift
-_MOST_EDGES = 12  # an input with more of them is no step experiment
-_HOLDS = 0.2  # part of the step by which an input may stray between its edges
-_STRAY = 0.01  # part of the first step by which a clean input may stray before it
-_SPIKE = 3  # samples of a spike of the input that do not move a plant
-_DWELL = 3  # times the visible onset: the onsets of faster steps overlap
 
 
 @single_threaded
@@ -212,7 +198,7 @@ def fit_output_error(
     asked = requested(structures)
     limit = None if max_delay is None else positive(max_delay, "max_delay", "number of samples")
     factor = known_factor(known)
-    several = _records(records)
+    several = checked_records(records)
     settings: _Settings = {
         "structures": None if asked is None else asked.structures,
         "forms": () if asked is None else asked.forms,
@@ -260,7 +246,7 @@ def _linear(
     if len(several) == 1:
         return _fit_one(several[0], limit, settings, any_input)[0]
     # If all records are complete step experiments they can be averaged.
-    stepped = all(not record.n_missing and _edges(record) for record in several)
+    stepped = all(not record.n_missing and edges_of(record) for record in several)
     way = _fit_mean if stepped else any_input
     if own_gains:
         start = relative_gains(aligned_steps(several)) if stepped else None
@@ -276,7 +262,7 @@ def _fit_one(
     settings: _Settings,
     any_input: Callable[..., tuple[OutputErrorFit, OutputErrorEstimate]],
 ) -> tuple[OutputErrorFit, OutputErrorEstimate]:
-    data = _step_data(record)
+    data = step_data_of(record)
     if data is None:
         return any_input((record,), limit, settings)
     latest = None if limit is None else limit * record.dt
@@ -318,87 +304,3 @@ def _fit_mean(
     flags = fit_flags(data, fit, limit) + repeat_flags(repeats)
     time = mean.dt * np.arange(-mean.edge, mean.output.size - mean.edge, dtype=np.float64)
     return summarise(fit, data, time, records, flags, repeatability=repeats), fit
-
-
-def _records(records: Record | Sequence[Record]) -> tuple[Record, ...]:
-    several = as_records(records)
-    for record in several:
-        check_input(record, "fit_output_error")
-        seen = int(np.count_nonzero(record.seen))
-        if seen < FEWEST_SAMPLES:
-            raise DataError(
-                f"{named('record', record.name)} has {seen} samples; a fit of delay, "
-                f"gain and lags needs at least {FEWEST_SAMPLES}"
-            )
-        moves = float(np.ptp(record.output[..., record.seen]))
-        if moves < SMALLEST:
-            raise DataError(
-                f"the output of {named('record', record.name)} does not leave its baseline: "
-                f"its range is {moves:.3g}"
-            )
-        if not record.issiso():
-            raise DataError(
-                f"{named('record', record.name)} has {record.ninputs} inputs and "
-                f"{record.noutputs} outputs; select one of each when the record is made"
-            )
-    return several
-
-
-def _step_data(record: Record) -> StepData | None:
-    """Data of a step record; None for any other input."""
-    signal, output = np.ravel(record.input), np.ravel(record.output)
-    edges = _edges(record)
-    if not edges:
-        return None
-    data = step_data(output, signal, record.dt, [(e.index, e.samples) for e in edges])
-    if data.motion is None:
-        raise DataError(
-            f"the output of {named('record', record.name)} does not leave its baseline by 5 "
-            f"standard deviations ({5 * data.sigma:.3g}) for long after the step at "
-            f"{edges[0].time:.6g} s"
-        )
-    if len(edges) > 1 and edges[1].index - edges[0].index < _DWELL * data.motion.crossing:
-        return None
-    return data
-
-
-def _edges(record: Record) -> tuple[StepEdge, ...]:
-    """Edges of a step experiment; none for any other input."""
-    signal = np.ravel(record.input)
-    try:
-        edges = found_step(record, most=_MOST_EDGES).edges
-    except NoStepError:
-        if np.ptp(signal[:-_LAST]) == 0:
-            # It moves only at the very end: there is no response to fit.
-            raise
-        return ()
-    steps = len(edges) <= _MOST_EDGES and not _moves_before(signal, edges[0])
-    return edges if steps and _holds_between(signal, edges) else ()
-
-
-def _moves_before(signal: FloatArray, edge: StepEdge) -> bool:
-    """Whether a clean input moves before its first edge, by less than counts as one.
-
-    The output may then move before the edge, or respond to it from a motion of its own.
-    """
-    before = signal[: edge.index]
-    if before.size <= 2 * _SPIKE or difference_noise(signal) > 0:
-        return False
-    return float(np.ptp(despike(before, _SPIKE))) > _STRAY * abs(edge.amplitude)
-
-
-def _holds_between(signal: FloatArray, edges: Sequence[StepEdge]) -> bool:
-    """Whether an input is nearly constant between edges, for nine samples of ten.
-
-    A sweep or noise may move like an edge, but is not constant afterwards. On measured steps the
-    nine tenths lie within 2 % of the amplitude, on random inputs and sweeps beyond 45 %.
-    """
-    bounds = [0, *(edge.index for edge in edges), signal.size]
-    ramps = [0, *(edge.samples for edge in edges)]
-    away = []
-    for start, stop, ramp in zip(bounds[:-1], bounds[1:], ramps, strict=True):
-        held = signal[min(start + max(ramp - 1, 0), stop) : stop]
-        if held.size:
-            away.append(np.abs(held - np.median(held)))
-    largest = max(abs(edge.amplitude) for edge in edges)
-    return bool(np.quantile(np.concatenate(away), 0.9) <= _HOLDS * largest)

@@ -18,7 +18,8 @@ import numpy as np
 
 from ..arrays import FloatArray
 from ..constants import Z_95
-from ..parameters.process_form import FormFit, ProcessForm, fit_form
+from ..parameters.form_fit import FormFit, fit_form
+from ..parameters.process_form import ProcessForm
 from ..separable.lag_chains import lag_sum
 from ..separable.profile_ends import profile_limits
 from ..separable.static_gain import INTEGRATOR, StaticGain, reached_after

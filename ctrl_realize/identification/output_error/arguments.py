@@ -1,0 +1,164 @@
+"""Arguments of an output-error fit: records, the steps in them, known dynamics."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import control as ct
+import numpy as np
+
+from ..._wording import named
+from ...data import Record, StepEdge
+from ...data.given import as_records, check_input
+from ...errors import DataError, NoStepError, UnsuitableSystemError
+from ...numerics.arrays import FloatArray
+from ...numerics.constants import SMALLEST
+from ...numerics.output_error.step_data import StepData, step_data
+from ...numerics.separable.varpro import KnownFactor
+from ...numerics.signals.edges import despike, difference_noise
+from ..step.steps import found_step
+
+_APART = 1e-3  # relative distance by which coincident poles are separated
+_LAST = 5  # a first step in the last samples of a record has no response to fit
+
+_FEWEST_SAMPLES = 20  # four for each of lag, gain, dead time, level and drift
+_MOST_EDGES = 12  # an input with more of them is no step experiment
+_HOLDS = 0.2  # part of the step by which an input may stray between its edges
+_STRAY = 0.01  # part of the first step by which a clean input may stray before it
+_SPIKE = 3  # samples of a spike of the input that do not move a plant
+_DWELL = 3  # times the visible onset: the onsets of faster steps overlap
+
+
+def known_factor(known: Any) -> KnownFactor:
+    """Convert a continuous, stable, proper system of one input and one output to a factor.
+
+    Raises
+    ------
+    UnsuitableSystemError
+        Anything else.
+    """
+    if known is None:
+        return KnownFactor()
+    if not isinstance(known, (ct.StateSpace, ct.TransferFunction)):
+        raise UnsuitableSystemError(
+            f"known is a {type(known).__name__}; expected a control.TransferFunction or StateSpace"
+        )
+    if not known.issiso() or not known.isctime():
+        raise UnsuitableSystemError(
+            f"known has {known.ninputs} inputs, {known.noutputs} outputs and dt={known.dt}; "
+            "expected a continuous system with one of each (a sensor or a filter)"
+        )
+    zeros, poles, gain = _zeros_poles_gain(known)
+    if zeros.size > poles.size:
+        raise UnsuitableSystemError("known has more zeros than poles; expected a proper system")
+    if poles.size and np.max(poles.real) >= 0:
+        raise UnsuitableSystemError(
+            f"known has a pole at {complex(poles[np.argmax(poles.real)]):.3g} rad/s; expected "
+            "a stable system (count integrators to the plant)"
+        )
+    numerator = np.atleast_1d(np.real(np.poly(zeros))) * gain
+    return KnownFactor(_apart(poles), numerator.astype(np.float64))
+
+
+def _zeros_poles_gain(known: Any) -> tuple[Any, Any, float]:
+    if isinstance(known, ct.TransferFunction):
+        num, den = np.trim_zeros(known.num[0][0], "f"), known.den[0][0]
+        if num.size == 0:
+            raise UnsuitableSystemError("known is zero")
+        return np.roots(num), np.roots(den).astype(np.complex128), float(num[0] / den[0])
+    return _zeros_poles_gain(ct.ss2tf(known))
+
+
+def _apart(poles: Any) -> Any:
+    """Separate coincident poles, because partial fractions need distinct ones."""
+    apart = np.array(poles, dtype=np.complex128)
+    for j in range(1, apart.size):
+        while np.any(np.abs(apart[:j] - apart[j]) < 0.5 * _APART * np.abs(apart[j])):
+            apart[j] *= 1 + _APART
+    return apart
+
+
+def checked_records(records: Record | Sequence[Record]) -> tuple[Record, ...]:
+    """Check what every record of a fit needs: one input, one output, both of which move."""
+    several = as_records(records)
+    for record in several:
+        check_input(record, "fit_output_error")
+        seen = int(np.count_nonzero(record.seen))
+        if seen < _FEWEST_SAMPLES:
+            raise DataError(
+                f"{named('record', record.name)} has {seen} samples; a fit of delay, "
+                f"gain and lags needs at least {_FEWEST_SAMPLES}"
+            )
+        moves = float(np.ptp(record.output[..., record.seen]))
+        if moves < SMALLEST:
+            raise DataError(
+                f"the output of {named('record', record.name)} does not leave its baseline: "
+                f"its range is {moves:.3g}"
+            )
+        if not record.issiso():
+            raise DataError(
+                f"{named('record', record.name)} has {record.ninputs} inputs and "
+                f"{record.noutputs} outputs; select one of each when the record is made"
+            )
+    return several
+
+
+def step_data_of(record: Record) -> StepData | None:
+    """Data of a step record; None for any other input."""
+    signal, output = np.ravel(record.input), np.ravel(record.output)
+    edges = edges_of(record)
+    if not edges:
+        return None
+    data = step_data(output, signal, record.dt, [(e.index, e.samples) for e in edges])
+    if data.motion is None:
+        raise DataError(
+            f"the output of {named('record', record.name)} does not leave its baseline by 5 "
+            f"standard deviations ({5 * data.sigma:.3g}) for long after the step at "
+            f"{edges[0].time:.6g} s"
+        )
+    if len(edges) > 1 and edges[1].index - edges[0].index < _DWELL * data.motion.crossing:
+        return None
+    return data
+
+
+def edges_of(record: Record) -> tuple[StepEdge, ...]:
+    """Edges of a step experiment; none for any other input."""
+    signal = np.ravel(record.input)
+    try:
+        edges = found_step(record, most=_MOST_EDGES).edges
+    except NoStepError:
+        if np.ptp(signal[:-_LAST]) == 0:
+            # It moves only at the very end: there is no response to fit.
+            raise
+        return ()
+    steps = len(edges) <= _MOST_EDGES and not _moves_before(signal, edges[0])
+    return edges if steps and _holds_between(signal, edges) else ()
+
+
+def _moves_before(signal: FloatArray, edge: StepEdge) -> bool:
+    """Whether a clean input moves before its first edge, by less than counts as one.
+
+    The output may then move before the edge, or respond to it from a motion of its own.
+    """
+    before = signal[: edge.index]
+    if before.size <= 2 * _SPIKE or difference_noise(signal) > 0:
+        return False
+    return float(np.ptp(despike(before, _SPIKE))) > _STRAY * abs(edge.amplitude)
+
+
+def _holds_between(signal: FloatArray, edges: Sequence[StepEdge]) -> bool:
+    """Whether an input is nearly constant between edges, for nine samples of ten.
+
+    A sweep or noise may move like an edge, but is not constant afterwards. On measured steps the
+    nine tenths lie within 2 % of the amplitude, on random inputs and sweeps beyond 45 %.
+    """
+    bounds = [0, *(edge.index for edge in edges), signal.size]
+    ramps = [0, *(edge.samples for edge in edges)]
+    away = []
+    for start, stop, ramp in zip(bounds[:-1], bounds[1:], ramps, strict=True):
+        held = signal[min(start + max(ramp - 1, 0), stop) : stop]
+        if held.size:
+            away.append(np.abs(held - np.median(held)))
+    largest = max(abs(edge.amplitude) for edge in edges)
+    return bool(np.quantile(np.concatenate(away), 0.9) <= _HOLDS * largest)
