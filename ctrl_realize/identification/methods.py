@@ -17,6 +17,7 @@ from ..errors import OptionError
 from ..numerics.blas_threads import single_threaded
 
 if TYPE_CHECKING:
+    from .output_error.actuated.alternatives import Asked
     from .process_structures import Structures
 
 # Together the methods are 200 modules, a quarter of the time of importing python-control: each is
@@ -38,7 +39,7 @@ class IdentifyOptions(TypedDict, total=False):
     structures: Structures | None
     include_known: bool
     gains: Literal["common", "own"]
-    actuator: Literal["auto", "slew_rate", "dead_band", "stiction"] | None
+    actuator: Asked | None
     cutoff_hz: float | Literal["auto"] | None
     samples: int | None
     feedthrough: bool | None
@@ -58,7 +59,7 @@ def identify(
     structures: Structures | None = None,
     include_known: bool = False,
     gains: Literal["common", "own"] = "common",
-    actuator: Literal["auto", "slew_rate", "dead_band", "stiction"] | None = None,
+    actuator: Asked | None = None,
     cutoff_hz: float | Literal["auto"] | None = "auto",
     samples: int | None = None,
     feedthrough: bool | None = None,
@@ -140,69 +141,58 @@ def identify(
     (True, 0.125)
     """
     method = one_of(method, "method", METHODS)
-    scan_only = {"cutoff_hz": cutoff_hz != "auto", "samples": samples is not None}
-    scan_only["feedthrough"] = feedthrough is not None
-    fit_only = {"known": known is not None, "structures": structures is not None}
-    fit_only |= {"loss": loss != "huber", "noise": noise != "auto"}
-    fit_only |= {"include_known": include_known, "gains": gains != "common"}
-    fit_only["actuator"] = actuator is not None
-    if frf is not None and method == "output_error":
-        given = [name for name, used in (scan_only | fit_only).items() if used]
-        if strange := [name for name in given if name != "structures"]:
-            raise OptionError(
-                f"{', '.join(strange)}: not an argument with frf; expected order, structures or "
-                "max_delay; fit the records alone with the others"
-            )
+    of_scan = _given(
+        cutoff_hz=cutoff_hz != "auto", samples=samples is not None,
+        feedthrough=feedthrough is not None,
+    )  # fmt: skip
+    of_fit = _given(
+        known=known is not None, structures=structures is not None, loss=loss != "huber",
+        noise=noise != "auto", include_known=include_known, gains=gains != "common",
+        actuator=actuator is not None,
+    )  # fmt: skip
+    other_method = f"an argument of method={method!r}; see the documentation of identify"
+    if method != "output_error":
+        _refuse(of_fit + _given(frf=frf is not None), other_method)
+        return _scanned(method, record, order, max_delay, cutoff_hz, samples, feedthrough)
+    if frf is not None:
+        _refuse(
+            [name for name in of_scan + of_fit if name != "structures"],
+            "an argument with frf; expected order, structures or max_delay; fit the records alone "
+            "with the others",
+        )
         from .joint.fit import fit_joint
 
         return fit_joint(record, frf, structures=_requested(order, structures), max_delay=max_delay)
-    fit_only["frf"] = frf is not None
-    strange = [
-        name
-        for name, given in (scan_only if method == "output_error" else fit_only).items()
-        if given
-    ]
-    if strange:
-        raise OptionError(
-            f"{', '.join(strange)}: not an argument of method={method!r}; see the "
-            "documentation of identify"
+    _refuse(of_scan, other_method)
+    if any(one.ninputs * one.noutputs > 1 for one in as_records(record)):
+        _refuse(
+            of_fit + _given(max_delay=max_delay is not None),
+            "an argument for records of several channels; see fit_state_space",
         )
-    if method == "output_error" and _of_several_channels(record):
-        fit_only |= {"max_delay": max_delay is not None}
-        strange = [name for name, given in fit_only.items() if given]
-        if strange:
-            raise OptionError(
-                f"{', '.join(strange)}: not an argument for records of several channels; see "
-                "fit_state_space"
-            )
         from .state_space_fit.fit import fit_state_space
 
         return fit_state_space(record, order)
-    if method == "output_error":
-        system = fit_records(
-            record,
-            order=order,
-            max_delay=max_delay,
-            known=known,
-            loss=loss,
-            noise=noise,
-            structures=structures,
-            include_known=include_known,
-            gains=gains,
-            actuator=actuator,
-        )
-        from .output_error.result import OutputErrorFit
+    system = fit_records(
+        record, order=order, max_delay=max_delay, known=known, loss=loss, noise=noise,
+        structures=structures, include_known=include_known, gains=gains, actuator=actuator,
+    )  # fmt: skip
+    if known is not None:
+        return system
+    return _modes_judged(system, max_delay, asked=order is not None or structures is not None)
 
-        fit = fit_of(system, OutputErrorFit)
-        if fit.actuator is not None:
-            return system
-        missing = any(record.n_missing for record in fit.records)
-        if np.isfinite(fit.onset) or known is not None or missing:
-            return system
-        from .model_class import with_modes_judged
 
-        asked = order is not None or structures is not None
-        return with_modes_judged(system, max_delay, asked=asked)
+def _given(**used: bool) -> list[str]:
+    """Names of the arguments that were used."""
+    return [name for name, is_used in used.items() if is_used]
+
+
+def _refuse(arguments: Sequence[str], what: str) -> None:
+    if arguments:
+        raise OptionError(f"{', '.join(arguments)}: not {what}")
+
+
+def _scanned(method: str, record: object, *options: Any) -> DelayedStateSpace:
+    """Identify one record by realization."""
     if not isinstance(record, Record):
         raise OptionError(
             f"method={method!r} takes one record; use method='output_error' for several "
@@ -210,12 +200,22 @@ def identify(
         )
     from .scan_methods import by_paper, by_scan
 
-    scan = by_paper if method == "paper" else by_scan
-    return scan(record, order, max_delay, cutoff_hz, samples, feedthrough)
+    return (by_paper if method == "paper" else by_scan)(record, *options)
 
 
-def _of_several_channels(records: Record | Sequence[Record]) -> bool:
-    return any(record.ninputs * record.noutputs > 1 for record in as_records(records))
+def _modes_judged(
+    system: DelayedStateSpace, max_delay: int | None, *, asked: bool
+) -> DelayedStateSpace:
+    """Compare a fit of complete records, none of them a step, with a model of any modes."""
+    from .output_error.result import OutputErrorFit
+
+    fit = fit_of(system, OutputErrorFit)
+    missing = any(record.n_missing for record in fit.records)
+    if fit.actuator is not None or np.isfinite(fit.onset) or missing:
+        return system
+    from .model_class import with_modes_judged
+
+    return with_modes_judged(system, max_delay, asked=asked)
 
 
 def fit_records(
