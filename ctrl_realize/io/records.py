@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 import inspect
-import math
 import os
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
 
-from .._checks import one_of
+from .._checks import one_of, positive
 from ..data import Record
 from ..errors import DataError, OptionError, TimeAxisError
 from .checks import MAX_BYTES
@@ -166,7 +166,7 @@ def read_record(
     >>> record
     <Record 'valve': 3 samples of 0.01 s, 1 input, 1 output>
     """
-    how = _checked(
+    how = _Reading(
         time=time, input=input, output=output, dt=dt, time_unit=time_unit,
         time_format=time_format, delimiter=delimiter, decimal=decimal, encoding=encoding,
         comment=comment, header=header, skip_rows=skip_rows, variable=variable, start=start,
@@ -220,7 +220,7 @@ def read_records(
     """
     given = inspect.signature(read_record).bind(path, **options)
     given.apply_defaults()
-    how = _checked(**{name: value for name, value in given.arguments.items() if name != "path"})
+    how = _Reading(**{name: value for name, value in given.arguments.items() if name != "path"})
     table = read_table(path, how.text, variable=how.variable, max_bytes=how.max_bytes)
     label = Path(path).stem if how.name is None else how.name
     taken = [] if by is None else find_columns(table, by, "by")
@@ -232,7 +232,7 @@ def read_records(
 
 @dataclass(frozen=True)
 class _Reading:
-    """Arguments of `read_record` that concern the signals, checked."""
+    """Arguments of `read_record`, checked."""
 
     time: str | int | None
     input: Selector | None
@@ -240,61 +240,54 @@ class _Reading:
     dt: float | None
     time_unit: str
     time_format: str | None
+    delimiter: str
+    decimal: str
+    encoding: str
+    comment: str | None
+    header: bool | str
+    skip_rows: int
+    variable: str | None
     start: Any
     stop: Any
+    missing: str
+    na_values: Any
+    quality: str | int | None
+    good: Any
     resample: bool
-    rest: tuple[Any, Any] | None
-    rules: Rules
-    holds: bool
-    text: TextOptions
-    variable: str | None
+    rest: Sequence[Any] | None
     name: str | None
     max_bytes: float
 
+    def __post_init__(self) -> None:
+        if self.dt is not None:
+            positive(self.dt, "dt", "sample time in s")
+        if self.treatment != "refuse" and self.resample:
+            raise OptionError(
+                f"missing={self.missing!r} and resample=True exclude each other: expected one of "
+                "them"
+            )
+        if self.rest is not None and (
+            isinstance(self.rest, str) or np.shape(self.rest)[:1] != (2,)
+        ):
+            raise OptionError(f"rest={self.rest!r}; expected input and output in the steady state")
+        _ = self.text, self.rules  # which are checked as well
 
-def _checked(
-    *,
-    time: str | int | None,
-    input: Selector | None,
-    output: Selector | None,
-    dt: float | None,
-    time_unit: str,
-    time_format: str | None,
-    delimiter: str,
-    decimal: str,
-    encoding: str,
-    comment: str | None,
-    header: bool | str,
-    skip_rows: int,
-    variable: str | None,
-    start: Any,
-    stop: Any,
-    missing: str,
-    na_values: Any,
-    quality: str | int | None,
-    good: Any,
-    resample: bool,
-    rest: Any,
-    name: str | None,
-    max_bytes: float,
-) -> _Reading:
-    """Check the arguments of `read_record`."""
-    text = TextOptions(delimiter, decimal, encoding, comment, header, skip_rows)
-    if dt is not None and not (_is_number(dt) and dt > 0 and math.isfinite(dt)):
-        raise OptionError(f"dt={dt!r} must be a positive number of seconds")
-    missing = one_of(missing, "missing", ("refuse", "keep", "hold"))
-    if missing != "refuse" and resample:
-        raise OptionError(
-            f"missing={missing!r} and resample=True exclude each other: expected one of them"
+    @property
+    def treatment(self) -> str:
+        """How missing samples are treated."""
+        return one_of(self.missing, "missing", ("refuse", "keep", "hold"))
+
+    @cached_property
+    def text(self) -> TextOptions:
+        """How to read text."""
+        return TextOptions(
+            self.delimiter, self.decimal, self.encoding, self.comment, self.header, self.skip_rows
         )
-    if rest is not None and (isinstance(rest, str) or np.shape(rest)[:1] != (2,)):
-        raise OptionError(f"rest={rest!r}; expected input and output in the steady state")
-    return _Reading(
-        time, input, output, dt, time_unit, time_format, start, stop, resample,
-        None if rest is None else (rest[0], rest[1]),
-        rules_of(missing != "refuse", na_values, quality, good), missing == "hold", text, variable,
-        name, max_bytes,
-    )  # fmt: skip
+
+    @cached_property
+    def rules(self) -> Rules:
+        """What counts as a missing sample."""
+        return rules_of(self.treatment != "refuse", self.na_values, self.quality, self.good)
 
 
 def _record(table: Table, how: _Reading, name: str, taken: Sequence[int] = ()) -> Record:
@@ -302,7 +295,9 @@ def _record(table: Table, how: _Reading, name: str, taken: Sequence[int] = ()) -
     samples, labels = _samples(table, how, taken)
     labels["name"] = name
     try:
-        record = samples.record(labels, keep=how.rules.keep, holds=how.holds, resample=how.resample)
+        record = samples.record(
+            labels, keep=how.rules.keep, holds=how.treatment == "hold", resample=how.resample
+        )
     except TimeAxisError as error:
         raise TimeAxisError(_explained(error, table, samples)) from error
     except DataError as error:
@@ -369,7 +364,3 @@ def _tests(
     cuts = np.flatnonzero((steps < 0) | (steps > _JUMP * usual)) + 1
     groups = np.split(np.arange(seconds.size), cuts)
     return [(str(number), rows) for number, rows in enumerate(groups, start=1)]
-
-
-def _is_number(value: object) -> bool:
-    return isinstance(value, int | float | np.integer | np.floating) and not isinstance(value, bool)
