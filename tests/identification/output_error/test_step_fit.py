@@ -8,7 +8,7 @@ from scipy.signal import lfilter
 
 import ctrl_realize as cr
 from ctrl_realize import report
-from ctrl_realize.identification.output_error.known import known_factor
+from ctrl_realize.identification.output_error.arguments import known_factor
 from tests import rigs
 from tests.rigs import codes, lag
 
