@@ -97,11 +97,10 @@ def valve_loop(
     lag = typical[1]
     if time_constant is not None:
         lag = positive(time_constant, "time_constant", "time in s")
-    wait = typical[2]
-    if dead_time is not None:
-        wait = real(dead_time, "dead_time", "dead time in s")
-        if wait < 0:
-            raise OptionError(f"dead_time={dead_time!r}; expected a value >= 0 s")
+    if dead_time is None:
+        dead_time = typical[2]
+    elif real(dead_time, "dead_time", "dead time in s") < 0:
+        raise OptionError(f"dead_time={dead_time!r}; expected a value >= 0 s")
     positive(dt, "dt", "sample time in s")
     positive(tightness, "tightness", "factor")
     if real(noise, "noise", "standard deviation in %") < 0:
@@ -112,7 +111,7 @@ def valve_loop(
         positive(period, "oscillation", "period in s")
         oscillation = (amplitude, period)
     if controller is None:
-        proportional, integral_time = _simc(chosen, lag, wait + dt / 2)
+        proportional, integral_time = _simc(chosen, lag, dead_time + dt / 2)
     else:
         proportional, integral_time = band(controller, "controller", "gain, integral time in s")
         positive(integral_time, "controller", "integral time in s")
@@ -121,7 +120,7 @@ def valve_loop(
         process=kind,
         gain=chosen,
         time_constant=lag,
-        dead_time=wait,
+        dead_time=float(dead_time),
         controller=(tightness * proportional, integral_time),
         oscillation=oscillation,
         noise=float(noise),

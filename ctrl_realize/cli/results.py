@@ -138,14 +138,14 @@ def campaign_table(campaign: Campaign) -> str:
             rows.append([printable(row.name), in_digits(row.amplitude), "", "", "", "",
                          printable(row.error or "failed")])  # fmt: skip
             continue
-        low, wait, high = dead_time_cells(row, scale)
+        low, dead_time, high = dead_time_cells(row, scale)
         remarks = ", ".join(flag.code for flag in row.flags)
         rows.append(
             [
                 printable(row.name),
                 in_digits(row.amplitude),
                 f"{row.delay:.4g}",
-                wait,
+                dead_time,
                 f"{low} ... {high}",
                 str(row.order),
                 remarks,

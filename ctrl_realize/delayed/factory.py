@@ -95,22 +95,22 @@ def delayed_ss(
         "inputs": inputs,
         "outputs": outputs,
     }
-    wait = None if dead_time is None else real(dead_time, "dead_time", "dead time in s, >= 0")
-    if wait is not None and wait < 0:
-        raise DelayRangeError(f"dead_time={wait:g} s; expected a value >= 0")
+    dead_time = None if dead_time is None else real(dead_time, "dead_time", "dead time in s, >= 0")
+    if dead_time is not None and dead_time < 0:
+        raise DelayRangeError(f"dead_time={dead_time:g} s; expected a value >= 0")
     if system.isctime(strict=True) or (dt is not None and system.dt is None):
         if dt is None:
             raise UnsuitableSystemError("the core is continuous; give dt, its sample time in s")
         step = positive(dt, "dt", "sample time in s")
-        _check_span(system, wait or 0.0, step)
-        if delay is None and split_dead_time(wait or 0.0, step)[1] and np.any(system.D):
+        _check_span(system, dead_time or 0.0, step)
+        if delay is None and split_dead_time(dead_time or 0.0, step)[1] and np.any(system.D):
             raise UnsuitableSystemError(
                 "the core has a feedthrough D, whose response jumps between two samples when "
-                f"the dead time is {(wait or 0.0) / step:.6g} samples; use a whole number of "
+                f"the dead time is {(dead_time or 0.0) / step:.6g} samples; use a whole number of "
                 "samples"
             )
         *sampled, samples = sample_with_dead_time(
-            system.A, system.B, system.C, system.D, step, wait or 0.0
+            system.A, system.B, system.C, system.D, step, dead_time or 0.0
         )
         if not all(np.isfinite(M).all() for M in sampled):
             raise UnsuitableSystemError(
@@ -128,23 +128,24 @@ def delayed_ss(
     check_core(system)
     if dt is not None and not np.isclose(positive(dt, "dt", "sample time in s"), system.dt):
         raise OptionError(f"dt={dt:g} s, but the core has the sample time {system.dt:g} s")
-    if wait is not None:
-        _check_span(system, wait, system.dt)
-        delay, rest = split_dead_time(wait, system.dt)
+    if dead_time is not None:
+        _check_span(system, dead_time, system.dt)
+        delay, rest = split_dead_time(dead_time, system.dt)
         if rest:
             raise DelayRangeError(
-                f"dead_time={wait:g} s is {wait / system.dt:.6g} samples of {system.dt:g} s; "
+                f"dead_time={dead_time:g} s is {dead_time / system.dt:.6g} samples of "
+                f"{system.dt:g} s; "
                 "a discrete core needs a whole number of samples (a continuous core takes "
                 "any dead time)"
             )
     return DelayedStateSpace(system, 0 if delay is None else delay, **settings)
 
 
-def _check_span(system: ct.StateSpace, wait: float, step: float) -> None:
+def _check_span(system: ct.StateSpace, dead_time: float, step: float) -> None:
     """Refuse sample times far too short for the dead time, or far too long for the core."""
-    if wait / step > MAX_DELAY:
+    if dead_time / step > MAX_DELAY:
         raise DelayRangeError(
-            f"dead_time={wait:g} s is {wait / step:.3g} samples of {step:g} s; at most "
+            f"dead_time={dead_time:g} s is {dead_time / step:.3g} samples of {step:g} s; at most "
             f"{MAX_DELAY} are allowed: use a longer sample time"
         )
     largest = max(float(np.abs(M).max(initial=0.0)) for M in (system.A, system.B))

@@ -54,19 +54,19 @@ class HostMargins(DeferredMatrices):
 
     def _followed(self) -> tuple[FloatArray, ComplexArray]:
         """Frequencies so close that the response between them can be interpolated."""
-        features, wait = self.features()
+        features, dead_time = self.features()
         sizes = np.abs(features)
         sizes = sizes[sizes > 0]
         dt = float(self.dt)
-        fastest = float(sizes.max(initial=1 / wait if wait else 1.0))
+        fastest = float(sizes.max(initial=1 / dead_time if dead_time else 1.0))
         top = np.pi / dt if dt else self._gain_is_gone(fastest)
-        low = 1e-3 * min(float(sizes.min(initial=top)), 1 / wait if wait else top)
+        low = 1e-3 * min(float(sizes.min(initial=top)), 1 / dead_time if dead_time else top)
 
         def curve(omega: FloatArray) -> ComplexArray:
             x = np.exp(1j * omega * dt) if dt else 1j * omega
             return np.asarray(self.horner(x, warn_infinite=False)[0, 0])
 
-        omega, values = follow(curve, frequency_grid(low, top, features, wait))
+        omega, values = follow(curve, frequency_grid(low, top, features, dead_time))
         omega, values = follow(curve, omega[: _last(values)], FINE)
         known = np.isfinite(values)
         return omega[known], values[known]

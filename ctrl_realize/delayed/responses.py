@@ -73,8 +73,8 @@ class DelayedResponses(HostResponses, CoreAndDelays):
         """Poles in the s-plane where the response changes quickly, and the largest delay in s."""
         poles = self._core.poles()
         poles = poles[np.abs(poles) > 0.05]
-        wait = float(np.max(self.delay)) * self.dt
-        return np.asarray(np.log(poles) / self.dt, dtype=np.complex128), wait
+        dead_time = float(np.max(self.delay)) * self.dt
+        return np.asarray(np.log(poles) / self.dt, dtype=np.complex128), dead_time
 
     def _with_delay(self, response: Any, count: int) -> FloatArray:
         core = self._core

@@ -36,19 +36,19 @@ def interval_of(system: DelayedStateSpace) -> tuple[float, float] | None:
 
 def mark_dead_time(axes: Axes, system: DelayedStateSpace, factor: float) -> None:
     """Draw the dead time as a line and its interval as a band; `factor` is the unit in 1/s."""
-    wait = estimate_of(system)
+    dead_time = estimate_of(system)
     interval = interval_of(system)
-    text = f"dead time\n{in_time(wait)} = {wait / system.dt:.3g} samples"
+    text = f"dead time\n{in_time(dead_time)} = {dead_time / system.dt:.3g} samples"
     if interval is not None:
-        samples = number_within(*(bound / system.dt for bound in (wait, *interval)))
-        text = f"dead time\n{time_within(wait, *interval)} = {samples} samples"
+        samples = number_within(*(bound / system.dt for bound in (dead_time, *interval)))
+        text = f"dead time\n{time_within(dead_time, *interval)} = {samples} samples"
         text += f"\n{interval_in_time(*interval)}"
         if interval[1] > interval[0]:
             low, high = (factor * bound for bound in interval)
             axes.axvspan(low, high, color=style.BAND, alpha=0.22, linewidth=0)
-    axes.axvline(factor * wait, color=style.MODEL, linewidth=1.5)
+    axes.axvline(factor * dead_time, color=style.MODEL, linewidth=1.5)
     axes.annotate(
-        text, (factor * wait, 0.97), (6, 0), xycoords=("data", "axes fraction"),
+        text, (factor * dead_time, 0.97), (6, 0), xycoords=("data", "axes fraction"),
         textcoords="offset points", va="top", color=style.INK,
         bbox={"facecolor": style.PAPER, "edgecolor": "none", "alpha": 0.75, "pad": 1.5},
     )  # fmt: skip

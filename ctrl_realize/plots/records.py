@@ -241,8 +241,8 @@ def _onset_span(step: StepResponse, system: DelayedStateSpace | None) -> float:
     final = float(np.nanmedian(step.output[-max(step.n_samples // 20, 1) :]))
     reached = np.flatnonzero(np.abs(step.output) >= 0.25 * abs(final))
     rise = step.dt * (int(reached[0]) if reached.size else step.n_samples // 4)
-    wait = 0.0 if system is None else float(np.max(system.dead_time))
-    return float(min(max(3 * wait, 1.3 * rise, 12 * step.dt), step.time[-1]))
+    dead_time = 0.0 if system is None else float(np.max(system.dead_time))
+    return float(min(max(3 * dead_time, 1.3 * rise, 12 * step.dt), step.time[-1]))
 
 
 def _step_label(step: StepResponse) -> str:

@@ -120,15 +120,17 @@ class InsidePoles(HostResponses, DelayOperators):
 
     def _grid(self) -> FloatArray:
         """Frequencies in rad/s at which no turn of the response is missed."""
-        features, wait = self.features()
+        features, dead_time = self.features()
         sizes = np.abs(features)
         if self.dt:
             top = np.pi / float(self.dt)
         else:
-            top = float(sizes.max(initial=1 / wait if wait else 1.0))
+            top = float(sizes.max(initial=1 / dead_time if dead_time else 1.0))
             top = dominant.settled_frequency(self._form(), top)
-        low = 1e-3 * min(float(sizes[sizes > 0].min(initial=top)), 1 / wait if wait else top)
-        return frequency_grid(low, top, features, wait)
+        low = 1e-3 * min(
+            float(sizes[sizes > 0].min(initial=top)), 1 / dead_time if dead_time else top
+        )
+        return frequency_grid(low, top, features, dead_time)
 
     def bandwidth(self, dbdrop: float = -3) -> float:
         """Lowest frequency in rad/s at which the gain is `dbdrop` dB below that at 0."""
@@ -219,5 +221,5 @@ class InsidePoles(HostResponses, DelayOperators):
         if not dt:
             return np.asarray(poles, dtype=np.complex128), float(sum(self.internal_delays))
         poles = poles[np.abs(poles) > 0.05]
-        wait = float(sum(self.internal_delays)) * dt
-        return np.asarray(np.log(poles) / dt, dtype=np.complex128), wait
+        dead_time = float(sum(self.internal_delays)) * dt
+        return np.asarray(np.log(poles) / dt, dtype=np.complex128), dead_time

@@ -108,8 +108,8 @@ def data_loop(
             integrators = beside.integrators + _read_integrators(omega, points.response)
         std = None if std is None else std * np.abs(beside.values)
     # The known delay is removed before the rest is estimated.
-    wait = known + dead_time_from_phase(omega, values * np.exp(1j * omega * known))
-    phase = unwrap_with_dead_time(omega, values, wait) + omega * wait
+    dead_time = known + dead_time_from_phase(omega, values * np.exp(1j * omega * known))
+    phase = unwrap_with_dead_time(omega, values, dead_time) + omega * dead_time
     x = np.log(omega)
     if integrators is None:
         integrators = _read_integrators(omega, values)
@@ -118,7 +118,7 @@ def data_loop(
         values,
         std,
         points.repeats,
-        wait,
+        dead_time,
         PchipInterpolator(x, np.log(np.abs(values))),
         PchipInterpolator(x, phase),
         whole(unstable_poles, "unstable_poles", 0),

@@ -126,7 +126,7 @@ def _state_space_factor(core: ct.StateSpace, dt: float, rate: float, delay: int)
 
 def _inside_factor(system: DelaySystem) -> Factor:
     dt = float(system.dt)
-    features, wait = system.features()
+    features, dead_time = system.features()
     shift = 1.0 if dt else 0.0
 
     def response(w: ComplexArray) -> ComplexArray:
@@ -136,7 +136,7 @@ def _inside_factor(system: DelaySystem) -> Factor:
         return system.characteristic(w + shift)
 
     poles = np.exp(features * dt) if dt else features
-    return Factor(response, characteristic, 0, wait / dt if dt else wait, features, poles)
+    return Factor(response, characteristic, 0, dead_time / dt if dt else dead_time, features, poles)
 
 
 def _polynomial_factor(system: ct.TransferFunction, dt: float, rate: float) -> Factor:

@@ -78,9 +78,9 @@ class Loop:
 
     def beyond(self, top: float) -> FloatArray:
         """Frequencies from `top` to where no factor of a continuous loop turns any more."""
-        wait = self.delay + sum(part.hidden_delay for part in self.factors)
+        dead_time = self.delay + sum(part.hidden_delay for part in self.factors)
         sizes = [float(np.abs(part.features).max(initial=0.0)) for part in self.factors]
-        end = 1e4 * max([*sizes, 1 / wait if wait else 0.0])
+        end = 1e4 * max([*sizes, 1 / dead_time if dead_time else 0.0])
         if end <= top:
             return np.zeros(0)
         return np.geomspace(top, end, int(40 * np.log10(end / top)) + 2)
@@ -109,9 +109,9 @@ class Loop:
             return frequency_grid(low, top, features, self.delay + hidden)
         slowest = float(sizes.min(initial=1 / self.delay if self.delay else 1.0))
         low = self._low_end(1e-3 * slowest)
-        wait = self.delay + sum(part.hidden_delay for part in self.factors)
-        top = self._high_end(1e3 * float(sizes.max(initial=slowest)), wait)
-        return frequency_grid(low, top, features, wait)
+        dead_time = self.delay + sum(part.hidden_delay for part in self.factors)
+        top = self._high_end(1e3 * float(sizes.max(initial=slowest)), dead_time)
+        return frequency_grid(low, top, features, dead_time)
 
     def _low_end(self, low: float) -> float:
         # An integrating loop must start above gain 1, however slow it is. If the gain does not
@@ -125,10 +125,10 @@ class Loop:
                     break
         return low
 
-    def _high_end(self, top: float, wait: float) -> float:
-        if wait == 0:
+    def _high_end(self, top: float, dead_time: float) -> float:
+        if dead_time == 0:
             return max(top, self._below(top))
-        return max(self._below(top * 1e-6), 20 / wait)
+        return max(self._below(top * 1e-6), 20 / dead_time)
 
     def _below(self, top: float) -> float:
         # A strictly proper loop ends where its gain stays small.

@@ -155,8 +155,8 @@ def _phase_margins(tube: _Tube) -> tuple[list[Stretch], list[Stretch]]:
         # A negative phase lead is a lag of almost a turn; if -1 itself is within reach the loop may
         # be on the stability boundary.
         later = np.where(high < 0, 2 * np.pi, 0.0)
-        wait = np.maximum(low + later, 0) / tube.omega[at], (high + later) / tube.omega[at]
-        waits.append((float(wait[0].min()), float(wait[1].max()), crosses))
+        dead_time = np.maximum(low + later, 0) / tube.omega[at], (high + later) / tube.omega[at]
+        waits.append((float(dead_time[0].min()), float(dead_time[1].max()), crosses))
     return phases, waits
 
 

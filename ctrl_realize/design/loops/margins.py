@@ -115,13 +115,13 @@ def margins(
             "unstable_poles and integrators are for measured responses; for systems they are "
             "computed"
         )
-    wait = real(dead_time, "dead_time", "dead time in s, >= 0")
-    if wait < 0:
-        raise OptionError(f"dead_time={wait:g} s; expected a value >= 0")
-    exact = open_loop(loop, controller, wait)
-    if wait and exact.dt:
+    dead_time = real(dead_time, "dead_time", "dead time in s, >= 0")
+    if dead_time < 0:
+        raise OptionError(f"dead_time={dead_time:g} s; expected a value >= 0")
+    exact = open_loop(loop, controller, dead_time)
+    if dead_time and exact.dt:
         raise OptionError(
-            f"dead_time={wait:g} s with a discrete loop; put the delay into the plant "
+            f"dead_time={dead_time:g} s with a discrete loop; put the delay into the plant "
             "(delayed_ss, or .replace(delay=...))"
         )
     warn_unresolved(loop)

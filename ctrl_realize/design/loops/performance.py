@@ -210,9 +210,9 @@ def continuous_performance(plant: DelaySystem, controller: Any, total_time: floa
 def plant_time(plant: DelayedStateSpace | DelaySystem) -> float:
     """Guess the settling time of a plant: dead time and twice its slowest lag, in s."""
     if isinstance(plant, DelaySystem):
-        features, wait = plant.features()
+        features, dead_time = plant.features()
         rates = -features.real[features.real < -1e-9 * np.abs(features).max(initial=1.0)]
-        return wait + 2 / float(rates.min(initial=np.inf)) + 4 * float(plant.dt)
+        return dead_time + 2 / float(rates.min(initial=np.inf)) + 4 * float(plant.dt)
     poles = np.abs(plant.delay_free.poles())
     slow = poles[poles < 1 - 1e-9]
     slowest = -1 / np.log(slow.max()) if slow.size and slow.max() > 0 else 1.0

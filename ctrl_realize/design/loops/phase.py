@@ -66,18 +66,18 @@ def unwrapped_phase(
     >>> print(cr.design.unwrapped_phase(lag, [1.0, 100.0, 1000.0], deg=True).round(1))
     [   -22.9  -1806.  -17306.9]
     """
-    wait = None if dead_time is None else real(dead_time, "dead_time", "dead time in s")
+    dead_time = None if dead_time is None else real(dead_time, "dead_time", "dead time in s")
     if isinstance(system, ct.FrequencyResponseData):
         if omega is not None:
             raise OptionError("omega is given, but the frequencies of data are fixed; omit it")
-        phase = _of_data(system, wait)
+        phase = _of_data(system, dead_time)
     else:
         if omega is None:
             raise OptionError("omega is missing; for a system give the frequencies in rad/s")
         grid = numbers(omega, "omega")
         if grid.ndim != 1 or np.any(grid < 0) or not np.all(np.isfinite(grid)):
             raise DataError("omega must be a one-dimensional array of frequencies >= 0 in rad/s")
-        phase = _of_loop(open_loop(system, dead_time=wait or 0.0), grid)
+        phase = _of_loop(open_loop(system, dead_time=dead_time or 0.0), grid)
     return np.degrees(phase) if deg else phase
 
 
@@ -89,9 +89,9 @@ def _of_data(data: ct.FrequencyResponseData, dead_time: float | None) -> FloatAr
     omega = np.asarray(data.omega, dtype=np.float64)
     order = np.argsort(omega)
     values = np.asarray(data.frdata[0, 0], dtype=np.complex128)[order]
-    wait = dead_time_from_phase(omega[order], values) if dead_time is None else dead_time
+    dead_time = dead_time_from_phase(omega[order], values) if dead_time is None else dead_time
     phase = np.empty(omega.size)
-    phase[order] = unwrap_with_dead_time(omega[order], values, wait)
+    phase[order] = unwrap_with_dead_time(omega[order], values, dead_time)
     return phase
 
 

@@ -91,14 +91,14 @@ def uncertainty_bound(
         raise OptionError(
             "expected systems or a nominal system, got neither; give nominal and dead_time_interval"
         )
-    plant, wait = _plant(nominal)
+    plant, dead_time = _plant(nominal)
     warn_unresolved(plant)
     interval = interval_of_dead_time(plant, dead_time_interval)
     if not models and interval is None:
         raise OptionError(
             "no systems to compare and no dead-time interval; give dead_time_interval in s"
         )
-    grid = _grid(plant, wait, omega)
+    grid = _grid(plant, dead_time, omega)
     base = _response(plant, grid)
     spread = np.zeros(grid.size)
     for model in models:
@@ -109,7 +109,7 @@ def uncertainty_bound(
     delay_part = np.zeros(grid.size)
     if interval is not None:
         low, high = interval
-        off = max(abs(low - wait), abs(high - wait))
+        off = max(abs(low - dead_time), abs(high - dead_time))
         # |exp(-jx) - 1| increases to 2 at x = pi; beyond that a smaller error gives 2.
         delay_part = 2 * np.sin(np.minimum(grid * off, np.pi) / 2)
     return UncertaintyBound(
@@ -143,7 +143,7 @@ def _plant(system: Any) -> tuple[DelayedStateSpace | DelaySystem, float]:
 
 
 def _grid(
-    plant: DelayedStateSpace | DelaySystem, wait: float, omega: ArrayLike | None
+    plant: DelayedStateSpace | DelaySystem, dead_time: float, omega: ArrayLike | None
 ) -> FloatArray:
     if omega is None:
         if isinstance(plant, DelayedStateSpace):
@@ -151,7 +151,9 @@ def _grid(
             slow = np.abs(np.log(np.abs(np.asarray(plant.delay_free.poles())) + 1e-12)) / plant.dt
         else:
             slow = np.abs(plant.core.poles())
-            top = 100 * max(float(slow.max(initial=0.0)), 1 / wait if wait else 0.0) or 1.0
+            top = (
+                100 * max(float(slow.max(initial=0.0)), 1 / dead_time if dead_time else 0.0) or 1.0
+            )
         low = float(
             np.clip(1e-3 * slow[slow > 1e-9 * top].min(initial=top), 1e-8 * top, 0.01 * top)
         )

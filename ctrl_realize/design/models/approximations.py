@@ -59,8 +59,8 @@ def pade_ss(dead_time: float, order: int = 5, *, name: str | None = None) -> ct.
     >>> print(f"{abs(delay(1j * omega) - np.exp(-1j * omega * 0.0289)):.1e}")
     1.1e-06
     """
-    wait = positive(dead_time, "dead_time", "dead time in s")
-    ladder = pade_ladder(wait, whole(order, "order", 1, MAX_PADE_ORDER))
+    dead_time = positive(dead_time, "dead_time", "dead time in s")
+    ladder = pade_ladder(dead_time, whole(order, "order", 1, MAX_PADE_ORDER))
     named = {} if name is None else {"name": name}
     return ct.StateSpace(*ladder, 0, inputs=["u"], outputs=["y"], **named)
 
@@ -106,16 +106,17 @@ def thiran(dead_time: float, dt: float, order: int = 3) -> DelayedStateSpace:
     <DelayedStateSpace: u -> y, order 2, z^-27 (0.027 s), dt = 0.001 s>
     """
     step = positive(dt, "dt", "sample time in s")
-    wait = real(dead_time, "dead_time", "dead time in s, >= 0")
+    dead_time = real(dead_time, "dead_time", "dead time in s, >= 0")
     most = whole(order, "order", 1, MAX_PADE_ORDER)
-    if wait < 0:
-        raise DelayRangeError(f"dead_time={wait:g} s; expected a value >= 0")
-    samples, rest = split_dead_time(wait, step)
+    if dead_time < 0:
+        raise DelayRangeError(f"dead_time={dead_time:g} s; expected a value >= 0")
+    samples, rest = split_dead_time(dead_time, step)
     if rest == 0.0:
         return DelayedStateSpace(ct.ss([], [], [], [[1.0]], step), samples)
     if samples + rest < 0.5:
         raise DelayRangeError(
-            f"dead_time={wait:g} s is {samples + rest:.3g} samples; a filter needs half a sample"
+            f"dead_time={dead_time:g} s is {samples + rest:.3g} samples; a filter needs half "
+            "a sample"
         )
     total = samples + rest
     nearest = math.floor(total + 0.5)

@@ -227,7 +227,7 @@ def to_continuous(system: DelayedStateSpace) -> ContinuousModel:
     core, dt = plant.delay_free, float(plant.dt)
     _check_logarithm(np.asarray(core.poles()))
     A, B, C, D = (np.asarray(M, dtype=np.float64) for M in (core.A, core.B, core.C, core.D))
-    wait = plant.delay * dt
+    dead_time = plant.delay * dt
     found = None
     if plant.issiso() and D[0, 0] != 0 and plant.delay > 0 and core.nstates:
         found = split_fraction(A, B, C, float(D[0, 0]), dt)
@@ -235,7 +235,7 @@ def to_continuous(system: DelayedStateSpace) -> ContinuousModel:
         F, G = inverse_zero_order_hold(A, B, dt)
     else:
         F, G, fraction = found
-        D, wait = np.zeros((1, 1)), wait - (1 - fraction) * dt
+        D, dead_time = np.zeros((1, 1)), dead_time - (1 - fraction) * dt
     continuous = ct.StateSpace(
         F,
         G,
@@ -247,7 +247,7 @@ def to_continuous(system: DelayedStateSpace) -> ContinuousModel:
         outputs=plant.output_labels,
         remove_useless_states=False,
     )
-    return ContinuousModel(continuous, float(wait), dt)
+    return ContinuousModel(continuous, float(dead_time), dt)
 
 
 def _check_logarithm(poles: FloatArray) -> None:

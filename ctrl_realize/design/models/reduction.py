@@ -148,18 +148,18 @@ def both_forms(
     if isinstance(system, ContinuousModel):
         return system, to_discrete(system)
     if isinstance(system, ct.LTI) and (system.dt is None or system.dt == 0):
-        core, wait = core_and_dead_time(system, "a reduction")
-        wait += 0.0 if dead_time is None else dead_time
+        core, total = core_and_dead_time(system, "a reduction")
+        total += 0.0 if dead_time is None else dead_time
         speeds = np.abs(core.poles())
         speeds = speeds[speeds > 1e-12]
-        span = float(np.sum(1 / speeds)) + wait
+        span = float(np.sum(1 / speeds)) + total
         if span == 0:
             raise UnsuitableSystemError(f"{core.name!r} has no lag and no dead time to reduce")
-        model = ContinuousModel(core, wait, span / 1000)
+        model = ContinuousModel(core, total, span / 1000)
         if np.any(core.D):
             # A feedthrough causes a jump; with whole samples it stays in place.
-            step = wait / max(1, round(wait / model.dt)) if wait else model.dt
-            model = ContinuousModel(core, wait, step)
+            step = total / max(1, round(total / model.dt)) if total else model.dt
+            model = ContinuousModel(core, total, step)
         return model, to_discrete(model)
     warn_unresolved(system)
     return None, delayed_system(system, "a reduction")
@@ -223,7 +223,7 @@ def _by_half_rule(
     # A complex pair is replaced by two equal lags with the same sum: each has tau = -Re p / |p|^2.
     lags = -poles.real / np.abs(poles) ** 2
     times = -zeros.real / np.abs(zeros) ** 2
-    factor, kept, wait = half_rule(
+    factor, kept, remaining = half_rule(
         lags,
         times[times > 0],
         -times[times < 0],
@@ -232,7 +232,7 @@ def _by_half_rule(
         integrating=integrating,
     )
     lag, second = [*sorted(kept, reverse=True), 0.0, 0.0][:2]
-    return ProcessModel(gain * factor, lag, wait, second, integrating, "half rule")
+    return ProcessModel(gain * factor, lag, remaining, second, integrating, "half rule")
 
 
 def _by_fit(
@@ -254,8 +254,8 @@ def _by_fit(
         return max(first, second), min(first, second), float(p[-1])
 
     def misfit(p: FloatArray) -> FloatArray:
-        lag, second, wait = unpack(p)
-        return process_step(time, lag, second, wait, integrating=integrating) - shape
+        lag, second, later = unpack(p)
+        return process_step(time, lag, second, later, integrating=integrating) - shape
 
     tiny = 1e-9 * span
     lower = np.array([*[tiny] * lags, dead_time])
@@ -269,8 +269,8 @@ def _by_fit(
         found = least_squares(misfit, start, bounds=(lower, upper), x_scale=total)
         if best is None or found.cost < best.cost:
             best = found
-    lag, second, wait = unpack(best.x)
-    return ProcessModel(gain, lag, wait, second, integrating, "optimal")
+    lag, second, dead_time = unpack(best.x)
+    return ProcessModel(gain, lag, dead_time, second, integrating, "optimal")
 
 
 def _total(time: FloatArray, shape: FloatArray, integrating: bool) -> float:

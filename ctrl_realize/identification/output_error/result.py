@@ -339,11 +339,11 @@ class OutputErrorFit(FractionalDelayFit):
 
     def _rows(self) -> list[tuple[str, str]]:
         low, high = self.interval
-        wait = time_within(self.dead_time, low, high)
+        dead_time = time_within(self.dead_time, low, high)
         samples = number_within(self.delay, *self.delay_interval)
         rows = [
             ("transfer function", self.formula),
-            (self._kind(), f"{wait} = {samples} samples"),
+            (self._kind(), f"{dead_time} = {samples} samples"),
             (self.interval_label, interval_in_time(low, high)),
             *([("visible onset", in_time(self.onset, 4))] if self.onset == self.onset else []),
             (

@@ -68,8 +68,8 @@ class Banks:
         self._next.bank.update(u, y)
         if count == self._next.begin:
             self._next.bank.restart()
-        wait = SHORT_RUN_IN if self.pending else RUN_IN
-        if count < self._next.begin + wait * self._span:
+        dead_time = SHORT_RUN_IN if self.pending else RUN_IN
+        if count < self._next.begin + dead_time * self._span:
             return False
         self.now, self._next = self._next, None
         return True
@@ -84,9 +84,9 @@ class Banks:
         if made is None:
             return
         fresh = self._about(*made, self.now.moved + step)
-        wait = fresh.bank.settling()
-        if wait is not None:
-            self._next = replace(fresh, begin=count + wait + self._candidates[1] + 1)
+        dead_time = fresh.bank.settling()
+        if dead_time is not None:
+            self._next = replace(fresh, begin=count + dead_time + self._candidates[1] + 1)
 
     def core_at(self, found: Solution | None) -> Core:
         """Return the core with its poles moved to the estimates; the zeros are unchanged."""

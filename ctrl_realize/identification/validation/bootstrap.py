@@ -292,8 +292,9 @@ def _identified(estimator: Estimator, draw: Any) -> tuple[DelayedStateSpace, flo
     except CtrlRealizeError:
         return None
     dead_time = None if system.fit is None else system.fit.dead_time
-    wait = float(system.dead_time) if dead_time is None else dead_time
-    return system.replace(fit=None), wait
+    if dead_time is None:
+        dead_time = float(system.dead_time)
+    return system.replace(fit=None), dead_time
 
 
 def _model_and_residual(system: DelayedStateSpace, record: Record) -> tuple[FloatArray, FloatArray]:
