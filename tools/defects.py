@@ -170,7 +170,7 @@ DEFECTS = (
        "missing_samples", FITS),
     # --- choices of the method
     _d("modes never asked", "a plant that rings keeps its lags, whatever they leave",
-       "if np.isfinite(fit.onset) or known is not None or missing:", "if True:",
+       "if fit.actuator is not None or np.isfinite(fit.onset) or missing:", "if True:",
        "identify decisions", FITS),
     _d("modes for nothing", "any gain of the criterion replaces lags by modes",
        "if gain > CLEAR and not late:", "if not late:", "identify decisions", FITS),

@@ -232,7 +232,7 @@ def test_a_bad_row_is_named(tmp_path, row, error, match):
         ("t,u,y,z\n", {"input": []}, r"must name one or more"),
         ("t,u,y,z\n", {"time": 0, "dt": 1.0}, r"got both"),
         ("t,u,y,z\n", {"dt": -1.0}, r"dt=-1.0; expected a positive"),
-        ("t,u,y,z\n", {"dt": math.nan}, r"dt=nan must be a positive"),
+        ("t,u,y,z\n", {"dt": math.nan}, r"dt=nan; expected a finite number"),
         ("t,u,y,z\n", {"input": "u", "output": "u"}, r"selected twice"),
         ("t [ticks],u,y,z\n", {}, r"'ticks' is not a known unit of time"),
         ("t,u,y,z\n", {"time_unit": "years"}, r"'years' is not a known unit of time"),
