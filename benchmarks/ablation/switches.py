@@ -16,6 +16,7 @@ from unittest import mock
 import numpy as np
 
 from ctrl_realize.numerics.output_error.selection import flows_of
+from ctrl_realize.numerics.output_error.step_fit import _STRONG, _dies_away
 from ctrl_realize.numerics.separable.structures import PLAUSIBLE, choose, needless_parameters
 
 Change = Callable[[Any], Any]
@@ -118,6 +119,14 @@ def _without_drift(make: Any) -> Any:
         return replace(data, drift=0.0, relaxing=False)
 
     return made
+
+
+def _while_it_dies_away(_: Any) -> Any:
+    return lambda data, whole, known: data.relaxing and not _dies_away(data, whole, known)
+
+
+def _best_fit(_: Any) -> Any:
+    return lambda whole, candidate, **_how: (candidate, whole.static(candidate))
 
 
 def _least_squares(fit: Any) -> Any:
@@ -271,6 +280,23 @@ SWITCHES = (
         "strong evidence of a motion",
         {f"{STEP}:_STRONG": value(0.0)},
         (f"{STEP}:_explained",),
+    ),
+    Switch(
+        "very strong evidence of a drift",
+        {f"{STEP}:PLAUSIBLE": value(_STRONG)},
+        (f"{STEP}:_explained",),
+    ),
+    Switch("motion that takes the gain", {f"{STEP}:_takes_the_gain": _while_it_dies_away}),
+    Switch(
+        "least extrapolation",
+        {
+            f"{FITS}.{module}:least_extrapolating": _best_fit
+            for module in ("interval", "step_fit", "flat_likelihood")
+        },
+    ),
+    Switch(
+        "no chain beside a free response",
+        {f"{FITS}.selection:_beside_own_terms": lambda _: lambda _whole, tanks: tanks},
     ),
     Switch(
         "no dispersion where rounding is coarse",

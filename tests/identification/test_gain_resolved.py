@@ -41,6 +41,42 @@ def test_a_gain_far_beyond_the_record_is_not_stated_as_known():
         cr.design.margins(system, 0.01)
 
 
+def sagging(seed, *, rise=0.0):
+    """A drive of gain 60 that loses 2 to 8 in a second, after `rise` in the fifth of one before."""
+    rng = np.random.default_rng(seed)
+    t = np.arange(1200.0) * 1e-3
+    x = np.maximum(t - 0.202, 0)
+    y = -60 * np.expm1(-x / rng.uniform(0.015, 0.04)) - rng.uniform(2, 8) * x
+    y += 5 * rise * np.minimum(t - 0.2, 0) + rng.normal(0, 0.6, t.size)
+    return cr.Record(t, np.where(t < 0.2, 0.0, 1.0), y)
+
+
+@pytest.mark.parametrize(("seed", "rise"), [(1, 0.0), (4, 0.0), (1, 8.0)])
+def test_a_model_extrapolates_no_further_than_the_data_ask(seed, rise):
+    # The best fits have gains of -2100 to -7, and one of them follows 40 % of the response.
+    record = sagging(seed, rise=rise)
+    system = cr.identify(record)
+    assert "gain_not_resolved" in codes(system)
+    assert 0 < system.fit.gain <= 60
+    alone = system.simulate(record.input)
+    assert np.std(record.output - alone) < 0.1 * np.std(record.output)
+
+
+@pytest.mark.parametrize("seed", [14, 18])
+def test_a_free_response_does_not_take_the_place_of_the_response(seed):
+    # Rounded to 0.32 K, on again while it cools. A chain of equal lags has a gain of 0.24 or 0.26.
+    rng = np.random.default_rng(seed)
+    gap = int(rng.integers(40, 160))
+    u = np.repeat([150.0, 0.0, 150.0], [600, gap + 60, 170])
+    slow, fast = rng.uniform(80, 130), rng.uniform(12, 22)
+    plant = cr.design.ProcessModel(gain=0.3, lag=slow, second_lag=fast, dead_time=4.0)
+    y = 300 + plant.system(1.0).simulate(u)[600 + gap :] + rng.normal(0, 0.1, 230)
+    record = cr.Record(np.arange(230.0), u[600 + gap :], np.round(y / 0.32) * 0.32)
+    fit = cr.identify(record).fit
+    assert fit.gain == pytest.approx(0.3, rel=0.05)
+    assert fit.delay == pytest.approx(4.0, abs=1.0)
+
+
 @pytest.fixture(scope="module")
 def unknown():
     """A response that dies away again: its gain is nothing."""

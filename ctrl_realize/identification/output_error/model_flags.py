@@ -73,9 +73,9 @@ def _no_sign(fit: OutputErrorEstimate, static: StaticGain, length: float) -> str
         why = f"its 95 % interval is {low:.3g} to {high:.3g}"
     else:
         why = (
-            f"its slowest time constant is {in_time(float(1 / np.abs(fit.poles).min()))} in a "
-            f"record of {in_time(length)}, and the standard error of the gain is "
-            f"{static.gain_std:.3g}"
+            "longer time constants than its slowest one "
+            f"({in_time(float(1 / np.abs(fit.poles).min()))} in a record of {in_time(length)}) are "
+            f"not ruled out: the standard error of the gain is {static.gain_std:.3g}"
         )
     return (
         "the record determines neither the gain nor its sign: the gain of the model is "

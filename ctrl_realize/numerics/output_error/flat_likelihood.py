@@ -24,6 +24,7 @@ from ..separable.compared_fits import at_dead_time
 from ..separable.profile import dead_time_error
 from ..separable.varpro import Structure, evaluate
 from ..separable.window import WindowFit
+from .extrapolation import least_extrapolating
 from .margins import close_to
 from .result import OutputErrorEstimate, RobustKey, followed_by
 from .step_data import StepData
@@ -75,6 +76,7 @@ def moved(
     dead_time = float(np.clip(np.median([at for _, at in views[:-1]]), found.low, found.high))
     own = whole.candidates[found.structure]
     fixed = at_dead_time(whole.problem, own, whole.scales, dead_time)
+    fixed, static = least_extrapolating(whole, fixed, dead_time_fixed=True)
     state = evaluate(whole.problem, fixed.structure, fixed.parameters[None])
     return replace(
         found,
@@ -83,7 +85,7 @@ def moved(
         numerator=state.numerator[0],
         fitted=whole.window.predict(whole.problem, fixed),
         followed=followed_by(whole, fixed, state.numerator[0]),
-        static=whole.static(fixed),
+        static=static,
         delay_estimates=views,
         process=found.process._replace(
             parameters=process_parameters(

@@ -36,6 +36,7 @@ from ..separable.profile_ends import profile_limits
 from ..separable.structures import LEAST_CHARGE, PLAUSIBLE, Scales, charged, plausible
 from ..separable.varpro import Structure
 from ..separable.window import WindowFit
+from .extrapolation import least_extrapolating
 from .friction import latest_slip
 from .margins import CloseDecision, close_choices, close_exclusions
 from .profiles import Profile, curves, laid_profiles, lower_minima, solved_profiles
@@ -97,6 +98,9 @@ def likelihood_fit(
         high = max(high, latest_slip(whole, chosen) or high)
     first, last = profile_limits(*own)
     interval = DelayInterval(low, high, (last - first) / (2 * Z_95))
+    static = None
+    if choice.chain is None and choice.flow is None:
+        chosen, static = least_extrapolating(whole, chosen)
     found = assembled(
         whole,
         chosen,
@@ -105,6 +109,7 @@ def likelihood_fit(
         kept.profiles,
         interval,
         own,
+        static=static,
         relaxing=relaxing,
         better=better,
     )

@@ -282,17 +282,19 @@ def assembled(
     interval: DelayInterval,
     profile: Profile,
     *,
+    static: StaticGain | None = None,
     relaxing: bool = False,
     better: StructureFit | None = None,
 ) -> OutputErrorEstimate:
     """Put a result together.
 
-    `profiles` are those of the table of structures, `profile` that of the dead time chosen.
+    `profiles` are those of the table of structures, `profile` that of the dead time chosen;
+    `static` is the static response, if it is not that of the model alone.
     """
     state = evaluate(whole.problem, chosen.structure, chosen.parameters[None])
     numerator = state.numerator[0]
     interval = interval.rounded(chosen.dead_time, whole.scales)
-    static = whole.static(chosen)
+    static = static or whole.static(chosen)
     charged = {s: whole.criterion[s] + needless_parameters(s) for s in profiles}
     least = charged.get(chosen.structure, np.inf)
     alike = [

@@ -3,7 +3,8 @@
 The rule:
 
 0. The output before the step is modelled as noise, hum, a drift, or the free response of the
-   plant, as chosen by the information criterion; drift and free response need strong evidence.
+   plant, as chosen by the information criterion; a free response needs strong evidence, a drift
+   very strong evidence. Neither is taken if the gain is then not determined.
 1. All structures are fitted to the whole record; the one with the lowest information criterion
    is the model, and its residual is compared with the noise before the step. A residual that is not
    much larger counts as noise, too, if it is white or no larger than that long after the step. If
@@ -29,6 +30,8 @@ The rule:
 4. The interval then spans these and a third-order model of the first 15 % (more lags, less dead
    time), without the lowest: a fit that fails takes dead time for lag.
 5. No dead time is later than the visible onset of the output.
+6. Of a slow pole that leaves the gain undetermined, the fastest value that is not ruled out is
+   taken, so that the model extrapolates little.
 
 Points 0 to 2 are based on the information criterion [3]_, profile likelihoods [1]_ and multimodel
 inference [2]_. Points 3 to 5 are our own: estimates whose errors have different causes (threshold,
@@ -65,6 +68,7 @@ from ..separable.dispersion.fit import DispersedFlow
 from ..separable.lag_chains import LagChain
 from ..separable.structures import (
     ALL_STRUCTURES,
+    PLAUSIBLE,
     SIMPLE_STRUCTURES,
     Candidate,
     choose,
@@ -74,6 +78,7 @@ from ..separable.varpro import KnownFactor, Structure, evaluate, respond
 from ..separable.window import WindowFit, among, fit_window
 from .better_structure import better_structure
 from .coloured import in_coloured_noise
+from .extrapolation import least_extrapolating
 from .flat_likelihood import closer, later, moved, pinned, told
 from .interval import likelihood_fit
 from .margins import close_to
@@ -149,8 +154,8 @@ def fit_step_record(
             [(way, _fit_until(way, way.output.size, few, latest, factor, huber)) for way in ways]
         )
     whole = _fit_until(data, data.output.size, tried, latest, factor, huber)
-    if data.relaxing and not _dies_away(data, whole, factor):
-        data = replace(data, relaxing=False)
+    if _takes_the_gain(data, whole, factor):
+        data = replace(data, drift=0.0, relaxing=False)
         whole = _fit_until(data, data.output.size, tried, latest, factor, huber)
     adequate = _is_noise(data, whole)
     near = close_to("adequate", whole.normalized_rms, ADEQUATE * data.colour)
@@ -219,7 +224,8 @@ def fit_step_record(
 def _explained(ways: list[tuple[StepData, WindowFit]]) -> StepData:
     """Choose between models of the samples before the step, by an information criterion.
 
-    A motion that goes on after the step needs strong evidence: it changes the gain of the model.
+    A motion that goes on after the step needs strong evidence: it changes the gain of the model. A
+    drift, which goes on to the end of the record, needs very strong evidence ([5]_).
     """
     closest = min((whole for _, whole in ways), key=lambda whole: whole.sigma)
     worst = _WILD * closest.sigma
@@ -231,9 +237,23 @@ def _explained(ways: list[tuple[StepData, WindowFit]]) -> StepData:
         squares = float(np.sum(np.clip(error, -worst, worst) ** 2))
         terms = best.order + best.zeros + (best.order if data.relaxing else bool(data.drift))
         value = squares / closest.variance + closest.penalty * terms + needless_parameters(best)
-        return value + (_STRONG if data.drift or data.relaxing else 0.0)
+        return value + (PLAUSIBLE if data.drift else _STRONG if data.relaxing else 0.0)
 
     return min(ways, key=criterion)[0]
+
+
+def _takes_the_gain(data: StepData, whole: WindowFit, known: KnownFactor) -> bool:
+    """Whether a motion before the step takes the place of the response to it.
+
+    Together with a slow pole, which is its opposite, it leaves the gain without a value or with the
+    wrong sign. Ablation: motion that takes the gain.
+    """
+    if not (data.drift or data.relaxing):
+        return False
+    if data.relaxing and not _dies_away(data, whole, known):
+        return True
+    static = whole.static(whole.best)
+    return not static.resolved or static.reached * static.gain < 0
 
 
 def _dies_away(data: StepData, whole: WindowFit, known: KnownFactor) -> bool:
@@ -284,9 +304,12 @@ def _robust_fit(
     low, high = float(dead_times[1]), float(dead_times[-1])
     profiles = {chosen.structure: profile_of(whole, chosen)}
     fixed = at_dead_time(whole.problem, chosen, whole.scales, dead_time)
+    fixed, static = least_extrapolating(whole, fixed, dead_time_fixed=True)
     interval = DelayInterval(low, high, (high - low) / (2 * Z_95))
     own = profiles[chosen.structure]
-    found = assembled(whole, fixed, False, views, profiles, interval, own, relaxing=relaxing)
+    found = assembled(
+        whole, fixed, False, views, profiles, interval, own, static=static, relaxing=relaxing
+    )
     return replace(
         found, process=found.process._replace(parameters=without_errors(found.process.parameters))
     )

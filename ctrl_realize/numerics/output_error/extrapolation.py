@@ -1,0 +1,77 @@
+"""Extrapolate as little as the data allow where they do not determine the gain.
+
+A pole far slower than the record stands for a drift that began with the response. Its time constant
+has no upper limit, and the gain of the best fit may be any number. The profile likelihood [1]_ of
+that pole tells the fastest one that is not ruled out; with it the model fits as well, and its gain
+is close to what was observed. Of all solutions within the error of the data, Phillips [2]_ takes
+the smoothest in the same way. Ablation: least extrapolation.
+
+References
+----------
+.. [1] D. J. Venzon and S. H. Moolgavkar, A method for computing profile-likelihood-based confidence
+   intervals, Appl. Statist. 37 (1988) 87-94, doi:10.2307/2347496.
+.. [2] D. L. Phillips, A technique for the numerical solution of certain integral equations of the
+   first kind, J. ACM 9 (1962) 84-97, doi:10.1145/321105.321114.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from ..constants import CHI2_95
+from ..separable.newton import settle
+from ..separable.poles import parameters_from_poles, poles_from_parameters
+from ..separable.polish import polish
+from ..separable.structures import Candidate, parameter_bounds
+from ..separable.varpro import KnownFactor, Structure
+from ..separable.window import WindowFit
+
+_FASTEST = 4.0  # over the length of the record: 2 % of such a mode are left at its end
+_RATIO = 2.0  # of the rates that are tried: time
+
+
+def least_extrapolating(
+    whole: WindowFit, candidate: Candidate, *, dead_time_fixed: bool = False
+) -> Candidate:
+    """Return the model with the fastest slow pole that is not ruled out (95 %), to a factor of two.
+
+    The pole ends at the length of the record. A model whose gain is determined, or the sign of it,
+    is returned as it is; so is one with a free response of its own poles.
+
+    Parameters
+    ----------
+    whole : WindowFit
+    candidate : Candidate
+    dead_time_fixed : bool, optional
+        Keep the dead time.
+    """
+    problem, scales, structure = whole.problem, whole.scales, candidate.structure
+    poles = candidate.poles
+    slow = int(np.argmin(np.abs(poles)))
+    static = whole.static(candidate)
+    if structure.order == 1 or poles[slow].imag or problem.segments is not None:
+        return candidate, static
+    if static.significant:
+        return candidate, static
+    rest = Structure(structure.order - 1, structure.relative_degree - 1)
+    bounds = parameter_bounds(rest, scales)
+    others = np.append(candidate.dead_time, parameters_from_poles(np.delete(poles, slow)))
+    level = candidate.cost + CHI2_95 * whole.variance
+    rate = _FASTEST / scales.length
+    while rate > np.abs(poles[slow]):
+        factor = KnownFactor(np.append(problem.known.poles, -rate), problem.known.numerator)
+        held = replace(problem, known=factor)
+        near, _ = polish(
+            held, rest, others[None], bounds, scales.dt, dead_time_fixed=dead_time_fixed
+        )
+        x, cost = settle(held, rest, near[0], bounds, scales.dt, dead_time_fixed=dead_time_fixed)
+        if cost <= level:
+            free = poles_from_parameters(x[None, 1:])[0][0]
+            parameters = np.append(x[0], parameters_from_poles(np.append(free, -rate)))
+            found = Candidate(structure, parameters, cost)
+            own = whole.static(found)
+            return found, replace(static, gain=own.gain, total=own.total)
+        others, rate = x, rate / _RATIO
+    return candidate, static
