@@ -24,6 +24,7 @@ from ..constants import CHI2_95
 from ..separable.newton import settle
 from ..separable.poles import parameters_from_poles, poles_from_parameters
 from ..separable.polish import polish
+from ..separable.static_gain import StaticGain
 from ..separable.structures import Candidate, parameter_bounds
 from ..separable.varpro import KnownFactor, Structure
 from ..separable.window import WindowFit
@@ -34,11 +35,11 @@ _RATIO = 2.0  # of the rates that are tried: time
 
 def least_extrapolating(
     whole: WindowFit, candidate: Candidate, *, dead_time_fixed: bool = False
-) -> Candidate:
+) -> tuple[Candidate, StaticGain]:
     """Return the model with the fastest slow pole that is not ruled out (95 %), to a factor of two.
 
-    The pole ends at the length of the record. A model whose gain is determined, or the sign of it,
-    is returned as it is; so is one with a free response of its own poles.
+    A model with a significant gain is returned as it is; so is one beside a free response of its
+    own poles. The second result is the static response, with the errors of the best fit.
 
     Parameters
     ----------
@@ -51,9 +52,8 @@ def least_extrapolating(
     poles = candidate.poles
     slow = int(np.argmin(np.abs(poles)))
     static = whole.static(candidate)
-    if structure.order == 1 or poles[slow].imag or problem.segments is not None:
-        return candidate, static
-    if static.significant:
+    alone = problem.segments is None and structure.order > 1
+    if static.significant or poles[slow].imag or not alone:
         return candidate, static
     rest = Structure(structure.order - 1, structure.relative_degree - 1)
     bounds = parameter_bounds(rest, scales)
