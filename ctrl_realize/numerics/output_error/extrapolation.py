@@ -57,21 +57,21 @@ def least_extrapolating(
         return candidate, static
     rest = Structure(structure.order - 1, structure.relative_degree - 1)
     bounds = parameter_bounds(rest, scales)
-    others = np.append(candidate.dead_time, parameters_from_poles(np.delete(poles, slow)))
+    start = np.append(candidate.dead_time, parameters_from_poles(np.delete(poles, slow)))
     level = candidate.cost + CHI2_95 * whole.variance
     rate = _FASTEST / scales.length
     while rate > np.abs(poles[slow]):
         factor = KnownFactor(np.append(problem.known.poles, -rate), problem.known.numerator)
         held = replace(problem, known=factor)
         near, _ = polish(
-            held, rest, others[None], bounds, scales.dt, dead_time_fixed=dead_time_fixed
+            held, rest, start[None], bounds, scales.dt, dead_time_fixed=dead_time_fixed
         )
         x, cost = settle(held, rest, near[0], bounds, scales.dt, dead_time_fixed=dead_time_fixed)
-        if cost <= level:
-            free = poles_from_parameters(x[None, 1:])[0][0]
+        free = poles_from_parameters(x[None, 1:])[0][0]
+        if cost <= level and np.abs(free).min() >= rate:
             parameters = np.append(x[0], parameters_from_poles(np.append(free, -rate)))
             found = Candidate(structure, parameters, cost)
             own = whole.static(found)
             return found, replace(static, gain=own.gain, total=own.total)
-        others, rate = x, rate / _RATIO
+        rate /= _RATIO
     return candidate, static
