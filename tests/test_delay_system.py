@@ -13,99 +13,13 @@ from ctrl_realize.errors import (
     ModelWarning,
     UnsuitableSystemError,
 )
+from tests.rigs import TWO_INPUTS
 
 DT = 0.1
 Z = np.exp(1j * np.geomspace(0.05, 0.97 * np.pi / DT, 25) * DT)
 T = DT * np.arange(150)
 LAG = ct.tf([1], [0.8, 1])
 PI = ct.ss([[1.0]], [[1.0]], [[0.02]], [[0.4]], DT)
-
-
-def drawn(seed: int, outputs: int, inputs: int, *, direct: bool = True) -> cr.DelayedStateSpace:
-    """A stable system with other delays, 0 to 40, at each input and output."""
-    rng = np.random.default_rng(seed)
-    A = rng.standard_normal((3, 3))
-    A *= 0.9 / np.abs(np.linalg.eigvals(A)).max()
-    D = 0.2 * rng.standard_normal((outputs, inputs)) * direct
-    core = ct.ss(
-        A, 0.3 * rng.standard_normal((3, inputs)), rng.standard_normal((outputs, 3)), D, DT
-    )
-    before, behind = rng.integers(0, 41, inputs), rng.integers(0, 2, outputs)
-    return cr.delayed_ss(core, before.tolist(), output_delay=behind.tolist())
-
-
-def plain(system: ct.StateSpace, dt: float = DT) -> ct.StateSpace:
-    """The same with the matrices of all registers, in python-control's hands."""
-    return ct.StateSpace(
-        *(np.array(M) for M in (system.A, system.B, system.C, system.D)),
-        dt,
-        remove_useless_states=False,
-    )
-
-
-ALGEBRA = {
-    "series": lambda a, b, f: ct.series(a, b),
-    "parallel": lambda a, b, f: ct.parallel(a, b),
-    "difference": lambda a, b, f: a - b,
-    "feedback": lambda a, b, f: ct.feedback(a, b),
-    "positive feedback": lambda a, b, f: a.feedback(0.3 * b, 1),
-    "feedback of feedback": lambda a, b, f: ct.feedback(ct.feedback(a, b), 0.5 * a),
-    "loop times system": lambda a, b, f: ct.feedback(a, b) * b + a,
-    "append": lambda a, b, f: ct.append(a, ct.feedback(b, a)),
-    "inverse": lambda a, b, f: (2 * f + ct.feedback(a, b)) ** -1,
-    "matrix around": lambda a, b, f: np.diag([2.0, -1.0]) * ct.feedback(a, b) * np.ones((2, 2)),
-    "one channel": lambda a, b, f: ct.feedback(a, b)[0, 1],
-    "quotient": lambda a, b, f: (a + b) * (3 * f + a) ** -1,
-    "linear fractional": lambda a, b, f: ct.append(a, b).lft(0.2 * a),
-}
-
-
-@pytest.mark.parametrize("seed", range(3))
-@pytest.mark.parametrize("operation", ALGEBRA)
-def test_interconnections_equal_those_of_the_augmented_matrices(operation, seed):
-    a, b = drawn(seed, 2, 2), drawn(seed + 10, 2, 2)
-    unit = ct.ss([], [], [], np.eye(2), DT)
-    ours = ALGEBRA[operation](a, b, cr.DelayedStateSpace(unit))
-    theirs = ALGEBRA[operation](plain(a), plain(b), unit)
-    assert isinstance(ours, cr.DelaySystem)
-    assert_allclose(ours(Z), theirs(Z), rtol=1e-9, atol=1e-11)
-    # the matrices that python-control asks for are those of the same system
-    assert ours.nstates <= theirs.nstates
-    assert_allclose(plain(ours)(Z), theirs(Z), rtol=1e-9, atol=1e-11)
-
-
-@pytest.mark.parametrize("seed", range(4))
-def test_time_responses_equal_those_of_the_augmented_matrices(seed):
-    loop = ct.feedback(drawn(seed, 2, 2), 0.3 * drawn(seed + 10, 2, 2))
-    host = plain(loop)
-    u = np.random.default_rng(seed).standard_normal((2, T.size))
-    limit = {"rtol": 0, "atol": 1e-11}
-    forced = ct.forced_response(host, T, u)
-    assert_allclose(loop.simulate(u), forced.outputs, **limit)
-    assert_allclose(loop.forced_response(T, u).outputs, forced.outputs, **limit)
-    assert_array_equal(loop.forced_response(T, u).inputs, forced.inputs)
-    for name in ("step_response", "impulse_response"):
-        ours, theirs = getattr(loop, name)(T), getattr(ct, name)(host, T)
-        assert_allclose(ours.outputs, theirs.outputs, **limit)
-        assert (ours.ntraces, ours.trace_types) == (theirs.ntraces, theirs.trace_types)
-    assert_allclose(loop.step(T.size), ct.step_response(host, T).outputs, **limit)
-    assert_allclose(DT * loop.impulse_response(T).outputs, loop.markov(T.size), **limit)
-    start = np.random.default_rng(seed + 1).standard_normal(loop.nstates)
-    for name, given in (
-        ("forced_response", (u, start)),
-        ("step_response", (start,)),
-        ("initial_response", (start,)),
-    ):
-        ours, theirs = getattr(loop, name)(T, *given), getattr(ct, name)(host, T, *given)
-        assert_allclose(ours.y, theirs.y, **limit)
-        early = T[:20]  # shorter than some of the delays
-        assert_allclose(
-            getattr(loop, name)(early, *(x[..., :20] if x is u else x for x in given)).y,
-            theirs.y[..., :20],
-            **limit,
-        )
-    # what asks for states is left to python-control
-    assert loop.step_response(T, return_states=True).states.shape[0] == loop.nstates
 
 
 def test_delays_of_zero_are_closed_at_once():
@@ -217,7 +131,7 @@ def test_a_root_locus_of_a_long_chain_is_that_of_its_closed_loops():
     with pytest.raises(DataError, match="gains must increase"):
         cr.design.root_locus(LAG, [1.0, 0.5])
     with pytest.raises(UnsuitableSystemError, match="2 inputs"):
-        cr.design.root_locus(drawn(0, 2, 2))
+        cr.design.root_locus(TWO_INPUTS)
 
 
 def test_zeros_of_a_loop_are_those_of_its_parts():
@@ -302,7 +216,7 @@ def test_margins_of_a_loop_with_an_inner_loop_are_right():
     assert not cr.design.margins(inner, 1.01 * gain).stable
     assert cr.design.margins(inner, 0.99 * gain).stable
     # of plain matrices: 62 states
-    augmented = cr.design.margins(plain(inner, 0.01))
+    augmented = cr.design.margins(ct.ss(inner))
     assert exact.delay_margin == pytest.approx(augmented.delay_margin, rel=1e-9)
 
 

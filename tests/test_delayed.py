@@ -15,7 +15,7 @@ from ctrl_realize.errors import (
     OptionError,
 )
 from ctrl_realize.io import FitSummary
-from tests.rigs import R3, TS, exact_step
+from tests.rigs import R3, TS, TWO_INPUTS, exact_step
 
 CONTROLLER = ct.ss([[1.0]], [[1.0]], [[0.02]], [[0.5]], TS)  # a PI controller
 
@@ -26,13 +26,6 @@ def valve(delay: int = 37, **names) -> cr.DelayedStateSpace:
 
 def circle(count: int = 60, dt: float = TS) -> np.ndarray:
     return np.exp(1j * np.geomspace(0.1, 0.99 * np.pi / dt, count) * dt)
-
-
-def mimo_core() -> ct.StateSpace:
-    rng = np.random.default_rng(3)
-    A = rng.standard_normal((4, 4))
-    A /= 1.2 * np.abs(np.linalg.eigvals(A)).max()
-    return ct.ss(A, rng.standard_normal((4, 2)), rng.standard_normal((3, 4)), np.ones((3, 2)), 0.1)
 
 
 @pytest.mark.parametrize("delay", [0, 1, 37, 300])
@@ -123,62 +116,12 @@ def test_a_fractional_dead_time_is_sampled_exactly(samples, dt):
 
 
 def test_several_channels_have_their_own_delays():
-    core = mimo_core()
-    S = cr.delayed_ss(core, [2, 5], output_delay=[0, 3, 1])
-    z = circle(dt=0.1)
-    expected = core(z) * (z ** -np.add.outer([0, 3, 1], [2, 5])[:, :, None])
-    assert_allclose(S(z), expected, rtol=1e-12)
-    assert_allclose(ct.ss(S)(z), expected, rtol=1e-9, atol=1e-12)
-    assert_array_equal(S.delay, np.add.outer([0, 3, 1], [2, 5]))
-    assert S.nstates == 4 + 7 + 4
-    t = 0.1 * np.arange(40)
-    u = np.random.default_rng(1).standard_normal((2, 40))
-    assert_allclose(S.simulate(u), ct.forced_response(S, t, u).outputs, rtol=0, atol=1e-12)
-    assert_allclose(S.markov(40)[1, 1, :8], np.zeros(8), atol=0)
-
-
-@pytest.mark.parametrize(
-    ("key", "rows", "columns"),
-    [
-        ((2, 1), [2], [1]),
-        (("out", "b"), [2], [1]),
-        ((slice(None), 1), [0, 1, 2], [1]),
-        (([2, 0], [1, 0]), [2, 0], [1, 0]),
-        ((1, slice(None)), [1], [0, 1]),
-    ],
-)
-def test_channels_that_are_chosen_keep_their_delays(key, rows, columns):
-    S = cr.delayed_ss(
-        mimo_core(), [2, 5], output_delay=[0, 3, 1], inputs=["a", "b"], outputs=["p", "q", "out"]
-    )
-    part = S[key]
-    assert isinstance(part, cr.DelayedStateSpace)
-    assert_array_equal(part.delay, np.add.outer([0, 3, 1], [2, 5])[np.ix_(rows, columns)])
-    z = circle(9, dt=0.1)
-    assert_allclose(
-        np.reshape(part(z), (len(rows), len(columns), 9)), S(z)[np.ix_(rows, columns)], rtol=1e-12
-    )
-    host = ct.ss(S)[key]
-    assert part.input_labels == host.input_labels
-    assert part.output_labels == host.output_labels
-    assert part.name == f"{S.name}$indexed"
-    # registers of channels that are left out go with them
-    assert part.nstates <= S.nstates
-
-
-def test_products_of_channels_with_different_delays_stay_right():
-    core = mimo_core()
-    S = cr.delayed_ss(core, [2, 5])
-    M = np.array([[1.0, 2.0], [0.5, -1.0]])
-    z = circle(9, dt=0.1)
-    mixed = S * M
-    assert isinstance(mixed, cr.DelaySystem)
-    assert mixed.internal_delays == (2, 5)
-    assert_allclose(mixed(z), np.einsum("pmk,mn->pnk", S(z), M), rtol=1e-9, atol=1e-12)
-    outer = np.array([[1.0, 0.0, 2.0]]) * S
-    assert isinstance(outer, cr.DelayedStateSpace)
-    assert outer.input_delays == (2, 5)
-    assert_allclose(outer(z)[0], S(z)[0] + 2 * S(z)[2], rtol=1e-12)
+    S = cr.delayed_ss(TWO_INPUTS.delay_free, [2, 5], output_delay=[0, 3, 1])
+    total = np.add.outer([0, 3, 1], [2, 5])
+    z = circle(dt=S.dt)
+    assert_allclose(S(z), S.delay_free(z) * z ** -total[:, :, None], rtol=1e-12)
+    assert_array_equal(S.delay, total)
+    assert S.nstates == 2 + 7 + 4
 
 
 @pytest.mark.parametrize("delay", [0, 37, 300])

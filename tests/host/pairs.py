@@ -33,7 +33,8 @@ CORES = {
     "mimo": _stable(4, 2, 2, 2, direct=True),
     "wide": _stable(3, 2, 3, 3, direct=False),
 }
-LOOP = "loop"  # around the core of one input and output: its delay is an internal one
+LOOPS = ("loop", "loop of channels")  # around the cores so named: their delays are internal ones
+KINDS = cr.DelaySystem, cr.DelayedStateSpace
 OTHER = _stable(2, 1, 1, 5, direct=True)
 OTHER_TF = ct.tf([0.5, 0.1], [1, -0.4], DT)
 OTHER_MIMO = _stable(3, 2, 2, 6, direct=True)
@@ -41,11 +42,14 @@ OTHER_MIMO = _stable(3, 2, 2, 6, direct=True)
 
 def pair(core: str, delay: int) -> tuple[cr.DelayedStateSpace, ct.StateSpace]:
     """Ours, and python-control's with the same matrices, names and labels."""
-    if core == LOOP:
-        ours = ct.feedback(cr.delayed_ss(0.1 * CORES["siso"], delay), OTHER)
-        ours.update_names(name="plant")
-    else:
-        ours = cr.delayed_ss(CORES[core], delay, name="plant")
+    plant = CORES.get(core, CORES["mimo" if "channels" in core else "siso"])
+    before = [delay // (k + 1) for k in range(plant.ninputs)]  # channels with delays of their own
+    behind = [delay * k // 9 for k in range(plant.noutputs)]
+    ours = cr.delayed_ss(plant, before, output_delay=behind)
+    if core in LOOPS:
+        back = OTHER if ours.issiso() else cr.delayed_ss(OTHER_MIMO, [2, 5])
+        ours = ct.feedback(0.1 * ours, back)
+    ours.update_names(name="plant")
     theirs = ct.StateSpace(
         *(np.array(M) for M in (ours.A, ours.B, ours.C, ours.D)),
         ours.dt,

@@ -7,7 +7,17 @@ import control as ct
 import numpy as np
 import pytest
 
-from tests.host.pairs import CORES, DELAYS, DT, GRID, LOOP, OTHER, assert_same, pair, quietly
+from tests.host.pairs import (
+    CORES,
+    DELAYS,
+    DT,
+    GRID,
+    KINDS,
+    OTHER,
+    assert_same,
+    pair,
+    quietly,
+)
 
 N = 90
 T = DT * np.arange(N)
@@ -30,6 +40,10 @@ ANY = {
     "step with states": lambda s: ct.step_response(s, T, return_states=True),
     "step of one channel": lambda s: ct.step_response(s, T, input_indices=0, output_indices=0),
     "step from a state": lambda s: ct.step_response(s, T, state(s)),
+    "step, shorter than delays": lambda s: ct.step_response(s, T[:20]),
+    "simulate": lambda s: (
+        s.simulate(rows(s)) if isinstance(s, KINDS) else ct.forced_response(s, T, rows(s)).outputs
+    ),
     "step, unsqueezed": lambda s: ct.step_response(s, T, squeeze=False),
     "step, squeezed": lambda s: ct.step_response(s, T, squeeze=True),
     "step, transposed": lambda s: ct.step_response(s, T, transpose=True).outputs,
@@ -46,6 +60,10 @@ ANY = {
     "input_output": lambda s: ct.input_output_response(s, T, rows(s)),
     "input_output from a state": lambda s: ct.input_output_response(s, T, rows(s), state(s)),
     "call of the response": lambda s: ct.step_response(s, T)(squeeze=False).outputs,
+    "kinds of the response": lambda s: [
+        (made.ntraces, made.trace_types)
+        for made in (ct.step_response(s, T), ct.impulse_response(s, T))
+    ],
     "labels of the response": lambda s: ct.forced_response(s, T, rows(s)).output_labels,
     "frequency response": lambda s: ct.frequency_response(s, GRID),
     "frequency response as a tuple": lambda s: tuple(ct.frequency_response(s, GRID)),
@@ -93,9 +111,8 @@ CASES = [
 ]
 
 CASES = [(core, operation, delay) for core, operation in CASES for delay in DELAYS]
-CASES += [
-    (LOOP, operation, 37) for operation in ALL if operation.startswith(("any", "one channel"))
-]
+CASES += [("loop", operation, 37) for operation in ALL]
+CASES += [("loop of channels", operation, 37) for operation in ALL if operation.startswith("any")]
 
 
 @pytest.mark.parametrize(("core", "operation", "delay"), CASES)
