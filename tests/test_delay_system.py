@@ -17,7 +17,6 @@ from tests.rigs import TWO_INPUTS
 
 DT = 0.1
 Z = np.exp(1j * np.geomspace(0.05, 0.97 * np.pi / DT, 25) * DT)
-T = DT * np.arange(150)
 LAG = ct.tf([1], [0.8, 1])
 PI = ct.ss([[1.0]], [[1.0]], [[0.02]], [[0.4]], DT)
 

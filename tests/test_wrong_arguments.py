@@ -1,11 +1,11 @@
-"""What is of the wrong kind is refused in our words, by whatever function it meets first."""
+"""What is of the wrong kind, masked, complex or not finite is refused in our words everywhere."""
 
 import control as ct
 import numpy as np
 import pytest
 
 import ctrl_realize as cr
-from ctrl_realize.errors import CtrlRealizeError, DataError, OptionError
+from ctrl_realize.errors import CtrlRealizeError, DataError, OptionError, UnsuitableSystemError
 from tests.rigs import step_record
 
 KINDS = [None, True, -1, 1.5, float("nan"), "x", b"x", [], {}, np.ones(3), object(), 1j]
@@ -78,3 +78,115 @@ def test_a_filter_slower_than_the_record_is_refused_before_memory_is_given_to_it
     # 1e-6 Hz of 1280 Hz: 51 GB of zeros before the step
     with pytest.raises(OptionError, match="takes 5e\\+06 s to settle"):
         cr.impulse_from_step(STEP, cutoff_hz=1e-6)
+
+
+T = 0.1 * np.arange(50)
+U = (T > 1).astype(float)
+Y = (T > 2).astype(float)
+
+
+def masked():
+    """The last nine samples are masked; below the mask stands 1e20, as netCDF files have it."""
+    values = np.where(T > 4.05, 1e20, Y)
+    return np.ma.masked_array(values, mask=T > 4.05)
+
+
+@pytest.mark.parametrize("given", [masked(), [masked()], (masked(),), list(masked())])
+def test_masked_samples_are_missing_in_lists_too(given):
+    count = int(np.sum(T > 4.05))
+    assert cr.Record(T, U, given, missing="keep").n_missing == count
+    for make in (
+        lambda: cr.Record(T, U, given),
+        lambda: cr.Record.resampled(T, U, given),
+        lambda: PLANT.simulate(given),
+    ):
+        with pytest.raises(DataError, match="non-finite"):
+            make()
+
+
+COMPLEX = np.array([1.0, 2.0]) + 1j
+
+
+@pytest.mark.parametrize(
+    "use",
+    [
+        lambda: PLANT.simulate(COMPLEX),
+        lambda: cr.design.predictor_lqr(PLANT, [[1 + 1j]], 1.0),
+        lambda: cr.design.kalman_predictor(PLANT, 1.0, [[1 + 1j]]),
+        lambda: cr.design.unwrapped_phase(PLANT, COMPLEX),
+        lambda: cr.design.uncertainty_bound([1.1 * PLANT], PLANT, COMPLEX),
+        lambda: cr.design.ProcessModel(1.0, 1.0, 1.0).step(COMPLEX),
+        lambda: cr.design.ProcessModel(1.0 + 1j, 1.0, 1.0),
+        lambda: cr.Record(T, U, Y + 1j),
+        lambda: cr.ImpulseResponse(Y + 1j, 0.1),
+        lambda: cr.MeasuredFRF([1.0, 2.0], COMPLEX),
+        lambda: cr.design.margins(PLANT, 1 + 1j),
+    ],
+)
+def test_complex_numbers_where_real_ones_belong_are_refused_not_cut(use):
+    with pytest.raises(CtrlRealizeError):
+        use()
+
+
+MEASURED = ct.FrequencyResponseData(np.array([1.0, 0.5, 0.1]), [1.0, 2.0, 3.0])
+
+
+def broken(dt=0.1):
+    """Made by somebody's own computation; python-control lets it pass."""
+    system = ct.ss([[0.5]], [[1.0]], [[1.0]], [[0.0]], dt)
+    system.A = np.array([[np.nan]])
+    return system
+
+
+def broken_fraction():
+    system = ct.tf([1.0], [1.0, -0.5], 0.1)
+    system.num[0][0][:] = np.nan
+    return system
+
+
+def test_a_mask_in_a_nested_list_is_seen_in_every_kind_of_response():
+    response = np.ma.masked_array([1.0, 1e20, 3.0], [False, True, False])
+    for make in (
+        lambda: cr.ImpulseResponse([[masked()]], 0.1),
+        lambda: cr.realize([[masked()]], 1, dt=0.1),
+        lambda: cr.MeasuredFRF([[response]], [1.0, 2.0, 3.0]),
+        lambda: cr.design.predictor_lqr(PLANT, [np.ma.masked_array([1e20], True)], 1.0),
+    ):
+        with pytest.raises(DataError, match="non-finite"):
+            make()
+
+
+def test_a_system_that_is_not_finite_is_refused_in_words():
+    D = cr.design
+    for use in (
+        lambda: D.margins(PLANT, broken()),
+        lambda: D.margins(PLANT, broken_fraction()),
+        lambda: D.margins(PLANT, float("nan")),
+        lambda: D.margins(PLANT, float("inf")),
+        lambda: D.margins(broken(0), 1.0),
+        lambda: D.margins(ct.frd([np.nan, 1.0, 1.0], [1.0, 2.0, 3.0])),
+        lambda: D.margins(MEASURED, broken(0)),
+        lambda: D.delay_robustness(PLANT, broken(), (0.1, 0.5)),
+        lambda: D.smith_predictor(PLANT, broken()),
+        lambda: D.smith_predictor(PLANT, float("nan")),
+        lambda: D.performance(PLANT, broken()),
+        lambda: D.pid(broken()),
+        lambda: D.reduce_fopdt(broken()),
+        lambda: D.reduce_fopdt(broken(0)),
+        lambda: D.to_tf(broken()),
+        lambda: D.to_continuous(broken()),
+        lambda: D.to_discrete(broken(0), 0.1, 0.1),
+        lambda: D.hankel_singular_values(broken()),
+        lambda: cr.delayed_ss(broken(), 3),
+        lambda: cr.DelayedStateSpace(broken(), 3),
+        lambda: cr.DelayTracker(broken(), max_delay=5, forgetting_time=5.0),
+    ):
+        with pytest.raises(UnsuitableSystemError, match="non-finite"):
+            use()
+
+
+def test_a_jitter_that_is_no_number_does_not_let_gaps_pass():
+    gap = np.delete(T, slice(20, 30))
+    for jitter in (float("nan"), float("inf"), -0.1, "a", None):
+        with pytest.raises(OptionError, match="max_jitter"):
+            cr.Record.resampled(gap, gap, gap, max_jitter=jitter)

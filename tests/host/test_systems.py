@@ -24,6 +24,12 @@ from tests.host.pairs import (
 )
 
 Z = np.exp(1j * GRID * DT)
+PID = cr.design.PIDController(0.5, 0.2, dt=DT)
+JOINED = ct.interconnect(
+    [ct.ss(PID, name="P", inputs="e", outputs="v"), ct.ss(OTHER, name="F", inputs="v")],
+    inplist="P.e",
+    outlist="F.y[0]",
+)
 
 SLYCOT = ct.slycot_check()
 
@@ -102,6 +108,10 @@ SISO = {
     "times a system": lambda s: s * OTHER,
     "system times": lambda s: OTHER * s,
     "times a transfer function": lambda s: s * OTHER_TF,
+    "times a PID controller": lambda s: s * PID,
+    "PID controller times": lambda s: PID * s,
+    "series with joined subsystems": lambda s: ct.series(JOINED, s),
+    "feedback around a system of ours": lambda s: ct.feedback(cr.DelaySystem(OTHER), 0.1 * s),
     "plus a system": lambda s: s + OTHER,
     "system plus": lambda s: OTHER + s,
     "minus a system": lambda s: s - OTHER,
