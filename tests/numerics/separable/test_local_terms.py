@@ -1,23 +1,11 @@
 """Level, drift and initial state of every stretch, noise and criterion of its fit."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
 from ctrl_realize.numerics.separable.local_terms import FixedTerms, LocalTerms, Segments
 from ctrl_realize.numerics.separable.poles import poles_from_parameters
-from ctrl_realize.numerics.separable.responses import StepSequence
-from ctrl_realize.numerics.separable.structures import Candidate
-from ctrl_realize.numerics.separable.varpro import (
-    KnownFactor,
-    Problem,
-    Structure,
-    respond,
-)
-from ctrl_realize.numerics.separable.window import Window
-from ctrl_realize.numerics.signals.bins import response_bins
 
 CLOCK = np.concatenate([np.arange(70.0), np.arange(110.0)])
 EDGES = np.array([0, 70, 180])
@@ -71,67 +59,3 @@ def test_nothing_else_disappears_and_records_do_not_mix():
     columns = np.concatenate([SHAPES[:70], np.exp(CLOCK[:70, None] * poles[0])], axis=1)
     expected = data[:70] - (columns @ np.linalg.lstsq(columns, data[:70] + 0j, rcond=None)[0]).real
     assert_allclose(left[:70], expected, rtol=0, atol=1e-10)
-
-
-ONE, TWO, ZERO = Structure(1, 1), Structure(2, 2), Structure(2, 1)
-SIZE, EDGE, DT = 120, 20, 0.5
-TRUTH = np.array([3.7, np.log(0.2)])  # dead time and rate, in s and 1/s
-
-
-def drive(first, width):
-    return StepSequence(DT * first, width, DT, np.array([EDGE * DT]), np.ones(1))
-
-
-def windows():
-    """One lag behind a dead time on a level of 3: on bins, and sample by sample."""
-    index, single = np.arange(SIZE), np.ones(SIZE, dtype=np.int64)
-    every = drive(index.astype(float), single)
-    output = 3.0 + respond(every, KnownFactor(), np.array([0.4]), TRUTH)
-    bins = response_bins(SIZE, [EDGE], 8)
-    assert bins.width.max() > 1
-    level = np.ones((SIZE, 1))
-    means = Problem(
-        bins.average(output),
-        np.sqrt(bins.width),
-        drive(bins.first.astype(float), bins.width),
-        np.ones((bins.first.size, 1)),
-        KnownFactor(),
-    )
-    samples = Problem(output, np.ones(SIZE), every, level, KnownFactor())
-    return (
-        Window(EDGE, output, means, every, level, bins),
-        Window(EDGE, output, samples, every, level, None),
-    )
-
-
-@pytest.mark.parametrize("window", windows(), ids=["bins", "samples"])
-def test_a_model_is_predicted_at_every_sample(window):
-    exact = window.predict(window.problem, Candidate(ONE, TRUTH, 0.0))
-    assert exact == pytest.approx(window.output, abs=1e-12)
-    # of other parameters gain and level are those of the problem's data
-    other = window.predict(window.problem, Candidate(ONE, np.array([4.7, np.log(0.27)]), 0.0))
-    assert 1e-3 < np.abs(other - window.output).max() < 0.5
-    half = window.with_output(0.5 * window.output)
-    assert window.predict(half, Candidate(ONE, TRUTH, 0.0)) == pytest.approx(0.5 * window.output)
-
-
-def test_a_free_response_is_predicted_at_every_sample():
-    means, _ = windows()
-    clock = DT * np.arange(SIZE)
-    free = 2.0 * np.exp(-0.2 * clock)
-    # in the middle of bins, of which those with one sample alone count here
-    middle = means.bins.average(clock)
-    single = 1.0 * (means.bins.width == 1)
-    none = np.ones((means.bins.first.size, 0))
-    level = np.ones((SIZE, 1))
-    own = Segments(np.array([0, SIZE]), clock, level)
-    problem = replace(
-        means.problem,
-        data=means.bins.average(means.output + free),
-        root_weight=single,
-        regressors=none,
-        segments=Segments(np.array([0, middle.size]), middle, means.bins.average(level)),
-    )
-    window = replace(means, problem=problem, columns=np.ones((SIZE, 0)), own=own)
-    found = window.predict(problem, Candidate(ONE, TRUTH, 0.0))
-    assert found == pytest.approx(means.output + free, abs=1e-10)
