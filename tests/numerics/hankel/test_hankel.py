@@ -6,7 +6,6 @@ from numpy.testing import assert_allclose
 
 from ctrl_realize.numerics.hankel.lanczos import largest_magnitude, leading_eigenpairs
 from ctrl_realize.numerics.hankel.matrix import (
-    BlockHankel,
     hankel_matrix,
     hankel_norm_squared,
 )
@@ -17,20 +16,6 @@ from tests.oracles.plants import modal, valve_pulse
 @pytest.fixture
 def rng():
     return np.random.default_rng(7)
-
-
-@pytest.mark.parametrize(("p", "m"), [(1, 1), (3, 2), (2, 5)])
-@pytest.mark.parametrize(
-    ("rows", "columns", "length"), [(30, 30, 59), (20, 41, 60), (30, 30, 40), (13, 13, 25)]
-)
-def test_block_products_are_the_dense_products(rng, p, m, rows, columns, length):
-    # 25 samples are transformed with 25 points, an odd number
-    h = rng.standard_normal((p, m, length))
-    H, fast = hankel_matrix(h, rows, columns), BlockHankel(h, rows, columns)
-    x, y = rng.standard_normal(H.shape[1]), rng.standard_normal(H.shape[0])
-    assert fast.shape == H.shape
-    assert_allclose(fast.times(x), H @ x, rtol=0, atol=1e-12)  # 200 terms of order one
-    assert_allclose(fast.transposed_times(y), H.T @ y, rtol=0, atol=1e-12)
 
 
 @pytest.mark.parametrize(

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
 from ctrl_realize.numerics.hankel.delay_models import realize_at
-from ctrl_realize.numerics.hankel.iae import integrated_absolute_error, markov_stack
+from ctrl_realize.numerics.hankel.iae import integrated_absolute_error
 from ctrl_realize.numerics.hankel.kung import realize_block, realize_symmetric
 from ctrl_realize.numerics.hankel.matrix import hankel_matrix
 from ctrl_realize.numerics.state_space.responses import markov
@@ -122,15 +122,6 @@ def stepped(A, B, C, count):
         out[k] = C @ x
         x = A @ x
     return out
-
-
-@pytest.mark.parametrize("count", [1, 2, 3, 31, 32, 33, 1100])
-@pytest.mark.parametrize("order", [1, 3, 8])
-def test_block_powers_step_the_states(count, order):
-    A, B, C = stack(4, order)
-    expected = [stepped(*model, count) for model in zip(A, B, C, strict=True)]
-    # 1100 steps, each rounded at 1e-16 of a state of order ten
-    assert_allclose(markov_stack(A, B, C, count), expected, atol=1e-12)
 
 
 @pytest.mark.parametrize("delays", [[0, 3, 17, 40], [5], [0], [40, 0], [3, 4, 5, 6], [4, 3]])

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from ctrl_realize.numerics.joint.frf_rows import MeasuredPoints, Sines, both_together
+from ctrl_realize.numerics.joint.frf_rows import MeasuredPoints, both_together
 from ctrl_realize.numerics.separable.compressed import compress
 from ctrl_realize.numerics.separable.local_terms import Segments
 from ctrl_realize.numerics.separable.poles import parameters_from_poles
@@ -24,11 +24,6 @@ NUMERATOR = np.array([60.0, 5.0])  # 60 + 5 s
 DEAD_TIME = 0.07
 PARAMETERS = np.append(DEAD_TIME, parameters_from_poles(POLES))
 EXACT = ct.tf([5.0, 60.0], np.poly(POLES).real)(1j * OMEGA) * np.exp(-1j * OMEGA * DEAD_TIME)
-
-
-def test_rows_are_real_and_imaginary_parts_of_the_transfer_function_with_dead_time():
-    rows = respond(Sines(OMEGA), KnownFactor(), NUMERATOR, PARAMETERS)
-    assert_allclose(rows[:12] + 1j * rows[12:], EXACT, rtol=1e-12)
 
 
 def test_the_cost_is_the_weighted_distance_with_half_of_the_variance_in_each_part():

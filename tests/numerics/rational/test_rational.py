@@ -7,7 +7,6 @@ from scipy import signal
 
 from ctrl_realize.numerics.rational.model import (
     basis_functions,
-    chain_state_space,
     factor_parameters,
     full_jacobian,
     project,
@@ -32,16 +31,6 @@ structures = pytest.mark.parametrize(
 
 def theta_of(order):
     return factor_parameters(np.array(POLES[order], dtype=complex))
-
-
-@structures
-def test_state_space_chain_has_the_response_of_the_basis(order, count):
-    theta = theta_of(order)
-    numerator = np.random.default_rng(order * 10 + count).standard_normal(count)
-    A, B, C, D = chain_state_space(theta, numerator, order)
-    states = np.linalg.solve(S[:, None, None] * np.eye(order) - A, B.astype(complex))
-    direct = basis_functions(S, theta, order, count)[0] @ numerator
-    assert_allclose((C @ states)[:, 0, 0] + D[0, 0], direct, rtol=1e-11)
 
 
 def test_gradient_of_the_projected_misfit_is_exact():
@@ -89,23 +78,6 @@ T = DT * np.arange(N)
 
 def sine(omega, phasor, offset=0.0, slope=0.0, time=T):
     return (phasor * np.exp(1j * omega * time)).real + offset + slope * time
-
-
-def test_given_frequency_is_plain_linear_least_squares():
-    rng = np.random.default_rng(0)
-    y = rng.standard_normal((4, 2, N))
-    omega = np.array([5.0, 7.0, 11.0, 13.0])
-    fit = fit_sines(T, y, omega, free_frequency=False)
-    for b in range(4):
-        design = np.stack([np.cos(omega[b] * T), -np.sin(omega[b] * T), np.ones(N)], axis=1)
-        expected, squares, _, _ = np.linalg.lstsq(design, y[b].T, rcond=None)
-        assert_allclose(fit.phasor[b], expected[0] + 1j * expected[1], atol=1e-13)
-        assert_allclose(fit.offset[b], expected[2], atol=1e-13)
-        assert_allclose(fit.noise_variance[b], squares / (N - 3), rtol=1e-12)
-        covariance = np.linalg.inv(design.T @ design)[:2, :2]
-        assert_allclose(
-            fit.phasor_covariance[b, 1], fit.noise_variance[b, 1] * covariance, rtol=1e-9
-        )
 
 
 def test_noisy_estimates_scatter_as_the_stated_standard_deviations_say():

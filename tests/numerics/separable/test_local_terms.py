@@ -1,4 +1,4 @@
-"""Level, drift and initial state of every stretch, noise and criterion of its fit."""
+"""Level, drift and initial state of every stretch of a record."""
 
 import numpy as np
 import pytest

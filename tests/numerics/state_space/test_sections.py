@@ -2,14 +2,12 @@
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 from scipy.linalg import block_diag
 from scipy.optimize import least_squares
 
 from ctrl_realize.numerics.state_space import responses
-from ctrl_realize.numerics.state_space.responses import markov, simulate
+from ctrl_realize.numerics.state_space.responses import simulate
 from ctrl_realize.numerics.state_space.section_fit import Experiment, fit_sections
 from ctrl_realize.numerics.state_space.sections import in_sections, motion
 
@@ -33,36 +31,6 @@ def test_markov_parameters_are_powers_of_a(count):
     assert_allclose(
         responses.markov(A, B, C, D, count), np.stack(expected, axis=-1), rtol=0, atol=1e-12
     )
-
-
-SAMPLES = 60
-
-
-def some_model(seed, order, p=2, m=3):
-    rng = np.random.default_rng(seed)
-    A = rng.standard_normal((order, order))
-    A *= 0.95 / max(np.abs(np.linalg.eigvals(A)).max(initial=0.0), 0.5)
-    B, C = rng.standard_normal((order, m)), rng.standard_normal((p, order))
-    return A, B, C, rng.standard_normal((p, m))
-
-
-models = st.builds(some_model, st.integers(0, 300), st.integers(1, 7))
-
-
-@given(models)
-def test_a_model_in_sections_is_the_same_model(model):
-    sections = in_sections(*model)
-    matrices = sections.matrices()
-    assert matrices[0].shape == model[0].shape
-    expected = markov(*model, SAMPLES)
-    # eigenvectors of random matrices of order 7 lose up to six digits
-    assert_allclose(
-        markov(*matrices, SAMPLES), expected, rtol=0, atol=1e-9 * np.abs(expected).max()
-    )
-    poles = np.linalg.eigvals(model[0])
-    distance = np.abs(sections.poles[:, None] - poles)
-    assert distance.min(axis=0).max() < 1e-7
-    assert sections.poles.size == poles.size
 
 
 PLANT = (
