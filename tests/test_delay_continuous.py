@@ -1,20 +1,16 @@
-"""Continuous systems with dead time: closed forms, mpmath, Lambert's W, and a second solver."""
+"""Continuous systems with dead time: closed forms, Lambert's W, textbook systems."""
 
 import pickle
 from math import factorial
 
 import control as ct
-import mpmath
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from scipy.special import lambertw
 
 import ctrl_realize as cr
-from ctrl_realize.errors import (
-    DelayRangeError,
-    ModelWarning,
-)
+from ctrl_realize.errors import DelayRangeError, ModelWarning
 
 LAG = ct.tf([1], [1, 1])
 OMEGA = np.geomspace(0.01, 200, 30)
@@ -29,18 +25,12 @@ def retarded(k: float, tau: float) -> cr.DelaySystem:
 # -- frequency responses --------------------------------------------------------------------------
 
 
-def exact(expression, omega=OMEGA) -> np.ndarray:
-    """Values of a function of s at j omega, with 30 digits."""
-    with mpmath.workdps(30):
-        return np.array([complex(expression(mpmath.mpc(0, w))) for w in omega])
-
-
 def p1(s):
-    return 2 * mpmath.exp(-mpmath.mpf("0.3") * s) / (s + 1)
+    return 2 * np.exp(-0.3 * s) / (s + 1)
 
 
 def p2(s):
-    return (s + 3) / (s**2 + 2 * s + 5) * mpmath.exp(-mpmath.mpf("1.1") * s)
+    return (s + 3) / (s**2 + 2 * s + 5) * np.exp(-1.1 * s)
 
 
 P1 = ct.tf([2], [1, 1]) * cr.delay(0.3)
@@ -51,24 +41,24 @@ ALGEBRA = {
     "plant": (P1, p1),
     "delay first": (cr.delay(0.3) * ct.tf([2], [1, 1]), p1),
     "series": (P1 * P2, lambda s: p1(s) * p2(s)),
-    "controller in front": (C * P1, lambda s: (s + mpmath.mpf("0.5")) / s * p1(s)),
+    "controller in front": (C * P1, lambda s: (s + 0.5) / s * p1(s)),
     "sum": (P1 + P2, lambda s: p1(s) + p2(s)),
     "sum with a transfer function": (LAG + P2, lambda s: 1 / (s + 1) + p2(s)),
-    "feedback": (ct.feedback(P1 * C), lambda s: 1 / (1 + s / (s + mpmath.mpf("0.5")) / p1(s))),
+    "feedback": (ct.feedback(P1 * C), lambda s: 1 / (1 + s / (s + 0.5) / p1(s))),
     "feedback of feedback": (
         ct.feedback(ct.feedback(P1, 0.3 * P2), P2),
-        lambda s: p1(s) / (1 + p1(s) * p2(s) * mpmath.mpf("0.3") + p1(s) * p2(s)),
+        lambda s: p1(s) / (1 + p1(s) * p2(s) * 0.3 + p1(s) * p2(s)),
     ),
-    "sensitivity": ((1 + P1 * C) ** -1, lambda s: 1 / (1 + p1(s) * (1 + mpmath.mpf("0.5") / s))),
+    "sensitivity": ((1 + P1 * C) ** -1, lambda s: 1 / (1 + p1(s) * (1 + 0.5 / s))),
     "quotient": (P2 / (2 + P1), lambda s: p2(s) / (2 + p1(s))),
 }
 
 
 @pytest.mark.parametrize("case", ALGEBRA)
-def test_frequency_responses_are_those_of_30_digits(case):
+def test_frequency_responses_are_those_of_their_formulas(case):
     system, expression = ALGEBRA[case]
     assert isinstance(system, cr.DelaySystem)
-    assert_allclose(system(1j * OMEGA), exact(expression), rtol=1e-10)
+    assert_allclose(system(1j * OMEGA), expression(1j * OMEGA), rtol=1e-10)
     again = pickle.loads(pickle.dumps(system))
     assert_allclose(again(1j * OMEGA), system(1j * OMEGA), rtol=0)
     assert type(again) is type(system)

@@ -11,9 +11,7 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 
 import ctrl_realize as cr
-from ctrl_realize.errors import (
-    OptionError,
-)
+from ctrl_realize.errors import OptionError
 from ctrl_realize.io import FitSummary
 from tests.rigs import R3, TS, TWO_INPUTS, exact_step
 

@@ -164,10 +164,7 @@ ERRORS = {
         (lambda: ct.sisotool(INTEGRAL * LATE), r"sisotool.*cr\.design\.root_locus"),
         (lambda: INTEGRAL * ct.feedback(LATE), r"P \* C.*cr\.DelaySystem\(ct\.ss\(C\)\)"),
         (lambda: LATE.step(10), r"step_response\(timepts\)"),
-        (
-            lambda: ct.feedback(LAG * cr.delay(1e-7)).step_response(BETWEEN),
-            "shortest delay",
-        ),
+        (lambda: ct.feedback(LAG * cr.delay(1e-7)).step_response(BETWEEN), "shortest delay"),
         # design functions
         (
             lambda: cr.design.smith_predictor(ct.tf([1], [1, 0]) * cr.delay(1.0), 0.1),

@@ -7,17 +7,7 @@ import control as ct
 import numpy as np
 import pytest
 
-from tests.host.pairs import (
-    CORES,
-    DELAYS,
-    DT,
-    GRID,
-    KINDS,
-    OTHER,
-    assert_same,
-    pair,
-    quietly,
-)
+from tests.host.pairs import CORES, DELAYS, DT, GRID, KINDS, OTHER, assert_same, pair, quietly
 
 N = 90
 T = DT * np.arange(N)

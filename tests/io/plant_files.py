@@ -17,7 +17,7 @@ class PlantFile:
 
     name: str
     write: Callable[[Path], None]
-    gain: float | None
+    gain: float
     dead_time: float
     within: float
     """Largest error of the dead time, in s: three standard errors or a few samples."""
@@ -26,15 +26,13 @@ class PlantFile:
     """Whether the file holds several tests."""
 
 
-def response(t, u, gain, dead_time, lags, *, integrator=False):
+def response(t, u, gain, dead_time, lags):
     """Exact response of lags with dead time to an input that is held between its samples."""
     moves = [(t[0], 0.0)] + [(t[k], u[k] - u[k - 1]) for k in range(1, len(u)) if u[k] != u[k - 1]]
     y = np.zeros(len(t))
     for at, height in moves:
         s = np.maximum(np.asarray(t) - at - dead_time, 0.0)
-        if integrator:
-            y += height * gain * s
-        elif len(lags) == 1:
+        if len(lags) == 1:
             y += height * gain * -np.expm1(-s / lags[0])
         else:
             one, two = lags
@@ -137,18 +135,6 @@ def loop_under_pid(path):
     path.write_text("Time,SP,PV,OP\n" + "\n".join(rows) + "\n")
 
 
-def furnace(path):
-    """Two hours before the step, without which the drift could as well be a slow response."""
-    t = 0.5 * np.arange(900)  # min
-    rng = np.random.default_rng(5)
-    u = steps(t, [(0, 50), (120, 60)])
-    walk = np.cumsum(0.002 * rng.standard_normal(t.size))
-    y = 700 + response(t, u, 2.0, 6.0, (40.0,)) + 0.003 * t + walk
-    y += 0.05 * rng.standard_normal(t.size)
-    rows = [f"{a:.1f},{b:.1f},{c:.3f}" for a, b, c in zip(t, u, y, strict=True)]
-    path.write_text("Time (min),Gas valve MV (%),Zone temperature PV (degC)\n" + "\n".join(rows))
-
-
 def begins_with_its_step(path):
     t = 0.02 * np.arange(300)
     rng = np.random.default_rng(6)
@@ -156,15 +142,6 @@ def begins_with_its_step(path):
     y += 0.02 * rng.standard_normal(t.size)
     rows = [f"{a:.2f},5,{c:.4f}" for a, c in zip(t, y, strict=True)]
     path.write_text("time,input,output\n" + "\n".join(rows) + "\n")
-
-
-def level(path):
-    t = 1.0 * np.arange(400)
-    rng = np.random.default_rng(7)
-    u = steps(t, [(0, 50), (60, 60), (160, 40), (260, 50)])
-    y = 30 + response(t, u, 0.02, 7.0, (), integrator=True) + 0.02 * rng.standard_normal(t.size)
-    rows = [f"{a:.0f};{b:.0f};{c:.3f}" for a, b, c in zip(t, u, y, strict=True)]
-    path.write_text("t [s];Pump [%];Level [cm]\n" + "\n".join(rows) + "\n")
 
 
 def arduino(path):
@@ -206,9 +183,7 @@ FILES = [
         {"by": "test", "input": "valve", "output": "flow"}, many=True,
     ),
     PlantFile("loop.csv", loop_under_pid, 2.0, 3.0, 0.5),
-    PlantFile("furnace.csv", furnace, 2.0, 360, 40),
     PlantFile("step_at_start.csv", begins_with_its_step, 1.0, 0.6, 0.03, {"rest": (0.0, 20.3)}),
-    PlantFile("level.csv", level, 0.02, 7.0, 0.5, {"input": "Pump", "output": "Level"}),
     PlantFile("arduino.csv", arduino, 0.1, 0.314, 0.03, {"resample": True}),
     PlantFile("labview.lvm", labview, 1.2, 0.08, 0.01, {"input": "Command", "output": "Position"}),
 ]  # fmt: skip

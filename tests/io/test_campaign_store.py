@@ -91,19 +91,6 @@ def test_after_a_failure_the_old_file_is_whole_and_the_folder_clean(tmp_path, re
     assert names(tmp_path) == ["a.txt"]
 
 
-@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="pipes are those of POSIX")
-def test_a_pipe_in_the_place_of_a_row_is_neither_waited_for_nor_replaced(records, tmp_path):
-    store = cr.io.CampaignStore(tmp_path)
-    first = cr.identify_campaign(records[:1], method="paper", store=store)
-    (path,) = tmp_path.glob("row-*.json")
-    path.unlink()
-    os.mkfifo(path)
-    again = cr.identify_campaign(records[:1], method="paper", store=store)
-    assert again.delays == first.delays
-    assert "will not be replaced" in again.rows[0].warnings[-1]
-    assert path.is_fifo()
-
-
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="the system has no named pipes")
 def test_what_is_no_regular_file_is_not_replaced(tmp_path):
     pipe, link = tmp_path / "pipe", tmp_path / "link"

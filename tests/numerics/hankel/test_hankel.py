@@ -5,10 +5,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from ctrl_realize.numerics.hankel.lanczos import largest_magnitude, leading_eigenpairs
-from ctrl_realize.numerics.hankel.matrix import (
-    hankel_matrix,
-    hankel_norm_squared,
-)
+from ctrl_realize.numerics.hankel.matrix import hankel_matrix, hankel_norm_squared
 from ctrl_realize.numerics.hankel.svd import leading_triplets, thin_svd
 from tests.oracles.plants import modal, valve_pulse
 

@@ -5,10 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from ctrl_realize.numerics.loops.circle import (
-    gain_gaps,
-    largest_gain,
-)
+from ctrl_realize.numerics.loops.circle import gain_gaps, largest_gain
 
 
 def bears(shape, distance, gain):

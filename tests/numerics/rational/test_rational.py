@@ -12,9 +12,7 @@ from ctrl_realize.numerics.rational.model import (
     project,
 )
 from ctrl_realize.numerics.rational.sines import fit_sines
-from ctrl_realize.numerics.rational.spectra import (
-    independent_segments,
-)
+from ctrl_realize.numerics.rational.spectra import independent_segments
 
 S = 1j * np.geomspace(0.05, 20, 60)
 POLES = {

@@ -8,11 +8,7 @@ from scipy.optimize import least_squares
 
 from ctrl_realize.numerics.output_error.step_data import step_data, step_scales, window
 from ctrl_realize.numerics.separable.batch_search import fit_batch
-from ctrl_realize.numerics.separable.compared_fits import (
-    at_dead_time,
-    converged,
-    on_new_data,
-)
+from ctrl_realize.numerics.separable.compared_fits import at_dead_time, converged, on_new_data
 from ctrl_realize.numerics.separable.newton import settle, solve_level
 from ctrl_realize.numerics.separable.poles import parameters_from_poles
 from ctrl_realize.numerics.separable.polish import polish

@@ -8,9 +8,7 @@ from numpy.testing import assert_allclose
 
 from ctrl_realize.numerics.state_space.delay_split import split_delays
 from ctrl_realize.numerics.state_space.process_models import half_rule
-from ctrl_realize.numerics.state_space.sampling import (
-    split_dead_time,
-)
+from ctrl_realize.numerics.state_space.sampling import split_dead_time
 
 
 @pytest.mark.parametrize(
