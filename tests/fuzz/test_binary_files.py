@@ -93,6 +93,6 @@ def test_a_damaged_file_is_read_or_refused(rng, tmp_path, ending):
     read_damaged(rng, tmp_path, ending)
 
 
-@fuzz(16)  # each one starts a process, 0.4 s
+@fuzz(10)  # each one starts a process, 0.4 s
 def test_a_damaged_mat_file_is_read_or_refused(rng, tmp_path):
     read_damaged(rng, tmp_path, ".mat")
