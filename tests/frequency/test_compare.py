@@ -150,17 +150,6 @@ def test_a_gain_that_is_off_is_told_and_a_contradiction_comes_first(scale, code)
         assert "contradicts" in verdict.reasons[0]
 
 
-def test_impulse_invariant_samples_need_no_hold():
-    A, B, C, _ = ct.ssdata(ct.ss(PLANT))
-    sampled = ct.sample_system(ct.ss(A, B, C, 0), DT, "zoh")
-    # Markov parameters dt h(k dt): A_d = exp(A dt), B_d = exp(A dt) B dt, D = 0 (h(0) = 0).
-    model = ct.ss(sampled.A, sampled.A @ B * DT, C, 0, DT)
-    comparison = cr.compare_frf(model, measured(), hold=None)
-    assert np.abs(comparison.phase_error_deg).max() < 1e-3
-    held = cr.compare_frf(model, measured(f=np.array([13.0, 14.0])))
-    assert held.phase_error_deg[0] == pytest.approx(1.828, abs=1e-3)
-
-
 def test_points_beyond_nyquist_are_left_out_and_said():
     slow = ct.sample_system(ct.ss(PLANT), 0.02, "zoh")
     comparison = cr.compare_frf(slow, measured())

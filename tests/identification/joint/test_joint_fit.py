@@ -91,16 +91,6 @@ def test_another_dead_time_of_the_frequency_response_is_found():
     assert fit.interval_kind == "spanned"
 
 
-def test_a_compromise_has_a_dead_time_that_one_of_the_two_has():
-    s = 2j * np.pi * HZ
-    slower = response(more=1 / (s / 12 + 1) ** 2, std=0.02)  # two lags of 83 ms more
-    fit = fit_joint(step(noise=0.005), slower, structures=[(2, 2), (2, 1)]).fit
-    ends = [*fit.record_fit.interval, *fit.frf_fit.interval]
-    assert fit.agreement.contradicts
-    assert min(ends) <= fit.dead_time <= max(ends)
-    assert fit.interval == (min(ends), max(ends))
-
-
 def test_another_gain_of_the_frequency_response_is_found():
     fit = fit_joint(step(), response(gain=1.1 * GAIN), structures=ONE_LAG).fit
     ratio, chance = fit.agreement.gain_ratio

@@ -145,14 +145,6 @@ def wrong(track, delay):
     return int(np.sum(track.resolved & ~held))
 
 
-def test_slower_poles_do_not_stand_in_for_a_delay_beyond_the_candidates():
-    record = operated(cr.delayed_ss(R3, delay=100, dt=TS), seconds=15, seed=0)
-    bank = tracker()
-    track = bank.track(record)
-    assert wrong(track, 100) == 0
-    assert not bank.estimate().resolved
-
-
 def test_a_track_that_is_lost_is_said_and_found_again_after_a_reset():
     """All poles of the plant become half as fast at once."""
     slow = cr.delayed_ss(lag(1.1) * pair(4.0, 0.7), delay=37, dt=TS)
