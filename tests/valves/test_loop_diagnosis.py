@@ -1,7 +1,5 @@
 """Oscillating loops: indices in closed form, and verdicts on simulated and measured loops."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
@@ -14,8 +12,8 @@ from ctrl_realize.numerics.oscillation.ellipse import fit_ellipse
 from ctrl_realize.numerics.oscillation.half_cycles import half_cycles
 from ctrl_realize.numerics.oscillation.movements import movement_indices
 from ctrl_realize.numerics.oscillation.rests import rests
+from tests import measured
 
-LOOPS = Path(__file__).resolve().parents[3] / "shared" / "data" / "valve_loops"
 STICKS, NOT_SO = "stiction", "no stiction: tuning or external oscillation"
 TIME = np.arange(2000.0)
 
@@ -223,11 +221,13 @@ def test_wrong_arguments_are_refused():
         diagnosed(wave, wave).method("vote")
 
 
-@pytest.mark.skipif(not LOOPS.exists(), reason="measured loops are not at hand")
 @pytest.mark.parametrize(
     ("name", "truth"),
     [("chem1", STICKS), ("pap2", STICKS), ("chem13", NOT_SO), ("pap9", NOT_SO)],
 )
 def test_measured_loops_have_the_cause_that_the_literature_gives(name, truth):
-    time, op, pv = np.loadtxt(LOOPS / f"{name}.csv", delimiter=",", skiprows=1).T
-    assert cr.valves.diagnose_loop(op, pv, dt=time[1] - time[0]).verdict == truth
+    record = measured.record(f"valve_loops/{name}")
+    assert cr.valves.diagnose_loop(record).verdict == truth
+    # and it is no test of a valve, either
+    told = cr.valves.valve_report(record, fit=False).verdict
+    assert told == "Cannot tell: the records contain no valve test."

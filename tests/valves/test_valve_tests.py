@@ -1,7 +1,6 @@
 """Valve tests on simulated valves whose metrics are known in closed form."""
 
 import pickle
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,7 +13,6 @@ from ctrl_realize.errors import DataError, NoStepError, OptionError
 DT, DEAD_TIME, LAG = 0.05, 0.25, 0.3
 PERCENT = {"u": "%", "y": "%"}
 QUICK = {"fit": False}
-LOOPS = Path(__file__).resolve().parents[3] / "shared" / "data" / "valve_loops"
 
 
 def command_of(levels, hold, dt=DT):
@@ -274,16 +272,6 @@ def test_records_of_operation_end_in_a_verdict_that_names_the_missing_tests():
     # its command is about one sample of 1 s ahead of the stem
     assert report.metric("fitted_dead_time").interval.high < 3.0
     assert "valve_test_plan" in report.report()
-
-
-@pytest.mark.parametrize("loop", ["chem1", "pap9"])
-def test_loops_of_plants_are_not_taken_for_a_test(loop):
-    file = LOOPS / f"{loop}.csv"
-    if not file.is_file():
-        pytest.skip("measured loops are not beside the project")
-    time, command, value = np.loadtxt(file, delimiter=",", skiprows=1, unpack=True)
-    report = valves.valve_report(cr.Record(time, command, value), **QUICK)
-    assert report.verdict == "Cannot tell: the records contain no valve test."
 
 
 def test_noise_spikes_and_drives_in_milliamperes_leave_the_parts_as_they_are():

@@ -2,7 +2,6 @@
 
 import functools
 import pickle
-from pathlib import Path
 
 import control as ct
 import numpy as np
@@ -18,7 +17,6 @@ from tests.rigs import codes
 DT, DEAD_TIME, LAG, NOISE = 0.01, 0.123, 0.4, 0.01
 GAINS = (1.0, 0.5, 0.25)
 ONE_LAG = [(1, 1)]
-DATA = Path(__file__).resolve().parents[4] / "shared" / "data"
 
 
 def step(seed, gain, *, level=0.0, height=2.0, lag=LAG, n=700, dead_time=DEAD_TIME, noise=NOISE):
@@ -204,13 +202,11 @@ def test_identify_and_campaigns_take_own_gains():
     assert_allclose(campaign.system.fit.gains.gains, GAINS, atol=0.005)
 
 
-@pytest.mark.skipif(not DATA.is_dir(), reason="measured records are absent")
-def test_a_free_response_does_not_take_the_place_of_the_response_to_the_step():
-    paths = sorted((DATA / "two_cart_drive").glob("v*.csv"))[1:]
+def test_a_free_response_does_not_take_the_place_of_the_response_to_the_step(shared_data):
+    paths = sorted((shared_data / "two_cart_drive").glob("v*.csv"))[1:]
     records = [cr.read_record(path) for path in paths]
     assert len(records) == 13
-    highest = max(
-        np.ptp(record.output) / np.ptp(record.input) for record in records
-    )  # 68: a motor with friction overshoots little
+    # 68: a motor with friction overshoots little
+    highest = max(np.ptp(record.output) / np.ptp(record.input) for record in records)
     fit = cr.fit_output_error(records).fit
     assert 0.5 * highest < fit.gain < highest
