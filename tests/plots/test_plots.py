@@ -92,21 +92,6 @@ def test_plots_draw_into_what_they_are_given_and_make_no_figure_of_their_own(eve
     assert plt.get_fignums() == []
 
 
-def test_the_phase_is_right_at_a_long_delay_on_a_coarse_grid():
-    # 30 points in three decades: the phase turns by many times between neighbours.
-    model = cr.delayed_ss(ct.tf([1], [0.08, 1]), dead_time=0.25, dt=7.8125e-4)
-    frequency = np.geomspace(0.05, 50.0, 30)
-    frf = cr.MeasuredFRF(
-        np.exp(-2j * np.pi * frequency * 0.25) / (1 + 2j * np.pi * frequency * 0.08), frequency
-    )
-    drawn = plots.frf_plot([frf, model], ax=Figure())
-    for line in drawn.lines[1, 0]:
-        hertz, phase = line.get_xdata(), line.get_ydata()
-        exact = -360 * 0.25 * hertz - np.degrees(np.arctan(2 * np.pi * hertz * 0.08))
-        # The model lags by half a sample more: 7 degrees at 50 Hz.
-        assert_allclose(phase, exact, atol=8.0)
-
-
 def test_all_that_was_measured_is_shown_and_the_trusted_band_is_marked(valve):
     frequency = np.geomspace(0.1, 50.0, 300)
     truth = valve.truth.frf(frequency)
