@@ -30,6 +30,12 @@ def codes(result: ct.StateSpace | ModelFit) -> set[str]:
     return {flag.code for flag in fit.flags}
 
 
+def covers(fit: ModelFit, delay: float) -> bool:
+    """Whether the interval of the dead time holds `delay` samples."""
+    low, high = fit.delay_interval
+    return low <= delay <= high
+
+
 DT = 0.1  # sample time in s of the two plants that follow
 TWO_STATES = cr.DelayedStateSpace(
     ct.ss([[0.8, 0.1], [0.0, 0.6]], [[0.0], [1.0]], [[0.5, 0.1]], [[0.0]], DT), 5

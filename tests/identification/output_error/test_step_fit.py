@@ -10,15 +10,10 @@ import ctrl_realize as cr
 from ctrl_realize import report
 from ctrl_realize.identification.output_error.arguments import known_factor
 from tests import rigs
-from tests.rigs import codes, lag
+from tests.rigs import codes, covers, lag
 
 TS = rigs.TS
 THREE = {"structures": [(3, 3)]}
-
-
-def covers(fit, delay: float) -> bool:
-    low, high = fit.delay_interval
-    return low <= delay <= high
 
 
 def changed(record: cr.Record, output) -> cr.Record:
