@@ -49,7 +49,7 @@ def band(value: Any, name: str, what: str) -> tuple[float, float]:
     return real(ends[0], name, what), real(ends[1], name, what)
 
 
-def whole(value: Any, name: str, low: int, high: int | None = None) -> int:
+def integer(value: Any, name: str, low: int, high: int | None = None) -> int:
     """Return `value` as an int; it must be a whole number in low...high."""
     limits = f">= {low}" if high is None else f"in {low}...{high}"
     if isinstance(value, bool) or not isinstance(value, Integral):

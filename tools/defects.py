@@ -139,7 +139,7 @@ DEFECTS = (
     _d("coloured noise ignored", "noise is never made white", "if adequate and whiten:",
        "if False:", "step_data lags_flow decisions", FITS),
     _d("every model adequate", "a residual with structure passes for noise",
-       "if whole.normalized_rms <= ADEQUATE * data.colour:", "if True:",
+       "if fits.normalized_rms <= ADEQUATE * data.colour:", "if True:",
        "step_data step_fit decisions", FITS),
     _d("needless zeros", "zeros and poles cost nothing more",
        "NEEDLESS_ZERO, NEEDLESS_POLE = 6.0, 4.0",

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import paper
-from .._checks import positive, whole
+from .._checks import integer, positive
 from ..actuators import Actuator
 from ..data import Record
 from ..errors import OptionError
@@ -156,7 +156,7 @@ class Valve:
         >>> len(records), records[4].name
         (40, 'valve_16mA_05')
         """
-        whole(repeats, "repeats", 1)
+        integer(repeats, "repeats", 1)
         generator = np.random.default_rng(rng)
         return tuple(
             self.step_record(
@@ -251,8 +251,8 @@ class Valve:
         >>> cr.bench.valve(hysteresis=0.01).static_test(rng=1)
         <Record 'valve_static': 29440 samples of 0.0125 s, 1 input, 1 output>
         """
-        whole(levels, "levels", 3)
-        whole(cycles, "cycles", 1)
+        integer(levels, "levels", 3)
+        integer(cycles, "cycles", 1)
         dt = _STATIC_DECIMATION * self.dt
         each = round(positive(hold, "hold", "time in s") / dt)
         up = np.linspace(*paper.SETUP.current_range, levels)
@@ -318,8 +318,8 @@ class Valve:
         >>> sweep[0][4]
         <Record 'valve_sine_001_5': 640 samples of 0.0640625 s, 1 input, 1 output>
         """
-        whole(points, "points", 1)
-        whole(repeats, "repeats", 1)
+        integer(points, "points", 1)
+        integer(repeats, "repeats", 1)
         if amplitude is None:
             amplitude = self.sine_amplitude
         positive(amplitude, "amplitude", "amplitude in mA")

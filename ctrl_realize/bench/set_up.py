@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import Literal
 
 from .. import paper
-from .._checks import one_of, positive, real, whole
+from .._checks import integer, one_of, positive, real
 from ..actuators import Actuator, Backlash, SlewRateLimit
 from ..actuators.base import actuators_of
 from ..errors import OptionError
@@ -141,7 +141,7 @@ def valve(
     positive(pre_step_time, "pre_step_time", "time in s")
     positive(hold, "hold", "time in s")
     if bits is not None:
-        whole(bits, "bits", 2, 32)
+        integer(bits, "bits", 2, 32)
     if slew_limit is not None:
         positive(slew_limit, "slew_limit", "speed in strokes per second")
     thin: list[Actuator] = [] if slew_limit is None else [SlewRateLimit(100.0 * slew_limit)]

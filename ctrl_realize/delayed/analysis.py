@@ -8,7 +8,7 @@ import control as ct
 import numpy as np
 from scipy.optimize import brentq
 
-from .._checks import real, whole
+from .._checks import integer, real
 from ..numerics.arrays import ComplexArray
 from .parts import CoreAndDelays
 
@@ -34,7 +34,7 @@ class DelayedAnalysis(CoreAndDelays):
         ndarray
             Descending in magnitude.
         """
-        wanted = whole(count, "count", 1)
+        wanted = integer(count, "count", 1)
         poles = np.asarray(self._core.poles(), dtype=np.complex128)
         poles = poles[np.lexsort((-poles.imag, -np.abs(poles)))]
         split = wanted < poles.size and poles[wanted - 1].imag > 0

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from .._checks import whole
+from .._checks import integer
 from ..errors import DelayRangeError, OptionError
 from ..numerics.arrays import ComplexArray, FloatArray, whole_power
 
@@ -22,7 +22,7 @@ def parse_delays(given: int | Sequence[int], count: int, name: str, side: str) -
     if len(values) != count:
         raise DelayRangeError(f"{name}={given!r}; the core has {count} {side}(s)")
     try:
-        return tuple(whole(value, name, 0) for value in values)
+        return tuple(integer(value, name, 0) for value in values)
     except OptionError as error:
         raise DelayRangeError(f"{error}; for a fractional dead time see delayed_ss") from None
 

@@ -238,8 +238,8 @@ class HostResponses(HostMargins):
         # an integrator, or an oscillation, is seen for five times as long as the rest
         lasting = rates < ON_CIRCLE
         slow = float(np.max(np.log(1000) / rates[~lasting], initial=0.0))
-        dead_time = self.features()[1] / float(self.dt)
-        count = (slow + dead_time) * (5 if lasting.any() else 1)
+        delay = self.features()[1] / float(self.dt)
+        count = (slow + delay) * (5 if lasting.any() else 1)
         return int(np.clip(np.ceil(count) + 1, FEWEST, MOST))
 
     def _state(self, given: ArrayLike) -> FloatArray | None:

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .._checks import whole
+from .._checks import integer
 from ..numerics.arrays import ComplexArray, FloatArray, later
 from ..numerics.internal_delays.recurrence import recurrence
 from ..numerics.state_space import responses
@@ -48,7 +48,7 @@ class DelayedResponses(HostResponses, CoreAndDelays):
         -------
         ndarray, shape (count,) or (outputs, inputs, count)
         """
-        return self._with_delay(responses.markov, whole(count, "count", 1))
+        return self._with_delay(responses.markov, integer(count, "count", 1))
 
     def step(self, count: int) -> FloatArray:
         """Compute the response to a unit step on each input, delay included.
@@ -59,7 +59,7 @@ class DelayedResponses(HostResponses, CoreAndDelays):
         -------
         ndarray, shape (count,) or (outputs, inputs, count)
         """
-        return self._with_delay(responses.step_response, whole(count, "count", 1))
+        return self._with_delay(responses.step_response, integer(count, "count", 1))
 
     def _simulated(self, inputs: FloatArray, state: FloatArray | None = None) -> FloatArray:
         if state is not None:

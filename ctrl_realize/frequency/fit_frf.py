@@ -9,7 +9,7 @@ from typing import Literal
 import control as ct
 import numpy as np
 
-from .._checks import positive, whole
+from .._checks import integer, positive
 from ..delayed import DelayedStateSpace
 from ..errors import DataError, OptionError, OrderError
 from ..numerics.arrays import FloatArray
@@ -191,7 +191,7 @@ def _candidates(given: int | Sequence[int] | None, name: str, low: int) -> tuple
     if not values:
         raise OrderError(f"{name}={given!r} is empty; expected at least one number")
     try:
-        return tuple(sorted({whole(value, name, low, 30) for value in values}))
+        return tuple(sorted({integer(value, name, low, 30) for value in values}))
     except OptionError as error:
         raise OrderError(str(error)) from error
 

@@ -7,7 +7,7 @@ from typing import Literal
 import control as ct
 import numpy as np
 
-from .._checks import one_of, positive, whole
+from .._checks import integer, one_of, positive
 from ..data.impulse_estimate import ImpulseEstimate
 from ..errors import DataError
 from ..numerics.arrays import ComplexArray, FloatArray
@@ -116,7 +116,7 @@ def impulse_from_frf(
     """
     kernel = one_of(kernel, "kernel", ("TC", "DC", "SS"))
     step = positive(dt, "dt", "sample time in s")
-    count = whole(length, "length", 8)
+    count = integer(length, "length", 8)
     weighting = one_of(weighting, "weighting", ("auto", "std", "relative", "uniform"))
     points = frf_points(frf, weighting, band_hz, below_hz=0.5 / step)
     if weighting == "auto" and not points.noise_known:

@@ -7,7 +7,7 @@ from typing import Literal
 
 import numpy as np
 
-from .._checks import one_of, real, whole
+from .._checks import integer, one_of, real
 from ..data import MeasuredFRF, Record
 from ..data.given import as_records, check_complete
 from ..errors import DataError, OptionError, TimeAxisError
@@ -123,11 +123,11 @@ def spectral_frf(
     2.0 True
     """
     method = one_of(method, "method", ("H1", "H2", "Hv"))
-    whole(delay, "delay", 0)
+    integer(delay, "delay", 0)
     stream = _aligned(records, delay)
     if period is not None:
-        whole(period, "period", 4)
-        whole(skip_periods, "skip_periods", 0)
+        integer(period, "period", 4)
+        integer(skip_periods, "skip_periods", 0)
         if segment is not None:
             raise OptionError(
                 "expected segment or period, got both; give only period for periodic records"

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.signal import get_window
 
-from .._checks import whole
+from .._checks import integer
 from ..errors import DataError, OptionError
 from ..numerics.arrays import FloatArray
 from ..numerics.rational.spectra import SpectralSums, independent_segments, segment_sums
@@ -114,7 +114,7 @@ def _many_channels(
 
 
 def _window(length: int, window: str | tuple[str, float]) -> FloatArray:
-    whole(length, "segment", 8)
+    integer(length, "segment", 8)
     try:
         return np.asarray(get_window(window, length), dtype=np.float64)
     except (ValueError, TypeError) as error:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Literal, TypedDict
 import control as ct
 import numpy as np
 
-from .._checks import one_of, whole
+from .._checks import integer, one_of
 from ..data import Record
 from ..data.given import as_records
 from ..data.shown_units import in_shown_units
@@ -239,5 +239,5 @@ def _requested(order: int | None, structures: Structures | None) -> Structures |
         raise OptionError("expected order or structures, got both")
     from .process_structures import MOST_ORDER
 
-    order = whole(order, "order", 1, MOST_ORDER)
+    order = integer(order, "order", 1, MOST_ORDER)
     return [(order, degree) for degree in range(1, order + 1)]

@@ -14,7 +14,7 @@ from typing import Any, TypeAlias
 import control as ct
 import numpy as np
 
-from .._checks import whole
+from .._checks import integer
 from ..delayed import DelayedStateSpace, DelaySystem
 from ..delayed.inside.pure import TransferDelay
 from ..errors import CtrlRealizeError, FileFormatError, OptionError
@@ -130,7 +130,7 @@ def load_model(path: str | os.PathLike[str], *, max_states: int | None = None) -
     (37, 'valve')
     """
     if max_states is not None:
-        whole(max_states, "max_states", 0)
+        integer(max_states, "max_states", 0)
     file = usable_file(path, MAX_MODEL_BYTES)
     try:
         text = file.read_bytes().decode("utf-8")

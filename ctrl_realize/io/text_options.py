@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from .._checks import whole
+from .._checks import integer
 from ..errors import OptionError
 
 _IN_NUMBERS = {"delimiter": frozenset("0123456789eE"), "comment": frozenset("0123456789eE.,+-")}
@@ -41,7 +41,7 @@ class TextOptions:
                 raise OptionError(f"{name}={mark!r} would split numbers")
         if self.header not in (True, False, "auto"):
             raise OptionError(f"header={self.header!r} must be True, False or 'auto'")
-        whole(self.skip_rows, "skip_rows", 0)
+        integer(self.skip_rows, "skip_rows", 0)
         if self.encoding != "auto":
             try:
                 # also refuses Python's codecs other than text encodings: zlib, rot13

@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
-from .._checks import whole
+from .._checks import integer
 from ..data import Record
 from ..errors import OptionError
 from ..identification.state_space_fit.result import StateSpaceFit
@@ -52,8 +52,8 @@ def residual_plot(
     >>> cplt.figure.axes[-1].get_xlabel()
     'lag [samples]'
     """
-    row = whole(output, "output", 0, check.fit_percent.size - 1)
-    column = whole(input, "input", 0, check.cross.shape[1] - 1)
+    row = integer(output, "output", 0, check.fit_percent.size - 1)
+    column = integer(input, "input", 0, check.cross.shape[1] - 1)
     label = f"simulated, fit {check.fit_percent[row]:.1f} %"
     simulated = np.atleast_2d(check.simulated)[row]
     lags = check.lags
@@ -101,8 +101,8 @@ def model_comparison_plot(
     ['measured', 'two lags, 99.6 %']
     """
     first, record = comparison.checks[0], comparison.record
-    row = whole(output, "output", 0, first.fit_percent.size - 1)
-    column = whole(input, "input", 0, first.cross.shape[1] - 1)
+    row = integer(output, "output", 0, first.fit_percent.size - 1)
+    column = integer(input, "input", 0, first.cross.shape[1] - 1)
     with style.canvas(
         ax, 4, title=title,
         size=(8.0, 8.4), heights=(2.2, 1.0, 1.0, 1.0), sharex=False,
@@ -173,7 +173,7 @@ def state_space_fit_plot(fit: StateSpaceFit, *, record: int = 0, **kwargs: Any) 
     """
     if not fit.checks:
         raise OptionError("all records have gaps; there is no simulation to plot")
-    return residual_plot(fit.checks[whole(record, "record", 0, len(fit.checks) - 1)], **kwargs)
+    return residual_plot(fit.checks[integer(record, "record", 0, len(fit.checks) - 1)], **kwargs)
 
 
 @documented()
@@ -204,7 +204,7 @@ def prediction_plot(
     >>> [text.get_text() for text in cplt.figure.axes[0].get_legend().get_texts()]
     ['measured', '10 ahead, fit 99.8 %']
     """
-    row = whole(output, "output", 0, prediction.fit_percent.size - 1)
+    row = integer(output, "output", 0, prediction.fit_percent.size - 1)
     label = f"{prediction.horizon} ahead, fit {prediction.fit_percent[row]:.1f} %"
     values = np.atleast_2d(prediction.output)[row]
     with style.canvas(ax, title=title) as (axes,):

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from .._checks import positive, real, whole
+from .._checks import integer, positive, real
 from .._wording import in_time
 from ..data import Record
 from ..data.given import as_record
@@ -110,7 +110,7 @@ def valve_test_plan(
     middle = real(center, "center", "command in % of the span")
     largest = max(sizes, default=0.0)
     step = positive(small_step, "small_step", "step in %")
-    count = whole(stairs, "stairs", 3, 16)
+    count = integer(stairs, "stairs", 3, 16)
     reach = max(largest, step * count)
     if middle < reach or middle + reach > 100:
         raise OptionError(
@@ -130,10 +130,10 @@ def valve_test_plan(
             level += way * step
             levels.append(("staircase", level, small))
     for size in sizes:
-        for _ in range(whole(repeats, "repeats", 1)):
+        for _ in range(integer(repeats, "repeats", 1)):
             for way in (1, 0, -1, 0):
                 levels.append((f"steps of {size:g} %", middle + way * size, hold(size)))
-    if whole(strokes, "strokes", 0):
+    if integer(strokes, "strokes", 0):
         levels.append(("strokes", 0.0, hold(100.0)))
         levels += [("strokes", end, hold(100.0)) for _ in range(strokes) for end in (100.0, 0.0)]
     ramp = 100 / _LAG * fast if ramp_time is None else positive(ramp_time, "ramp_time", "time in s")

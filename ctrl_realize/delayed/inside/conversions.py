@@ -8,7 +8,7 @@ import control as ct
 import numpy as np
 from scipy.linalg import expm
 
-from ..._checks import positive, whole
+from ..._checks import integer, positive
 from ...errors import DelayRangeError, ModelWarning, UnsuitableSystemError, warn_caller
 from ...numerics.arrays import FloatArray
 from ...numerics.internal_delays import form as forms
@@ -52,7 +52,7 @@ class InsideConversions(DelayOperators):
             raise UnsuitableSystemError(
                 f"{self.name!r} is discrete; ct.ss(sys) represents its delays exactly, as states"
             )
-        count = whole(order, "order", 1, MAX_PADE_ORDER)
+        count = integer(order, "order", 1, MAX_PADE_ORDER)
         form = self._form()
         opened = DelayForm(form.A, form.B, form.C, form.D)
         m, p, q = form.inputs, form.outputs, len(form.delays)

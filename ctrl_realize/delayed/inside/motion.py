@@ -150,8 +150,8 @@ class Motion(InsidePoles):
         poles = self.dominant_poles(4)
         rates = np.abs(poles.real[np.abs(poles.real) > 1e-6 * (np.abs(poles).max(initial=0.0))])
         slow = 6 / float(rates.min()) if rates.size else 0.0
-        dead_time = float(sum(self.internal_delays))
-        return min(max(slow + dead_time, 5 * dead_time), 100 * dead_time + slow) or 1.0
+        delay = float(sum(self.internal_delays))
+        return min(max(slow + delay, 5 * delay), 100 * delay + slow) or 1.0
 
 
 def _unit_signal(m: int, j: int) -> Callable[[FloatArray], FloatArray]:

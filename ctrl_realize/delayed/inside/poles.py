@@ -8,7 +8,7 @@ import control as ct
 import numpy as np
 from scipy.optimize import brentq
 
-from ..._checks import real, whole
+from ..._checks import integer, real
 from ...errors import UnsuitableSystemError
 from ...numerics.arrays import ComplexArray, FloatArray
 from ...numerics.internal_delays import characteristic, dominant, spectrum
@@ -84,7 +84,7 @@ class InsidePoles(HostResponses, DelayOperators):
         >>> loop.nstates, abs(loop.dominant_poles(1)).round(6)
         (10001, array([0.999931, 0.999931]))
         """
-        wanted = whole(count, "count", 1)
+        wanted = integer(count, "count", 1)
         if self.dt:
             return dominant.dominant_discrete_poles(self._form(), wanted)
         return spectrum.rightmost_poles(self._form(), wanted)

@@ -8,7 +8,7 @@ import control as ct
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..._checks import whole
+from ..._checks import integer
 from ...errors import OptionError
 from ...numerics.arrays import ComplexArray, FloatArray
 from ...numerics.internal_delays.recurrence import recurrence
@@ -130,7 +130,7 @@ class InsideResponses(Motion, HostResponses, DelayOperators):
         -------
         ndarray, shape (count,) or (outputs, inputs, count)
         """
-        pulse = np.zeros(whole(count, "count", 1))
+        pulse = np.zeros(integer(count, "count", 1))
         pulse[0] = 1.0
         return self._one_by_one(pulse, "impulse_response")
 
@@ -141,7 +141,7 @@ class InsideResponses(Motion, HostResponses, DelayOperators):
         -------
         ndarray, shape (count,) or (outputs, inputs, count)
         """
-        return self._one_by_one(np.ones(whole(count, "count", 1)), "step_response")
+        return self._one_by_one(np.ones(integer(count, "count", 1)), "step_response")
 
     def _one_by_one(self, signal: FloatArray, instead: str) -> FloatArray:
         self._refuse_continuous(instead)

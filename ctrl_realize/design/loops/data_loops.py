@@ -9,7 +9,7 @@ import control as ct
 import numpy as np
 from scipy.interpolate import PchipInterpolator
 
-from ..._checks import whole
+from ..._checks import integer
 from ...delayed.parts import check_entries
 from ...errors import DataError
 from ...frequency.points import MeasuredPoints, measured_points
@@ -121,8 +121,8 @@ def data_loop(
         dead_time,
         PchipInterpolator(x, np.log(np.abs(values))),
         PchipInterpolator(x, phase),
-        whole(unstable_poles, "unstable_poles", 0),
-        whole(integrators, "integrators", 0),
+        integer(unstable_poles, "unstable_poles", 0),
+        integer(integrators, "integrators", 0),
     )
 
 

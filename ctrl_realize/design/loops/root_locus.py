@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.optimize import linear_sum_assignment
 
-from ..._checks import numbers, whole
+from ..._checks import integer, numbers
 from ...delayed import DelayedStateSpace, DelaySystem
 from ...errors import DataError, UnsuitableSystemError
 from ...numerics.arrays import ComplexArray, FloatArray
@@ -76,7 +76,7 @@ def root_locus(system: Any, gains: ArrayLike | None = None, *, count: int = 10) 
     >>> print(np.abs(locus.loci).max(axis=1).round(4))
     [0.9993 1.     1.0001]
     """
-    wanted = whole(count, "count", 1)
+    wanted = integer(count, "count", 1)
     loop = _with_delays(system)
     values = _gains(loop) if gains is None else _given(gains)
     few = min(wanted + 2 + wanted // 2, loop.nstates) if loop.dt else wanted + 2 + wanted // 2

@@ -7,7 +7,7 @@ import math
 import control as ct
 import numpy as np
 
-from ..._checks import positive, real, whole
+from ..._checks import integer, positive, real
 from ...delayed import DelayedStateSpace
 from ...errors import DelayRangeError
 from ...numerics.arrays import FloatArray
@@ -60,7 +60,7 @@ def pade_ss(dead_time: float, order: int = 5, *, name: str | None = None) -> ct.
     1.1e-06
     """
     dead_time = positive(dead_time, "dead_time", "dead time in s")
-    ladder = pade_ladder(dead_time, whole(order, "order", 1, MAX_PADE_ORDER))
+    ladder = pade_ladder(dead_time, integer(order, "order", 1, MAX_PADE_ORDER))
     named = {} if name is None else {"name": name}
     return ct.StateSpace(*ladder, 0, inputs=["u"], outputs=["y"], **named)
 
@@ -107,7 +107,7 @@ def thiran(dead_time: float, dt: float, order: int = 3) -> DelayedStateSpace:
     """
     step = positive(dt, "dt", "sample time in s")
     dead_time = real(dead_time, "dead_time", "dead time in s, >= 0")
-    most = whole(order, "order", 1, MAX_PADE_ORDER)
+    most = integer(order, "order", 1, MAX_PADE_ORDER)
     if dead_time < 0:
         raise DelayRangeError(f"dead_time={dead_time:g} s; expected a value >= 0")
     samples, rest = split_dead_time(dead_time, step)

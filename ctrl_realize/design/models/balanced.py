@@ -8,7 +8,7 @@ from typing import Any
 import control as ct
 import numpy as np
 
-from ..._checks import positive, whole
+from ..._checks import integer, positive
 from ...delayed import DelayedStateSpace
 from ...errors import OptionError, OrderError
 from ...numerics.arrays import FloatArray, read_only
@@ -195,7 +195,7 @@ def reduce(
         tails = 2 * np.cumsum(balanced_truncation(A, B, C, 0)[3][::-1])[::-1]
         wanted = int(np.sum(tails > limit))
     else:
-        wanted = whole(order, "order", 0) - kept
+        wanted = integer(order, "order", 0) - kept
         if wanted < 0 or order > core.nstates:
             raise OrderError(
                 f"order={order}; the core has order {core.nstates}, of which {kept} state(s) on or "

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ..._checks import real, whole
+from ..._checks import integer, real
 from ...delayed import DelayedStateSpace
 from ...errors import UnsuitableSystemError
 from ...numerics.arrays import FloatArray
@@ -101,7 +101,7 @@ def simulate_loop(
     0.0 -1.0
     """
     plant = delayed_system(system, "simulate_loop")
-    whole(count, "count", 2, MOST)
+    integer(count, "count", 2, MOST)
     height = real(setpoint_step, "setpoint_step", "height of a step")
     disturbance = real(load_step, "load_step", "height of a step")
     noise = real(noise_std, "noise_std", "standard deviation")

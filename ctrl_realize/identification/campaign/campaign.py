@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..._checks import whole
+from ..._checks import integer
 from ..._wording import in_time
 from ...delayed import DelayedStateSpace, fit_of
 from ...errors import DataError
@@ -118,7 +118,7 @@ class Campaign(Result):
         """
         count = len(self.good)
         _ = self.dt
-        drop = min(3, count // 4) if trim is None else whole(trim, "trim", 0)
+        drop = min(3, count // 4) if trim is None else integer(trim, "trim", 0)
         if 2 * drop >= count:
             raise DataError(f"trim={drop} removes all {count} delays")
         return trimmed_statistics(self.delays, drop, ddof=ddof)

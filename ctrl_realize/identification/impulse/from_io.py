@@ -8,7 +8,7 @@ from typing import Literal
 
 import numpy as np
 
-from ..._checks import one_of, whole
+from ..._checks import integer, one_of
 from ...data import Record
 from ...data.given import as_records
 from ...data.impulse_estimate import ImpulseEstimate
@@ -144,7 +144,7 @@ def impulse_from_io(
         # A window that ends before the response begins would show neither response nor tail.
         count = min(max(SHORTEST, 2 * _latest_onset(group, most)), most)
     else:
-        count = whole(length, "length", 2)
+        count = integer(length, "length", 2)
     chosen = choose_estimate(group, count, start) if method == "auto" else None
     while True:
         found = _estimate(group, count, start, chosen, (method, kernel, arx_order))

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import fdtrc, ndtri
 
-from ..._checks import whole
+from ..._checks import integer
 from ...data import Record
 from ...errors import DataError
 from ...numerics.arrays import FloatArray
@@ -141,7 +141,7 @@ def through_arx(
         most = min(count - 1, total // (5 * (m + p)) - 1)
         orders = tuple(q for q in OKID_ORDERS if q <= most) or (1,)
     else:
-        orders = (whole(arx_order, "arx_order", 1),)
+        orders = (integer(arx_order, "arx_order", 1),)
     while True:
         top = orders[-1]
         equations = _okid_equations(group, top, start)

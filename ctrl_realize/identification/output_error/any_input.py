@@ -205,13 +205,13 @@ def _cut(records: tuple[Record, ...], used: tuple[int, ...], found: SampledFit) 
     ]
     if not long:
         return ()
-    whole, size, offset = max(long)
+    fits, size, offset = max(long)
     others = f", and so of {len(long) - 1} more" if len(long) > 1 else ""
     return (
         Flag(
             "cut",
             f"{size} samples were fitted, from sample {offset} on, of a record of "
-            f"{whole}{others}; select the best part with `between`, or pass parts as several "
+            f"{fits}{others}; select the best part with `between`, or pass parts as several "
             "records",
         ),
     )

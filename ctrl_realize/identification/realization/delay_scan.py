@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..._checks import whole
+from ..._checks import integer
 from ...data import ImpulseResponse
 from ...delayed import DelayedStateSpace, fit_of
 from ...errors import OrderError
@@ -100,7 +100,7 @@ def estimate_delay(
     >>> sys.delay, sys.fit.delay_interval
     (37, (37, 38))
     """
-    order = whole(order, "order", 1)
+    order = integer(order, "order", 1)
     surface = scan_surface(impulse, (order,), max_delay, samples, feedthrough, hankel, dt)
     return best_of(surface, order)
 

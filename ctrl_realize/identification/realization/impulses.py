@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..._checks import whole
+from ..._checks import integer
 from ...data import ImpulseResponse
 from ...errors import DataError, DelayRangeError, OptionError, OrderError
 from ...numerics.arrays import FloatArray
@@ -64,7 +64,7 @@ def check_samples(
     if samples is None:
         samples = available - 1 - max_delay
     else:
-        samples = whole(samples, "samples", 2)
+        samples = integer(samples, "samples", 2)
         if samples + max_delay + 1 > available:
             raise DelayRangeError(
                 f"samples={samples} and {what}={max_delay} need {samples + max_delay + 1} "

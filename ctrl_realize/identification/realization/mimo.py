@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..._checks import one_of, real, whole
+from ..._checks import integer, one_of, real
 from ...data import ImpulseResponse
 from ...data.impulse_estimate import ImpulseEstimate
 from ...delayed import DelayedStateSpace
@@ -254,7 +254,7 @@ def realize_mimo(
     True
     """
     data = as_impulse(impulse, dt)
-    count = whole(order, "order", 1)
+    count = integer(order, "order", 1)
     choice = one_of(structure, "structure", ("auto", "common", "rows", "columns"))
     hankel = one_of(hankel, "hankel", HANKEL)
     markov = channels(data)

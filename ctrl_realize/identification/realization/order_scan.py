@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..._checks import whole
+from ..._checks import integer
 from ...data import ImpulseResponse
 from ...delayed import DelayedStateSpace
 from ...errors import OptionError
@@ -114,7 +114,7 @@ class OrderScan(Result):
         DelayedStateSpace
             Its `fit` is a `DelayScan`.
         """
-        chosen = self.order if order is None else whole(order, "order", 1)
+        chosen = self.order if order is None else integer(order, "order", 1)
         if chosen not in self.orders:
             raise OptionError(f"order={chosen} was not scanned; choose one of {self.orders}")
         return best_of(self._surface, chosen)
@@ -263,8 +263,8 @@ def scan_orders(
 
 def _orders(orders: int | Iterable[int]) -> tuple[int, ...]:
     if isinstance(orders, Iterable):
-        tried = sorted({whole(order, "orders", 1) for order in orders})
+        tried = sorted({integer(order, "orders", 1) for order in orders})
         if not tried:
             raise OptionError("orders is empty; expected at least one order")
         return tuple(tried)
-    return tuple(range(1, whole(orders, "orders", 1) + 1))
+    return tuple(range(1, integer(orders, "orders", 1) + 1))

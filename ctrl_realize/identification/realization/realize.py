@@ -6,7 +6,7 @@ import control as ct
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..._checks import one_of, whole
+from ..._checks import integer, one_of
 from ...data import ImpulseResponse
 from ...delayed import DelayedStateSpace
 from ...errors import OrderError
@@ -108,8 +108,8 @@ def realize(
     (3, array([0.9]))
     """
     data = as_impulse(impulse, dt)
-    order = whole(order, "order", 1)
-    delay = whole(delay, "delay", 0)
+    order = integer(order, "order", 1)
+    delay = integer(delay, "delay", 0)
     hankel = one_of(hankel, "hankel", HANKEL)
     padded = hankel == "padded"
     samples = check_samples(data, samples, order, delay, padded=padded, what="delay")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from ..._checks import whole
+from ..._checks import integer
 from ..._wording import in_time
 from ...data import ImpulseResponse, Record
 from ...numerics.arrays import FloatArray, read_only
@@ -107,7 +107,7 @@ class Realization(ModelFit):
         -------
         ndarray, shape (count,), or fewer if the matrix is smaller
         """
-        count = whole(count, "count", 1)
+        count = integer(count, "count", 1)
         padded = self.hankel == "padded"
         size = hankel_size(self.samples, padded=padded)
         count = min(count, size * min(self.impulse.ninputs, self.impulse.noutputs))

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..._checks import one_of, whole
+from ..._checks import integer, one_of
 from ...data import ImpulseResponse
 from ...numerics.arrays import FloatArray
 from ...numerics.hankel.delay_models import DelayModels, hankel_size, misfit, realize_at_delays
@@ -66,7 +66,7 @@ def scan_surface(
 ) -> Surface:
     """Check the arguments, decompose for every delay, and compute all IAEs over one window."""
     data = as_impulse(impulse, dt)
-    max_delay = whole(max_delay, "max_delay", 0)
+    max_delay = integer(max_delay, "max_delay", 0)
     hankel = one_of(hankel, "hankel", HANKEL)
     padded = hankel == "padded"
     highest = max(orders)

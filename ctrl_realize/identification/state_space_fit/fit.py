@@ -9,7 +9,7 @@ import control as ct
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..._checks import whole
+from ..._checks import integer
 from ...data import Record
 from ...data.shown_units import in_shown_units
 from ...delayed import DelayedStateSpace, fit_of
@@ -158,9 +158,9 @@ def refine_state_space(
     >>> print(refined.poles().real.max().round(6))
     0.8
     """
-    whole = as_group(records)
-    _check_signals(whole, feedthrough)
-    group, cut = lively_parts(whole)
+    everything = as_group(records)
+    _check_signals(everything, feedthrough)
+    group, cut = lively_parts(everything)
     model = as_delayed(system, group[0], stable=False)
     core = model.delay_free
     if core.nstates == 0:
@@ -177,7 +177,7 @@ def _orders(order: int | Iterable[int] | None) -> tuple[int, ...] | None:
     if order is None:
         return None
     given = order if isinstance(order, Iterable) else (order,)
-    orders = tuple(sorted({whole(n, "order", 1) for n in given}))
+    orders = tuple(sorted({integer(n, "order", 1) for n in given}))
     if not orders:
         raise OrderError("order is empty; expected at least one order")
     return orders

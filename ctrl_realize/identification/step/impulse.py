@@ -6,7 +6,7 @@ from typing import Literal
 
 import numpy as np
 
-from ..._checks import one_of, positive, whole
+from ..._checks import integer, one_of, positive
 from ...data import FilterSpec, ImpulseResponse, StepResponse
 from ...errors import DataError, OptionError
 from ...numerics.arrays import FloatArray
@@ -87,7 +87,7 @@ def impulse_from_step(
     """
     if not isinstance(step, StepResponse):
         raise DataError(f"step is a {type(step).__name__}; expected a StepResponse, see unit_step")
-    order = whole(filter_order, "filter_order", 1, 10)
+    order = integer(filter_order, "filter_order", 1, 10)
     difference = one_of(difference, "difference", ("backward", "central"))
     cutoff = _cutoff(step, cutoff_hz)
     # The samples before the step are included, so that differentiation and filter have settled at

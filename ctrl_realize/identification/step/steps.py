@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..._checks import real, whole
+from ..._checks import integer, real
 from ..._wording import named
 from ...data import Record, StepEdge, StepResponse
 from ...data.given import as_record, check_complete, check_input
@@ -82,7 +82,7 @@ def found_step(
         # A short record does not contain a window of that length on both sides of its step.
         spikes = min(spikes, max((record.n_samples - 3) // 6, 0))
     else:
-        spikes = whole(spike_samples, "spike_samples", 0, record.n_samples // 3)
+        spikes = integer(spike_samples, "spike_samples", 0, record.n_samples // 3)
     share = real(min_share, "min_share", "part of the input's range, above 0 and below 1")
     if not 0 < share < 1:
         raise OptionError(f"min_share={share:g}; expected a value above 0 and below 1")

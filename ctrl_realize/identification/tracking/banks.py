@@ -68,8 +68,8 @@ class Banks:
         self._next.bank.update(u, y)
         if count == self._next.begin:
             self._next.bank.restart()
-        dead_time = SHORT_RUN_IN if self.pending else RUN_IN
-        if count < self._next.begin + dead_time * self._span:
+        run_in = SHORT_RUN_IN if self.pending else RUN_IN
+        if count < self._next.begin + run_in * self._span:
             return False
         self.now, self._next = self._next, None
         return True
@@ -77,16 +77,16 @@ class Banks:
     def follow(self, found: Solution, count: int) -> None:
         """Start a bank for the moved poles, to be used when it has enough samples."""
         clear = np.abs(found.moves) > np.maximum(MOVED, CLEAR_MOVE * found.move_std)
-        if self._next is not None or not np.any(clear) or not found.sees_reply:
+        if self._next is not None or not np.any(clear) or not found.responds:
             return
         step = np.clip(np.where(clear, found.moves, 0.0), -LEAP, LEAP)
         made = moved_core(self.now.core, self._zeros, self.now.directions, step, self._dt)
         if made is None:
             return
         fresh = self._about(*made, self.now.moved + step)
-        dead_time = fresh.bank.settling()
-        if dead_time is not None:
-            self._next = replace(fresh, begin=count + dead_time + self._candidates[1] + 1)
+        settling = fresh.bank.settling()
+        if settling is not None:
+            self._next = replace(fresh, begin=count + settling + self._candidates[1] + 1)
 
     def core_at(self, found: Solution | None) -> Core:
         """Return the core with its poles moved to the estimates; the zeros are unchanged."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import control as ct
 import numpy as np
 
-from ..._checks import positive, whole
+from ..._checks import integer, positive
 from ...data import Record
 from ...data.given import check_complete
 from ...delayed import DelayedStateSpace
@@ -19,7 +19,7 @@ LONGEST = 1e12
 
 def check_candidates(min_delay: int, max_delay: int) -> tuple[int, int]:
     """Return the first and the last candidate delay."""
-    low, high = whole(min_delay, "min_delay", 0), whole(max_delay, "max_delay", 0)
+    low, high = integer(min_delay, "min_delay", 0), integer(max_delay, "max_delay", 0)
     if high <= low:
         raise DelayRangeError(f"delays {low}...{high} leave only one candidate")
     return low, high

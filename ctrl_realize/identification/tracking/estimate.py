@@ -20,7 +20,7 @@ CLEAR_GAIN = 3.0
 SHOWN_MOVE = 2.0
 """Largest move of a pole that is computed, as logarithm of the speed ratio."""
 
-LOUD, LOUD_AFTER_MOVES = 3.0, 1.2
+EXCESS, EXCESS_AFTER_MOVES = 3.0, 1.2
 """Residual, relative to the model's noise, above which no estimate is given: nine times the power
 is not explained by the same plant. Moved poles are accepted only if the residual does not exceed
 the noise: otherwise slower poles can take the place of a delay beyond the candidates (a delay of
@@ -54,13 +54,13 @@ class Solution:
     """Best candidate of a bank, and its uncertainty.
 
     ``theta`` contains the gain, then the gain times the `moves` of the poles; `delay` is in samples
-    and `place` the same with its fraction. `reply_std` is the size of the response; `sees_reply` is
-    false if the output does not respond to the input; `reason` states why the delay is not
-    resolved, and is empty if it is.
+    and `delay_estimate` the same with its fraction. `response_std` is the size of the response;
+    `responds` is false if the output does not respond to the input; `reason` states why the delay
+    is not resolved, and is empty if it is.
     """
 
     delay: int
-    place: float
+    delay_estimate: float
     interval: tuple[int, int]
     theta: FloatArray
     offset: float
@@ -68,8 +68,8 @@ class Solution:
     move_std: FloatArray
     pole_speed_ratios: tuple[float, ...]
     variance: float
-    reply_std: float
-    sees_reply: bool
+    response_std: float
+    responds: bool
     reason: str
 
     @property
@@ -109,11 +109,11 @@ def solve(now: LinearisedBank, variance: float, inflation: float) -> Solution:
     gain, gain_std = float(theta[0]), float(std[0])
     moves = _relative(theta)
     speeds = [i for i, (what, _, _) in enumerate(now.directions) if what == "speed"]
-    unseen = _no_reply(float(found.power - found.weighted_sse[best]) / noise, gain, gain_std)
+    unseen = _no_response(float(found.power - found.weighted_sse[best]) / noise, gain, gain_std)
     open_still = _no_choice(delay, interval, (bank.low, bank.high))
     return Solution(
         delay=delay,
-        place=delay + _fraction(found.weighted_sse, best),
+        delay_estimate=delay + _fraction(found.weighted_sse, best),
         interval=interval,
         theta=theta,
         offset=float(found.offset[best]),
@@ -123,8 +123,8 @@ def solve(now: LinearisedBank, variance: float, inflation: float) -> Solution:
             float(np.exp(now.moved[i] + np.clip(moves[i], -SHOWN_MOVE, SHOWN_MOVE))) for i in speeds
         ),
         variance=variance,
-        reply_std=float(np.sqrt(max(found.power - found.weighted_sse[best], 0.0) / bank.weight)),
-        sees_reply=not unseen,
+        response_std=float(np.sqrt(max(found.power - found.weighted_sse[best], 0.0) / bank.weight)),
+        responds=not unseen,
         reason=unseen or open_still or _too_far(moves[speeds]),
     )
 
@@ -151,7 +151,7 @@ def _fraction(misfit: FloatArray, best: int) -> float:
     return float((before - after) / (2 * bend)) if bend > 0 else 0.0
 
 
-def _no_reply(explained: float, gain: float, gain_std: float) -> str:
+def _no_response(explained: float, gain: float, gain_std: float) -> str:
     """State why the output does not respond to the input; `explained` is in noise variances."""
     if explained < SIGNIFICANT:
         return "no movement above the noise within the forgetting time"
@@ -183,10 +183,10 @@ def _too_far(speeds: FloatArray) -> str:
     )
 
 
-def too_loud(found: Solution, noise: float, limit: float) -> str:
+def excess_residual(found: Solution, noise: float, limit: float) -> str:
     """Report that the residual exceeds `limit` times the noise of the model."""
     left = float(np.sqrt(found.variance))
-    if noise == 0 or left <= limit * noise or left <= NEGLIGIBLE * found.reply_std:
+    if noise == 0 or left <= limit * noise or left <= NEGLIGIBLE * found.response_std:
         return ""
     return (
         f"the track is lost: the residual, {left:.3g}, is {plainly(left / noise, 2)} times the "

@@ -123,8 +123,8 @@ class TrackPoint(ModelFit):
         ]
 
     def __repr__(self) -> str:
-        told = "" if self.resolved else f", not resolved: {self.reason}"
-        return f"<TrackPoint {self.delay} {self.delay_interval} at {self.time:.6g} s{told}>"
+        reason = "" if self.resolved else f", not resolved: {self.reason}"
+        return f"<TrackPoint {self.delay} {self.delay_interval} at {self.time:.6g} s{reason}>"
 
 
 @dataclass(frozen=True, eq=False)
@@ -193,15 +193,15 @@ class TrackHistory(Result):
         return "Tracked delay"
 
     def _rows(self) -> list[tuple[str, str]]:
-        told = np.flatnonzero(self.resolved)
-        share = f"{told.size} of {self.time.size} points"
+        resolved = np.flatnonzero(self.resolved)
+        share = f"{resolved.size} of {self.time.size} points"
         if self.lost.any():
             share += f", track lost at {int(self.lost.sum())}"
-        if told.size == 0:
-            return [("told", share)]
-        first, last = told[0], told[-1]
+        if resolved.size == 0:
+            return [("resolved", share)]
+        first, last = resolved[0], resolved[-1]
         return [
-            ("told", share),
+            ("resolved", share),
             ("first", f"{self.delay[first]:.2f} samples at {self.time[first]:.6g} s"),
             ("last", f"{self.delay[last]:.2f} samples at {self.time[last]:.6g} s"),
             ("gain", f"{self.gain_ratio[first]:.4g} to {self.gain_ratio[last]:.4g}"),
@@ -211,19 +211,19 @@ class TrackHistory(Result):
         return f"<TrackHistory: {self.time.size} points, resolved at {int(self.resolved.sum())}>"
 
 
-def track_of(course: Sequence[TrackPoint], dt: float) -> TrackHistory:
+def track_of(points: Sequence[TrackPoint], dt: float) -> TrackHistory:
     """Collect single estimates in the arrays of a history."""
 
     def along(values: Iterable[float]) -> FloatArray:
         return read_only(np.array(list(values)))
 
     return TrackHistory(
-        time=along(moment.time for moment in course),
-        dead_time=along(moment.dead_time for moment in course),
-        low=along(moment.interval[0] for moment in course),
-        high=along(moment.interval[1] for moment in course),
-        gain_ratio=along(moment.gain_ratio for moment in course),
-        resolved=locked(np.array([moment.resolved for moment in course])),
-        lost=locked(np.array([moment.lost for moment in course])),
+        time=along(point.time for point in points),
+        dead_time=along(point.dead_time for point in points),
+        low=along(point.interval[0] for point in points),
+        high=along(point.interval[1] for point in points),
+        gain_ratio=along(point.gain_ratio for point in points),
+        resolved=locked(np.array([point.resolved for point in points])),
+        lost=locked(np.array([point.lost for point in points])),
         dt=dt,
     )

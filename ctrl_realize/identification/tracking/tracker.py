@@ -24,7 +24,7 @@ from .checks import (
     model_noise,
     starting_core,
 )
-from .estimate import LOUD, LOUD_AFTER_MOVES, Solution, solve, too_loud
+from .estimate import EXCESS, EXCESS_AFTER_MOVES, Solution, excess_residual, solve
 from .results import TrackHistory, TrackPoint, track_of
 
 MOMENTS = 50
@@ -163,14 +163,14 @@ class DelayTracker:
         # Sample at which the sums were last solved.
         self._variance = 0.0
         self._solution: Solution | None = None
-        self._told = self._nothing_yet()
+        self._point = self._unresolved_point()
         # Delays within the last forgetting time; NaN where the delay was not resolved.
-        self._places: deque[float] = deque(maxlen=MOMENTS)
+        self._recent_delays: deque[float] = deque(maxlen=MOMENTS)
 
     def __repr__(self) -> str:
         return (
             f"<DelayTracker: delays {self._low}...{self._high}, {self._count} samples, "
-            f"{self._told!r}>"
+            f"{self._point!r}>"
         )
 
     def update(self, u: float, y: float) -> None:
@@ -192,8 +192,8 @@ class DelayTracker:
         if self._banks.update(moved, seen, self._count):
             self._solution = None
         if self._solution is not None:
-            reply = self._banks.now.bank.predict(self._solution.delay, self._solution.theta)
-            self._residual.add(seen - self._solution.offset - reply)
+            response = self._banks.now.bank.predict(self._solution.delay, self._solution.theta)
+            self._residual.add(seen - self._solution.offset - response)
         if self._count % self._stride == 0:
             self._residual.close_sum()
             self._keep(self._solve())
@@ -236,11 +236,11 @@ class DelayTracker:
     @property
     def model(self) -> DelayedStateSpace:
         """Present plant model, with the estimate as its `fit`; zeros are unchanged."""
-        found, told = self._latest()
+        found, point = self._latest()
         A, B, C, D = self._banks.core_at(found)
-        gain = told.gain_ratio
+        gain = point.gain_ratio
         return DelayedStateSpace(
-            ct.ss(A, B[:, None], gain * C[None], gain * D, self.dt), told.delay, fit=told
+            ct.ss(A, B[:, None], gain * C[None], gain * D, self.dt), point.delay, fit=point
         )
 
     @single_threaded
@@ -253,17 +253,17 @@ class DelayTracker:
             A record with several channels, missing samples, or another sample time.
         """
         check_record(record, self.dt)
-        course: list[TrackPoint] = []
+        points: list[TrackPoint] = []
         for u, y in zip(record.input.ravel(), record.output.ravel(), strict=True):
             self.update(float(u), float(y))
             if self._count % self._stride == 0:
-                course.append(self._told)
-        if not course:
+                points.append(self._point)
+        if not points:
             raise DataError(
                 f"the record has {record.n_samples} samples, fewer than the {self._stride} "
                 "between two estimates"
             )
-        return track_of(course, self.dt)
+        return track_of(points, self.dt)
 
     def _solve(self) -> Solution | None:
         """Solve for the present estimate; None while there are too few samples."""
@@ -274,23 +274,25 @@ class DelayTracker:
     def _latest(self) -> tuple[Solution | None, TrackPoint]:
         """Return the present solution: the stored one if no sample has been added since."""
         if self._count % self._stride == 0:
-            return self._solution, self._told
+            return self._solution, self._point
         found = self._solve()
-        return found, self._tell(found)
+        return found, self._point_of(found)
 
     def _keep(self, found: Solution | None) -> None:
         """Update the state from a solution, and start a new bank if the poles have moved."""
-        self._told = self._tell(found)
+        self._point = self._point_of(found)
         full = self._count >= self._span
-        if found is not None and full and self._told.resolved and not self._banks.moved:
+        if found is not None and full and self._point.resolved and not self._banks.moved:
             self._least = min(self._least, float(np.sqrt(found.variance)))
-        self._places.append(self._told.dead_time / self.dt if self._told.resolved else np.nan)
+        self._recent_delays.append(
+            self._point.dead_time / self.dt if self._point.resolved else np.nan
+        )
         if found is None:
             return
         self._solution, self._variance = found, found.variance
         self._banks.follow(found, self._count)
 
-    def _nothing_yet(self) -> TrackPoint:
+    def _unresolved_point(self) -> TrackPoint:
         low = self._low
         return TrackPoint(
             time=max(self._count - 1, 0) * self.dt,
@@ -306,47 +308,47 @@ class DelayTracker:
             reason=f"only {self._count} samples yet" if self._count else "no samples yet",
         )
 
-    def _tell(self, found: Solution | None) -> TrackPoint:
+    def _point_of(self, found: Solution | None) -> TrackPoint:
         if found is None:
-            return self._nothing_yet()
-        loud, pending = self._too_loud(found), self._banks.pending
+            return self._unresolved_point()
+        excess, pending = self._excess_residual(found), self._banks.pending
         return TrackPoint(
             time=(self._count - 1) * self.dt,
             delay=found.delay,
-            dead_time=found.place * self.dt,
-            delay_interval=self._with_trail(found.interval, found.place),
+            dead_time=found.delay_estimate * self.dt,
+            delay_interval=self._widened(found.interval, found.delay_estimate),
             dt=self.dt,
             gain_ratio=found.gain,
             gain_std=found.gain_std,
             pole_speed_ratios=found.pole_speed_ratios,
             noise_std=float(np.sqrt(found.variance)),
-            resolved=not (found.reason or loud or pending),
-            reason=found.reason or loud or pending,
-            lost=bool(loud),
+            resolved=not (found.reason or excess or pending),
+            reason=found.reason or excess or pending,
+            lost=bool(excess),
         )
 
-    def _too_loud(self, found: Solution) -> str:
+    def _excess_residual(self, found: Solution) -> str:
         """Report that the residual exceeds the noise of the model."""
         noise = self._noise_std or self._least
         moved = self._banks.moved
         if moved and not np.isfinite(noise) and self._well_sampled:
             noise = self._residual.noise_std
         # The noise observed so far may have been unusually small.
-        limit = LOUD_AFTER_MOVES if moved and noise != self._least else LOUD
-        return too_loud(found, noise, limit)
+        limit = EXCESS_AFTER_MOVES if moved and noise != self._least else EXCESS
+        return excess_residual(found, noise, limit)
 
-    def _with_trail(self, interval: tuple[int, int], place: float) -> tuple[int, int]:
+    def _widened(self, interval: tuple[int, int], delay_estimate: float) -> tuple[int, int]:
         """Widen an interval by the change of the delay over one forgetting time, and for a pending
         move of the poles.
 
         The mean age of the samples is one forgetting time, so the estimate lags a moving delay by
         about this change.
         """
-        before = self._places[0] if self._places else np.nan
-        way = 0.0 if np.isnan(before) else place - before
+        before = self._recent_delays[0] if self._recent_delays else np.nan
+        change = 0.0 if np.isnan(before) else delay_estimate - before
         off = abs(self._banks.step_made) * self._lag
-        low = max(interval[0] + int(np.floor(min(way, 0.0) - off)), self._low)
-        return low, min(interval[1] + int(np.ceil(max(way, 0.0) + off)), self._high)
+        low = max(interval[0] + int(np.floor(min(change, 0.0) - off)), self._low)
+        return low, min(interval[1] + int(np.ceil(max(change, 0.0) + off)), self._high)
 
 
 def _parts(core: ct.StateSpace) -> tuple[Core, ComplexArray]:

@@ -8,7 +8,7 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from ..._checks import numbers, whole
+from ..._checks import integer, numbers
 from ..._wording import in_time, interval_in_time, time_within
 from ...data import Record
 from ...data.given import as_records
@@ -226,8 +226,8 @@ def bootstrap(
     >>> print(f"{again.interval[0]:.4f} to {again.interval[1]:.4f} s")
     0.1245 to 0.1253 s
     """
-    count = whole(repeats, "repeats", 2)
-    whole(seed, "seed", 0)
+    count = integer(repeats, "repeats", 2)
+    integer(seed, "seed", 0)
     if not callable(estimator):
         raise OptionError(f"estimator={estimator!r}; expected a function of the records")
     several = as_records(records)
@@ -311,7 +311,7 @@ def _model_and_residual(system: DelayedStateSpace, record: Record) -> tuple[Floa
 def _block(parts: list[tuple[FloatArray, FloatArray]], block: int | None) -> int:
     shortest = min(residual.size for _, residual in parts)
     if block is not None:
-        return whole(block, "block", 1, shortest)
+        return integer(block, "block", 1, shortest)
     time = max(correlation_time(residual) for _, residual in parts)
     return int(np.clip(round(_BLOCK_OVER_CORRELATION * time), 1, max(shortest // 4, 1)))
 

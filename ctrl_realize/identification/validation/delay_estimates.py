@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..._checks import whole
+from ..._checks import integer
 from ...data import MeasuredFRF, Record
 from ...data.given import check_complete
 from ...delayed import fit_of
@@ -104,9 +104,9 @@ def compare_delay_estimates(
     if record is None and frf is None:
         raise DataError("expected a record or an FRF, got neither")
     if max_delay is not None:
-        whole(max_delay, "max_delay", 0)
+        integer(max_delay, "max_delay", 0)
     if order is not None:
-        whole(order, "order", 1)
+        integer(order, "order", 1)
     views: list[DelayEstimate] = []
     flags: list[Flag] = []
     if record is not None:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import control as ct
 import numpy as np
 
-from ..._checks import whole
+from ..._checks import integer
 from ..._wording import in_percent
 from ...data import Record
 from ...delayed.simulation import Start, simulate_record
@@ -126,7 +126,7 @@ def predict(
     1 [87.]
     10 [65.]
     """
-    ahead = whole(horizon, "horizon", 1)
+    ahead = integer(horizon, "horizon", 1)
     simulated = simulate_record(system, record, start)
     y = np.atleast_2d(record.output)
     most = min(NOISE_ORDER, record.n_samples // 10)

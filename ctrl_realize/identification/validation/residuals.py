@@ -6,7 +6,7 @@ import control as ct
 import numpy as np
 from scipy.special import ndtri
 
-from ..._checks import real, whole
+from ..._checks import integer, real
 from ...data import Record
 from ...data.given import as_record
 from ...delayed import DelayedStateSpace
@@ -86,7 +86,7 @@ def analyse_residuals(
     >>> cr.validation.analyse_residuals(plant.replace(delay=4), record).independent
     False
     """
-    count = whole(lags, "lags", 1)
+    count = integer(lags, "lags", 1)
     level = _level(confidence)
     simulated = simulate_record(system, as_record(record), start)
     y, u = np.atleast_2d(record.output), np.atleast_2d(record.input)

@@ -235,11 +235,11 @@ class _Pace:
         self._excess = np.inf
 
     def set(self, steps: int, excess: float) -> None:
-        waited, dead_time = steps - self._looked, min(2.0, self._longest)
+        since, pause = steps - self._looked, min(2.0, self._longest)
         if 1 < excess < self._excess < np.inf:
-            needed = waited * np.log(excess) / np.log(self._excess / excess)
-            dead_time = min(max(0.6 * needed, dead_time), self._longest)
-        self.next_look, self._looked, self._excess = steps + int(dead_time), steps, excess
+            needed = since * np.log(excess) / np.log(self._excess / excess)
+            pause = min(max(0.6 * needed, pause), self._longest)
+        self.next_look, self._looked, self._excess = steps + int(pause), steps, excess
 
 
 def _fall_back(

@@ -25,7 +25,7 @@ _MOST_ORDER = ALL_STRUCTURES[-1].order  # highest order that is tried
 
 
 def better_structure(
-    whole: WindowFit, given: Candidate, refit: Callable[[], WindowFit]
+    fits: WindowFit, given: Candidate, refit: Callable[[], WindowFit]
 ) -> StructureFit | None:
     """Find a structure that rules out the given one; None if there is none.
 
@@ -34,14 +34,14 @@ def better_structure(
 
     Parameters
     ----------
-    whole : WindowFit
+    fits : WindowFit
         Of the requested structures.
     given : Candidate
         The best of them.
     refit : callable
         Fit of the default structures.
     """
-    if not _lacks_a_pole(whole, given):
+    if not _lacks_a_pole(fits, given):
         return None
     free = refit()
     best = free.best
@@ -67,16 +67,16 @@ def better_structure(
     )
 
 
-def _lacks_a_pole(whole: WindowFit, given: Candidate) -> bool:
+def _lacks_a_pole(fits: WindowFit, given: Candidate) -> bool:
     n, r = given.structure.order, given.structure.relative_degree
     if n >= _MOST_ORDER:
         return False
     # Without Huber's clipping towards the given model, which may hide its errors.
-    problem = whole.window.problem
+    problem = fits.window.problem
     state = evaluate(problem, given.structure, given.parameters[None])
     start = Candidate(given.structure, given.parameters, float(state.cost[0]))
     richer = (Structure(n + 1, r + 1), Structure(n + 1, r))
-    found = search(problem, richer, whole.scales, {given.structure: start})
+    found = search(problem, richer, fits.scales, {given.structure: start})
     least = min(found[s].cost for s in richer)
     # Relative to the residual of the richer ones: that of the given one may be large and
     # correlated.

@@ -41,51 +41,51 @@ something that the noise does not: plain least squares are safer. Ablation: unli
 alone."""
 
 
-def in_coloured_noise(whole: WindowFit, data: StepData) -> WindowFit:
-    """Fit by generalised least squares if the baseline noise is coloured; otherwise return `whole`.
+def in_coloured_noise(fits: WindowFit, data: StepData) -> WindowFit:
+    """Fit by generalised least squares if the baseline noise is coloured; otherwise return `fits`.
 
     White baseline noise is not changed: correlation of the residual is then a misfit. Neither are
     records with gaps: an autoregression from the covariances of the pairs of samples that there are
     (Parzen 1963) need not be stable, and with 30 % missing its intervals were no narrower.
     """
-    bins = whole.window.bins
-    if data.coarse or bins is None or whole.problem.segments is not None:
-        return whole
+    bins = fits.window.bins
+    if data.coarse or bins is None or fits.problem.segments is not None:
+        return fits
     if np.ptp(np.diff(data.rows)) > 0:
-        return whole
-    error = whole.window.output - whole.window.predict(whole.problem, whole.best)
+        return fits
+    error = fits.window.output - fits.window.predict(fits.problem, fits.best)
     rest = error[: data.edge]
     if rest.size < _FEWEST:
-        return whole
+        return fits
     samples = correlation_time(rest)
-    if samples < max(_COLOURED, 0.5 * whole.correlation) or rest.size < _TIMES * samples:
-        return whole
+    if samples < max(_COLOURED, 0.5 * fits.correlation) or rest.size < _TIMES * samples:
+        return fits
     # Not the pseudo-values of Huber's loss, which distort smooth noise.
-    limit = _WILD * max(mad_sigma(error), whole.sigma)
-    plain = whole.window.with_output(whole.window.output - error + np.clip(error, -limit, limit))
+    limit = _WILD * max(mad_sigma(error), fits.sigma)
+    plain = fits.window.with_output(fits.window.output - error + np.clip(error, -limit, limit))
     covariance = noise_covariance(_quiet(error, data), error.size)
     if covariance.size == 1:
-        return whole
+        return fits
     problem = replace(plain, whitener=whitener(bins, covariance))
-    candidates = _fitted_again(whole, problem)
-    candidates = converged(problem, candidates, whole.scales, whole.sigma**2, whole.independent)
-    refit = replace(whole, problem=problem, candidates=candidates, colour=1.0)
+    candidates = _fitted_again(fits, problem)
+    candidates = converged(problem, candidates, fits.scales, fits.sigma**2, fits.independent)
+    refit = replace(fits, problem=problem, candidates=candidates, colour=1.0)
     chosen = candidates[choose(refit.criteria(candidates))]
-    lost = 1 + chosen.structure.order + chosen.structure.zeros + whole.window.columns.shape[1]
-    colour = chosen.cost / max(problem.data.size - lost, 1) / whole.sigma**2
+    lost = 1 + chosen.structure.order + chosen.structure.zeros + fits.window.columns.shape[1]
+    colour = chosen.cost / max(problem.data.size - lost, 1) / fits.sigma**2
     if colour > _UNLIKE**2:
-        return whole
+        return fits
     refit = replace(refit, colour=max(colour, 1.0))
     return replace(refit, criterion=refit.criteria(candidates))
 
 
-def _fitted_again(whole: WindowFit, problem: Problem) -> dict[Structure, Candidate]:
+def _fitted_again(fits: WindowFit, problem: Problem) -> dict[Structure, Candidate]:
     """Fit all structures, starting from the previous optima and those next to them."""
     found: dict[Structure, Candidate] = {}
-    for structure in sorted(whole.candidates, key=lambda s: (s.order, s.zeros)):
-        starts = _dead_times_near(problem, whole.candidates[structure], whole.scales)
-        starts += neighbour_starts(structure, whole.scales, found)
-        bounds = parameter_bounds(structure, whole.scales)
+    for structure in sorted(fits.candidates, key=lambda s: (s.order, s.zeros)):
+        starts = _dead_times_near(problem, fits.candidates[structure], fits.scales)
+        starts += neighbour_starts(structure, fits.scales, found)
+        bounds = parameter_bounds(structure, fits.scales)
         parameters, cost = fit_batch(problem, structure, np.array(starts), bounds)
         order = np.argsort(cost)
         best = order[0]

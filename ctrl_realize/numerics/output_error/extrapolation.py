@@ -34,7 +34,7 @@ _RATIO = 2.0  # of the rates that are tried: time
 
 
 def least_extrapolating(
-    whole: WindowFit, candidate: Candidate, *, dead_time_fixed: bool = False
+    fits: WindowFit, candidate: Candidate, *, dead_time_fixed: bool = False
 ) -> tuple[Candidate, StaticGain]:
     """Return the model with the fastest slow pole that is not ruled out (95 %), to a factor of two.
 
@@ -43,22 +43,22 @@ def least_extrapolating(
 
     Parameters
     ----------
-    whole : WindowFit
+    fits : WindowFit
     candidate : Candidate
     dead_time_fixed : bool, optional
         Keep the dead time.
     """
-    problem, scales, structure = whole.problem, whole.scales, candidate.structure
+    problem, scales, structure = fits.problem, fits.scales, candidate.structure
     poles = candidate.poles
     slow = int(np.argmin(np.abs(poles)))
-    static = whole.static(candidate)
+    static = fits.static(candidate)
     alone = problem.segments is None and structure.order > 1
     if static.significant or poles[slow].imag or not alone:
         return candidate, static
     rest = Structure(structure.order - 1, structure.relative_degree - 1)
     bounds = parameter_bounds(rest, scales)
     start = np.append(candidate.dead_time, parameters_from_poles(np.delete(poles, slow)))
-    level = candidate.cost + CHI2_95 * whole.variance
+    level = candidate.cost + CHI2_95 * fits.variance
     rate = _FASTEST / scales.length
     while rate > np.abs(poles[slow]):
         factor = KnownFactor(np.append(problem.known.poles, -rate), problem.known.numerator)
@@ -71,7 +71,7 @@ def least_extrapolating(
         if cost <= level and np.abs(free).min() >= rate:
             parameters = np.append(x[0], parameters_from_poles(np.append(free, -rate)))
             found = Candidate(structure, parameters, cost)
-            own = whole.static(found)
+            own = fits.static(found)
             return found, replace(static, gain=own.gain, total=own.total)
         rate /= _RATIO
     return candidate, static

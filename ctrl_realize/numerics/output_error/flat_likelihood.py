@@ -39,14 +39,14 @@ def told(found: OutputErrorEstimate, ratio: float) -> OutputErrorEstimate:
     return replace(found, close=found.close + close_to("likelihood", ratio, 1.0))
 
 
-def pinned(found: OutputErrorEstimate, data: StepData, whole: WindowFit) -> float:
+def pinned(found: OutputErrorEstimate, data: StepData, fits: WindowFit) -> float:
     """Below 1 if a likelihood is flat down to the earliest dead time, and its maximum there.
 
     So it may be where the residual is quantised, or correlated in a way that is not known.
     """
-    white = not data.coarse and whole.correlation == 1.0
+    white = not data.coarse and fits.correlation == 1.0
     lags = found.distributed.chain is None and not found.distributed.follows_flow
-    if white or found.residual.whitened or not lags or found.low > whole.scales.earliest:
+    if white or found.residual.whitened or not lags or found.low > fits.scales.earliest:
         return np.inf
     return float((found.dead_time - found.low) / max(_PINNED * (found.high - found.low), SMALLEST))
 
@@ -70,26 +70,26 @@ def later(found: OutputErrorEstimate, views: tuple[tuple[RobustKey, float], ...]
 
 
 def moved(
-    found: OutputErrorEstimate, whole: WindowFit, views: tuple[tuple[RobustKey, float], ...]
+    found: OutputErrorEstimate, fits: WindowFit, views: tuple[tuple[RobustKey, float], ...]
 ) -> OutputErrorEstimate:
     """Put the dead time at the median of the delay estimates; the interval is not changed."""
     dead_time = float(np.clip(np.median([at for _, at in views[:-1]]), found.low, found.high))
-    own = whole.candidates[found.structure]
-    fixed = at_dead_time(whole.problem, own, whole.scales, dead_time)
-    fixed, static = least_extrapolating(whole, fixed, dead_time_fixed=True)
-    state = evaluate(whole.problem, fixed.structure, fixed.parameters[None])
+    own = fits.candidates[found.structure]
+    fixed = at_dead_time(fits.problem, own, fits.scales, dead_time)
+    fixed, static = least_extrapolating(fits, fixed, dead_time_fixed=True)
+    state = evaluate(fits.problem, fixed.structure, fixed.parameters[None])
     return replace(
         found,
         dead_time=dead_time,
         poles=fixed.poles,
         numerator=state.numerator[0],
-        fitted=whole.window.predict(whole.problem, fixed),
-        followed=followed_by(whole, fixed, state.numerator[0]),
+        fitted=fits.window.predict(fits.problem, fixed),
+        followed=followed_by(fits, fixed, state.numerator[0]),
         static=static,
         delay_estimates=views,
         process=found.process._replace(
             parameters=process_parameters(
-                fixed.poles, state.numerator[0], dead_time, whole.scales.length
+                fixed.poles, state.numerator[0], dead_time, fits.scales.length
             )
         ),
     )

@@ -33,12 +33,12 @@ _S_AND_J = 2  # parameters of friction; behind a single lag the dead time takes 
 _POINTS = 16  # dead times at which the friction is tried: time
 
 
-def latest_slip(whole: WindowFit, lags: Candidate) -> float | None:
+def latest_slip(fits: WindowFit, lags: Candidate) -> float | None:
     """Latest time in s at which a stem behind lags may have come loose.
 
     Parameters
     ----------
-    whole : WindowFit
+    fits : WindowFit
     lags : Candidate
         The chosen structure, without zeros.
 
@@ -48,7 +48,7 @@ def latest_slip(whole: WindowFit, lags: Candidate) -> float | None:
         Upper end of its 95 % interval, or where it fits as well as the lags; None if friction is
         ruled out, or the visible onset is at the dead time of the lags.
     """
-    scales = whole.scales
+    scales = fits.scales
     first, last = lags.dead_time, scales.latest
     count = min(int((last - first) / scales.dt) + 1, _POINTS)
     if count < 2:
@@ -58,11 +58,11 @@ def latest_slip(whole: WindowFit, lags: Candidate) -> float | None:
     starts = np.tile(lags.parameters, (count, 1))
     starts[:, 0] = grid
     box = parameter_bounds(slips, scales)
-    costs = polish(whole.problem, slips, starts, box, scales.dt, dead_time_fixed=True)[1]
-    gained = (lags.cost - costs.min()) / whole.variance
-    charge = max(slips.zeros, _S_AND_J) * max(LEAST_CHARGE, whole.penalty)
+    costs = polish(fits.problem, slips, starts, box, scales.dt, dead_time_fixed=True)[1]
+    gained = (lags.cost - costs.min()) / fits.variance
+    charge = max(slips.zeros, _S_AND_J) * max(LEAST_CHARGE, fits.penalty)
     if charge - gained <= PLAUSIBLE:
-        return profile_limits(grid, (costs - costs.min()) / whole.variance)[1]
+        return profile_limits(grid, (costs - costs.min()) / fits.variance)[1]
     if slips.zeros != _S_AND_J:
         return None  # the modes of more lags can do more than slip
     # Noise hides friction as it hides lags, and does not remove it.

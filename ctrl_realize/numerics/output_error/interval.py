@@ -60,7 +60,7 @@ _MOST_ROUNDS = 6
 
 
 def likelihood_fit(
-    whole: WindowFit,
+    fits: WindowFit,
     *,
     adequate: bool,
     chains: Sequence[LagChain] = (),
@@ -78,11 +78,11 @@ def likelihood_fit(
     and `better` are those of the result, `near` are close decisions made before.
     """
     tanks = [chain for chain in chains if not chain.hidden]
-    whole, choice, kept = _compared(whole, tanks, chains, flows)
-    chosen, scales = choice.model, whole.scales
+    fits, choice, kept = _compared(fits, tanks, chains, flows)
+    chosen, scales = choice.model, fits.scales
     own = kept.profile_of(choice, scales)
     if choice.chain is not None:
-        whole = _with_chain(whole, choice.chain)
+        fits = _with_chain(fits, choice.chain)
         kept.profiles[chosen.structure] = own
     others = kept.other_models(scales)
     limits = [profile_limits(*profile) for profile in kept.profiles.values()]
@@ -95,14 +95,14 @@ def likelihood_fit(
     if onset is not None and open_start:
         low, high = _opened(low, high, chosen.dead_time, onset, scales)
     if may_stick and choice.chain is None and choice.flow is None and not chosen.structure.zeros:
-        high = max(high, latest_slip(whole, chosen) or high)
+        high = max(high, latest_slip(fits, chosen) or high)
     first, last = profile_limits(*own)
     interval = DelayInterval(low, high, (last - first) / (2 * Z_95))
     static = None
     if choice.chain is None and choice.flow is None:
-        chosen, static = least_extrapolating(whole, chosen)
+        chosen, static = least_extrapolating(fits, chosen)
     found = assembled(
-        whole,
+        fits,
         chosen,
         adequate,
         (),
@@ -116,8 +116,8 @@ def likelihood_fit(
     close: tuple[CloseDecision, ...] = near
     if choice.chain is None and choice.flow is None:
         own_structure = chosen.structure
-        close += close_choices(whole, choice.level, own_structure)
-        close += close_exclusions(whole, _charged_level(whole, choice), own_structure)
+        close += close_choices(fits, choice.level, own_structure)
+        close += close_exclusions(fits, _charged_level(fits, choice), own_structure)
     process = found.process
     if choice.chain is not None or choice.flow is not None:
         process = process._replace(parameters=without_errors(process.parameters))
@@ -158,7 +158,7 @@ class _Kept:
 
 
 def _compared(
-    whole: WindowFit,
+    fits: WindowFit,
     tanks: Sequence[LagChain],
     chains: Sequence[LagChain],
     flows: Sequence[DispersedFlow],
@@ -166,37 +166,41 @@ def _compared(
     """Choose, and lay the profiles of what is not ruled out: again where these lead lower."""
     points: dict[Structure, Points] = {}
     for _ in range(_MOST_ROUNDS):
-        choice = choose_model(whole, tanks, flows)
-        values = charged(whole.criterion, whole.penalty)
-        level = _charged_level(whole, choice)
-        free = plausible(whole.candidates, values, whole.variance, choice.model, level)
-        points |= laid_profiles(whole, [s for s in free if s not in points])
+        choice = choose_model(fits, tanks, flows)
+        values = charged(fits.criterion, fits.penalty)
+        level = _charged_level(fits, choice)
+        free = plausible(fits.candidates, values, fits.variance, choice.model, level)
+        points |= laid_profiles(fits, [s for s in free if s not in points])
         kept = {s: points[s] for s in free}
-        lower = lower_minima(whole, kept)
+        lower = lower_minima(fits, kept)
         if not lower:
-            kept = solved_profiles(whole, kept, choice.model.structure)
-            lower = lower_minima(whole, kept)
+            kept = solved_profiles(fits, kept, choice.model.structure)
+            lower = lower_minima(fits, kept)
         if not lower:
             break
-        candidates = whole.candidates | lower
-        whole = replace(whole, candidates=candidates, criterion=whole.criteria(candidates))
+        candidates = fits.candidates | lower
+        fits = replace(fits, candidates=candidates, criterion=fits.criteria(candidates))
         points = {s: own for s, own in points.items() if s not in lower}
-    return whole, choice, _not_ruled_out(whole, choice, chains, flows, curves(whole, kept))
+    return (
+        fits,
+        choice,
+        _not_ruled_out(fits, choice, chains, flows, curves(fits, kept)),
+    )
 
 
 def _not_ruled_out(
-    whole: WindowFit,
+    fits: WindowFit,
     choice: Choice,
     chains: Sequence[LagChain],
     flows: Sequence[DispersedFlow],
     profiles: dict[Structure, Profile],
 ) -> _Kept:
-    more = max(LEAST_CHARGE - whole.penalty, 0.0)
-    limit = _charged_level(whole, choice) + PLAUSIBLE
+    more = max(LEAST_CHARGE - fits.penalty, 0.0)
+    limit = _charged_level(fits, choice) + PLAUSIBLE
     return _Kept(
         profiles,
         [
-            (flow, flow_profile(whole.problem, flow, whole.scales, whole.variance))
+            (flow, flow_profile(fits.problem, flow, fits.scales, fits.variance))
             for flow in flows
             if flow.criterion + more * flow.parameters <= limit
         ],
@@ -204,9 +208,9 @@ def _not_ruled_out(
     )
 
 
-def _charged_level(whole: WindowFit, choice: Choice) -> float:
+def _charged_level(fits: WindowFit, choice: Choice) -> float:
     """Value of the criterion relative to which structures are ruled out."""
-    return choice.level + max(LEAST_CHARGE - whole.penalty, 0.0) * choice.parameters
+    return choice.level + max(LEAST_CHARGE - fits.penalty, 0.0) * choice.parameters
 
 
 def _opened(
@@ -220,10 +224,10 @@ def _opened(
     )
 
 
-def _with_chain(whole: WindowFit, chain: LagChain) -> WindowFit:
+def _with_chain(fits: WindowFit, chain: LagChain) -> WindowFit:
     structure = chain.candidate.structure
     return replace(
-        whole,
-        candidates=whole.candidates | {structure: chain.candidate},
-        criterion=whole.criterion | {structure: chain.criterion},
+        fits,
+        candidates=fits.candidates | {structure: chain.candidate},
+        criterion=fits.criterion | {structure: chain.criterion},
     )

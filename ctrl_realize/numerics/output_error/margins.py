@@ -34,27 +34,32 @@ def close_to(key: DecisionKey, value: float, threshold: float) -> tuple[CloseDec
     return (CloseDecision(key),) if abs(value - threshold) <= CLOSE * threshold else ()
 
 
-def close_choices(whole: WindowFit, level: float, chosen: Structure) -> tuple[CloseDecision, ...]:
+def close_choices(fits: WindowFit, level: float, chosen: Structure) -> tuple[CloseDecision, ...]:
     """List structures whose criterion nearly equals `level`, that of the chosen one.
 
     Also those that could have determined the noise level, on which everything depends.
     """
     near = [
         s
-        for s, value in whole.criterion.items()
+        for s, value in fits.criterion.items()
         if abs(value + needless_parameters(s) - level) <= CLOSE * PLAUSIBLE
     ]
-    near += [s for s, excess in whole.rivals.items() if excess <= CLOSE * PLAUSIBLE]
+    near += [s for s, excess in fits.rivals.items() if excess <= CLOSE * PLAUSIBLE]
     return tuple(CloseDecision("structure", s) for s in dict.fromkeys(near) if s != chosen)
 
 
-def close_exclusions(
-    whole: WindowFit, level: float, chosen: Structure
-) -> tuple[CloseDecision, ...]:
+def close_exclusions(fits: WindowFit, level: float, chosen: Structure) -> tuple[CloseDecision, ...]:
     """List structures that are just ruled out, or just not; `level` includes penalties."""
-    values = charged(whole.criterion, whole.penalty)
+    values = charged(fits.criterion, fits.penalty)
     most, least = (
-        plausible(whole.candidates, values, whole.variance, whole.candidates[chosen], level, slack)
+        plausible(
+            fits.candidates,
+            values,
+            fits.variance,
+            fits.candidates[chosen],
+            level,
+            slack,
+        )
         for slack in (CLOSE * PLAUSIBLE, -CLOSE * PLAUSIBLE)
     )
     return tuple(CloseDecision("ruled_out", s) for s in most if s not in least)

@@ -44,7 +44,7 @@ IsNoise = Callable[[float, float], bool]
 
 
 def process_fit(
-    whole: WindowFit,
+    fits: WindowFit,
     forms: Sequence[ProcessForm],
     *,
     is_noise: IsNoise,
@@ -56,35 +56,33 @@ def process_fit(
 
     Parameters
     ----------
-    whole : WindowFit
+    fits : WindowFit
         Fit of the structures of the forms, without their prescriptions.
     forms : sequence of ProcessForm
     is_noise : callable
     better : StructureFit or None
-        A structure that rules out those of `whole`.
+        A structure that rules out those of `fits`.
     relaxing, near
         As for `likelihood_fit`.
     """
-    adequate = is_noise(whole.normalized_rms, whole.correlation)
-    length = whole.scales.length
-    if all(form.admits(whole.candidates[form.structure], length) for form in forms):
-        found = likelihood_fit(
-            whole, adequate=adequate, relaxing=relaxing, better=better, near=near
-        )
+    adequate = is_noise(fits.normalized_rms, fits.correlation)
+    length = fits.scales.length
+    if all(form.admits(fits.candidates[form.structure], length) for form in forms):
+        found = likelihood_fit(fits, adequate=adequate, relaxing=relaxing, better=better, near=near)
         form = next(form for form in forms if form.structure == found.structure)
         return replace(found, process=found.process._replace(form=form))
-    fits = [_fitted(whole, form) for form in forms]
-    values = [_criterion(whole, fit) for fit in fits]
+    form_fits = [_fitted(fits, form) for form in forms]
+    values = [_criterion(fits, fit) for fit in form_fits]
     best = int(np.argmin(values))
-    chosen = fits[best]
-    host = whole.candidates[chosen.form.structure]
+    chosen = form_fits[best]
+    host = fits.candidates[chosen.form.structure]
     # What the prescriptions cost is part of the noise, if the data contradict them.
-    variance = whole.variance * max(chosen.candidate.cost / max(host.cost, 1e-300), 1.0)
-    if variance > 1.01 * whole.variance:
-        chosen = _fitted(whole, chosen.form, variance)
+    variance = fits.variance * max(chosen.candidate.cost / max(host.cost, 1e-300), 1.0)
+    if variance > 1.01 * fits.variance:
+        chosen = _fitted(fits, chosen.form, variance)
     kept = [
         chosen if i == best else fit
-        for i, fit in enumerate(fits)
+        for i, fit in enumerate(form_fits)
         if values[i] <= values[best] + PLAUSIBLE
     ]
     ends = [profile_limits(*fit.profile) for fit in kept]
@@ -92,12 +90,12 @@ def process_fit(
     interval = DelayInterval(
         min(low for low, _ in ends), max(high for _, high in ends), (last - first) / (2 * Z_95)
     )
-    fitted = _predicted(whole, chosen)
-    rms = whole.normalized_rms * float(np.sqrt(chosen.candidate.cost / max(host.cost, 1e-300)))
-    error = (whole.window.output - fitted)[whole.window.start :]
+    fitted = _predicted(fits, chosen)
+    rms = fits.normalized_rms * float(np.sqrt(chosen.candidate.cost / max(host.cost, 1e-300)))
+    error = (fits.window.output - fitted)[fits.window.start :]
     correlation = correlation_time(error)
     found = assembled(
-        whole,
+        fits,
         chosen.candidate,
         is_noise(rms, correlation),
         (),
@@ -105,51 +103,51 @@ def process_fit(
         interval,
         chosen.profile,
         relaxing=relaxing,
-        better=_better(whole, chosen, better),
+        better=_better(fits, chosen, better),
     )
     return replace(
         found,
         numerator=chosen.numerator,
         fitted=fitted,
-        followed=_followed(whole, chosen, fitted),
+        followed=_followed(fits, chosen, fitted),
         residual=found.residual._replace(
             std=float(np.sqrt(np.mean(error**2))), normalized_rms=rms, correlation=correlation
         ),
-        static=_static(whole, chosen),
+        static=_static(fits, chosen),
         alike=(),
-        structures=_table(fits, values, ends=dict(zip(map(id, kept), ends, strict=True))),
+        structures=_table(form_fits, values, ends=dict(zip(map(id, kept), ends, strict=True))),
         process=ProcessEstimate(chosen.parameters, chosen.form, chosen.at_bound),
         close=near,
     )
 
 
-def _fitted(whole: WindowFit, form: ProcessForm, variance: float | None = None) -> FormFit:
-    like = list(whole.candidates.values())
+def _fitted(fits: WindowFit, form: ProcessForm, variance: float | None = None) -> FormFit:
+    like = list(fits.candidates.values())
     like.sort(key=lambda one: one.structure != form.structure)
     numerators = [
-        evaluate(whole.problem, one.structure, one.parameters[None]).numerator[0] for one in like
+        evaluate(fits.problem, one.structure, one.parameters[None]).numerator[0] for one in like
     ]
-    noise = whole.variance if variance is None else variance
-    return fit_form(whole.problem, form, whole.scales, like, numerators, noise)
+    noise = fits.variance if variance is None else variance
+    return fit_form(fits.problem, form, fits.scales, like, numerators, noise)
 
 
-def _criterion(whole: WindowFit, fit: FormFit) -> float:
-    return fit.candidate.cost / whole.variance + fit.free * whole.penalty
+def _criterion(fits: WindowFit, fit: FormFit) -> float:
+    return fit.candidate.cost / fits.variance + fit.free * fits.penalty
 
 
-def _better(whole: WindowFit, chosen: FormFit, better: StructureFit | None) -> StructureFit | None:
+def _better(fits: WindowFit, chosen: FormFit, better: StructureFit | None) -> StructureFit | None:
     """The structure without the prescriptions, if it rules them out; or what rules out both."""
-    host = whole.candidates[chosen.form.structure]
+    host = fits.candidates[chosen.form.structure]
     more = 2 + host.structure.order + host.structure.zeros - chosen.free
-    excess = (chosen.candidate.cost - host.cost) / whole.variance - more * whole.penalty
+    excess = (chosen.candidate.cost - host.cost) / fits.variance - more * fits.penalty
     if better is not None:
         # relative to the structure without prescriptions, which may be worse: it has no integrator
         both = excess - better.delta_bic
         return replace(better, delta_bic=-both) if both > PLAUSIBLE else None
     if excess <= PLAUSIBLE:
         return None
-    found = likelihood_fit(whole, adequate=True)
-    static = whole.static(whole.candidates[found.structure])
+    found = likelihood_fit(fits, adequate=True)
+    static = fits.static(fits.candidates[found.structure])
     return StructureFit(
         found.structure,
         found.dead_time,
@@ -161,9 +159,9 @@ def _better(whole: WindowFit, chosen: FormFit, better: StructureFit | None) -> S
     )
 
 
-def _predicted(whole: WindowFit, fit: FormFit) -> FloatArray:
+def _predicted(fits: WindowFit, fit: FormFit) -> FloatArray:
     """Model at every sample, with the terms that enter linearly."""
-    window, problem = whole.window, whole.problem
+    window, problem = fits.window, fits.problem
     setting = problem.known, fit.numerator, fit.candidate.parameters
     rest = problem.data - respond(problem.drive, *setting)
     regressors = problem.weighted(problem.regressors)
@@ -179,16 +177,16 @@ def _predicted(whole: WindowFit, fit: FormFit) -> FloatArray:
     return np.asarray(respond(window.drive, *setting) + window.columns @ linear)
 
 
-def _followed(whole: WindowFit, fit: FormFit, fitted: FloatArray) -> Followed:
-    window = whole.window
-    alone = respond(window.drive, whole.problem.known, fit.numerator, fit.candidate.parameters)
+def _followed(fits: WindowFit, fit: FormFit, fitted: FloatArray) -> Followed:
+    window = fits.window
+    alone = respond(window.drive, fits.problem.known, fit.numerator, fit.candidate.parameters)
     alone = alone + np.mean(window.output - alone)
     both = fit_percent(np.tile(window.output, (2, 1)), np.stack([fitted, alone]))
     return Followed(float(both[0]), float(both[1]), fit.form.structure, float(both[0]))
 
 
-def _static(whole: WindowFit, fit: FormFit) -> StaticGain:
-    length, poles = whole.scales.length, fit.candidate.poles
+def _static(fits: WindowFit, fit: FormFit) -> StaticGain:
+    length, poles = fits.scales.length, fit.candidate.poles
     moving = poles[np.abs(poles) * length >= INTEGRATOR]
     gain = next(one for one in fit.parameters if one.name == "gain")
     slow = np.abs(moving)
@@ -205,7 +203,7 @@ def _static(whole: WindowFit, fit: FormFit) -> StaticGain:
 
 
 def _table(
-    fits: Sequence[FormFit],
+    form_fits: Sequence[FormFit],
     values: Sequence[float],
     ends: dict[int, tuple[float, float]],
 ) -> tuple[StructureFit, ...]:
@@ -219,6 +217,6 @@ def _table(
             fit.candidate.poles,
             float(fit.numerator[0] / np.prod(-fit.candidate.poles).real),
         )
-        for fit, value in zip(fits, values, strict=True)
+        for fit, value in zip(form_fits, values, strict=True)
     ]
     return tuple(sorted(lines, key=lambda line: line.delta_bic))

@@ -39,19 +39,19 @@ Profile: TypeAlias = tuple[FloatArray, FloatArray]
 """Dead times, and the misfit at each; see `dead_time_profile`."""
 
 
-def profile_of(whole: WindowFit, candidate: Candidate) -> Profile:
+def profile_of(fits: WindowFit, candidate: Candidate) -> Profile:
     """Misfit over the dead time of one candidate of a window."""
-    return dead_time_profile(whole.problem, candidate, whole.variance, whole.scales)
+    return dead_time_profile(fits.problem, candidate, fits.variance, fits.scales)
 
 
-def laid_profiles(whole: WindowFit, structures: Sequence[Structure]) -> dict[Structure, Points]:
+def laid_profiles(fits: WindowFit, structures: Sequence[Structure]) -> dict[Structure, Points]:
     """Profile points of structures, from their minima."""
-    setting = whole.variance, whole.scales
-    return {s: profile_points(whole.problem, whole.candidates[s], *setting) for s in structures}
+    setting = fits.variance, fits.scales
+    return {s: profile_points(fits.problem, fits.candidates[s], *setting) for s in structures}
 
 
 def solved_profiles(
-    whole: WindowFit, points: dict[Structure, Points], chosen: Structure
+    fits: WindowFit, points: dict[Structure, Points], chosen: Structure
 ) -> dict[Structure, Points]:
     """Profile points, with the ends of the intervals that may be ends of all of them.
 
@@ -59,8 +59,8 @@ def solved_profiles(
     chosen structure, those that lie as far out as any, and those without a point near them are
     solved for.
     """
-    setting = whole.variance, whole.scales
-    profiles = curves(whole, points)
+    setting = fits.variance, fits.scales
+    profiles = curves(fits, points)
     limits = {s: profile_limits(*profile) for s, profile in profiles.items()}
     # None are left where a dispersed flow rules out every structure.
     low = min((first for first, _ in limits.values()), default=np.inf)
@@ -74,7 +74,7 @@ def solved_profiles(
             s == chosen or upper or last + margin >= high,
         )
         if any(ends):
-            found[s] = with_ends(whole.problem, points[s], *setting, ends)
+            found[s] = with_ends(fits.problem, points[s], *setting, ends)
     return found
 
 
@@ -85,17 +85,17 @@ def _without_points(profile: Profile) -> tuple[bool, bool]:
     return far.get(False, False), far.get(True, False)
 
 
-def curves(whole: WindowFit, points: dict[Structure, Points]) -> dict[Structure, Profile]:
+def curves(fits: WindowFit, points: dict[Structure, Points]) -> dict[Structure, Profile]:
     """Misfit over the dead time of structures with these profile points."""
-    setting = whole.variance, whole.scales
-    return {s: profile_curve(own, whole.candidates[s], *setting) for s, own in points.items()}
+    setting = fits.variance, fits.scales
+    return {s: profile_curve(own, fits.candidates[s], *setting) for s, own in points.items()}
 
 
-def lower_minima(whole: WindowFit, points: dict[Structure, Points]) -> dict[Structure, Candidate]:
+def lower_minima(fits: WindowFit, points: dict[Structure, Points]) -> dict[Structure, Candidate]:
     """Minima to which profiles lead that are lower than those that the searches have found."""
     found = {}
     for s, own in points.items():
         best = min(own.values(), key=lambda point: point.cost)
-        if whole.candidates[s].cost - best.cost > _LOWER * whole.variance:
-            found[s] = settled(whole.problem, best, whole.scales)
+        if fits.candidates[s].cost - best.cost > _LOWER * fits.variance:
+            found[s] = settled(fits.problem, best, fits.scales)
     return found

@@ -248,24 +248,24 @@ class OutputErrorEstimate:
         return max(low, 0.0), high
 
 
-def _table(whole: WindowFit, profiles: dict[Structure, Profile]) -> tuple[StructureFit, ...]:
-    best = min(whole.criterion.values())
+def _table(fits: WindowFit, profiles: dict[Structure, Profile]) -> tuple[StructureFit, ...]:
+    best = min(fits.criterion.values())
     lines = []
-    for s, candidate in whole.candidates.items():
+    for s, candidate in fits.candidates.items():
         interval = profile_limits(*profiles[s]) if s in profiles else None
         poles = candidate.poles
-        numerator = eliminate(whole.problem, s, candidate.parameters[None]).numerator[0]
+        numerator = eliminate(fits.problem, s, candidate.parameters[None]).numerator[0]
         total = candidate.dead_time + lag_sum(poles, numerator)
-        excess = whole.criterion[s] - best
+        excess = fits.criterion[s] - best
         gain = float(np.real(numerator[0] / np.prod(-poles)))
         lines.append(StructureFit(s, candidate.dead_time, total, excess, interval, poles, gain))
     return tuple(sorted(lines, key=lambda line: line.delta_bic))
 
 
-def followed_by(whole: WindowFit, chosen: Candidate, numerator: FloatArray) -> Followed:
+def followed_by(fits: WindowFit, chosen: Candidate, numerator: FloatArray) -> Followed:
     """Compare a model alone, and the structure with the smallest residual, with the output."""
-    window, problem = whole.window, whole.problem
-    closest = min(whole.candidates.values(), key=lambda candidate: candidate.cost)
+    window, problem = fits.window, fits.problem
+    closest = min(fits.candidates.values(), key=lambda candidate: candidate.cost)
     alone = respond(window.drive, problem.known, numerator, chosen.parameters)
     alone += np.mean(window.output - alone)
     modelled = [window.predict(problem, chosen), alone, window.predict(problem, closest)]
@@ -274,7 +274,7 @@ def followed_by(whole: WindowFit, chosen: Candidate, numerator: FloatArray) -> F
 
 
 def assembled(
-    whole: WindowFit,
+    fits: WindowFit,
     chosen: Candidate,
     adequate: bool,
     delay_estimates: tuple[tuple[RobustKey, float], ...],
@@ -291,14 +291,14 @@ def assembled(
     `profiles` are those of the table of structures, `profile` that of the dead time chosen;
     `static` is the static response, if it is not that of the model alone.
     """
-    state = evaluate(whole.problem, chosen.structure, chosen.parameters[None])
+    state = evaluate(fits.problem, chosen.structure, chosen.parameters[None])
     numerator = state.numerator[0]
-    interval = interval.rounded(chosen.dead_time, whole.scales)
-    static = static or whole.static(chosen)
-    charged = {s: whole.criterion[s] + needless_parameters(s) for s in profiles}
+    interval = interval.rounded(chosen.dead_time, fits.scales)
+    static = static or fits.static(chosen)
+    charged = {s: fits.criterion[s] + needless_parameters(s) for s in profiles}
     least = charged.get(chosen.structure, np.inf)
     alike = [
-        (whole.static(whole.candidates[s]), float(np.exp(-max(value - least, 0.0) / 2)))
+        (fits.static(fits.candidates[s]), float(np.exp(-max(value - least, 0.0) / 2)))
         for s, value in charged.items()
         if s != chosen.structure
     ]
@@ -312,19 +312,19 @@ def assembled(
         numerator=numerator,
         adequate=adequate,
         residual=Residual(
-            whole.sigma, whole.normalized_rms, whole.correlation, whole.colour is not None
+            fits.sigma, fits.normalized_rms, fits.correlation, fits.colour is not None
         ),
-        structures=_table(whole, profiles),
+        structures=_table(fits, profiles),
         delay_estimates=delay_estimates,
-        fitted=whole.window.predict(whole.problem, chosen),
-        followed=followed_by(whole, chosen, numerator),
+        fitted=fits.window.predict(fits.problem, chosen),
+        followed=followed_by(fits, chosen, numerator),
         profile=profile,
-        latest=whole.scales.latest,
+        latest=fits.scales.latest,
         relaxing=relaxing,
         static=static,
         alike=tuple((other, weight) for other, weight in alike if other.resolved),
         better=better,
         process=ProcessEstimate(
-            fitted_parameters(whole.problem, chosen, numerator, whole.variance, whole.scales.length)
+            fitted_parameters(fits.problem, chosen, numerator, fits.variance, fits.scales.length)
         ),
     )

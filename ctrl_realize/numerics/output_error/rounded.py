@@ -43,7 +43,7 @@ _NOTHING, _LARGEST = 1e-16, 600.0  # for logarithms of small differences and exp
 
 
 def in_rounded_data(
-    found: OutputErrorEstimate, whole: WindowFit, step: float
+    found: OutputErrorEstimate, fits: WindowFit, step: float
 ) -> OutputErrorEstimate:
     """Take the model of the likelihood of rounded data, if the data are such.
 
@@ -52,14 +52,14 @@ def in_rounded_data(
     identifiable, from rounded samples neither. The interval is extended to that of the new dead
     time for its structure.
     """
-    window, scales = whole.window, whole.scales
+    window, scales = fits.window, fits.scales
     many = found.distributed
     special = many.chain is not None or many.follows_flow or found.residual.whitened
     special |= found.structure.zeros > 0
     if special or window.own is not None or window.output.size > _LONGEST:
         return found
-    start = whole.candidates[found.structure]
-    best = fit_rounded(whole, start, step)
+    start = fits.candidates[found.structure]
+    best = fit_rounded(fits, start, step)
     if best.noise > _ROUGH * step or best.correlation > _WHITE:
         return found
     dead_time, reach = best.candidate.dead_time, Z_95 * best.std
@@ -72,12 +72,12 @@ def in_rounded_data(
         poles=best.candidate.poles,
         numerator=numerator,
         fitted=best.model,
-        static=whole.static(best.candidate),
-        followed=followed_by(whole, best.candidate, numerator),
+        static=fits.static(best.candidate),
+        followed=followed_by(fits, best.candidate, numerator),
         residual=found.residual._replace(rounded=best.noise),
         process=found.process._replace(
             parameters=fitted_parameters(
-                whole.problem, best.candidate, numerator, whole.variance, scales.length
+                fits.problem, best.candidate, numerator, fits.variance, scales.length
             )
         ),
     )
@@ -104,20 +104,20 @@ class Rounded:
 class _Likelihood:
     """Output (N,), a multiple of `step` beside a constant, and what makes a model of it."""
 
-    whole: WindowFit
+    fits: WindowFit
     structure: Structure
     step: float
 
     def terms(self, x: FloatArray) -> FloatArray:
         """Responses (N, q) to numerators of one power of s, and the regressors."""
-        window, known = self.whole.window, self.whole.problem.known
+        window, known = self.fits.window, self.fits.problem.known
         powers = np.eye(self.structure.zeros + 1)
         responses = (respond(window.drive, known, power, x) for power in powers)
         return np.column_stack([*responses, window.columns])
 
     def error(self, model: FloatArray) -> FloatArray:
         """Output minus model."""
-        return self.whole.window.output - model
+        return self.fits.window.output - model
 
     def value(self, model: FloatArray, noise: float) -> float:
         """Log likelihood."""
@@ -150,15 +150,15 @@ class _Likelihood:
     def units(self, count: int) -> FloatArray:
         """Units of the parameters: one sample, and one for the logarithms."""
         unit = np.ones(count)
-        unit[0] = self.whole.scales.dt
+        unit[0] = self.fits.scales.dt
         return unit
 
 
-def fit_rounded(whole: WindowFit, start: Candidate, step: float) -> Rounded:
+def fit_rounded(fits: WindowFit, start: Candidate, step: float) -> Rounded:
     """Maximise the likelihood of samples that are multiples of a step, beside a constant."""
-    likelihood = _Likelihood(whole, start.structure, step)
-    bounds = parameter_bounds(start.structure, whole.scales)
-    state = evaluate(whole.problem, start.structure, start.parameters[None])
+    likelihood = _Likelihood(fits, start.structure, step)
+    bounds = parameter_bounds(start.structure, fits.scales)
+    state = evaluate(fits.problem, start.structure, start.parameters[None])
     x, linear = start.parameters, np.concatenate([state.numerator[0], state.regression[0]])
     terms = likelihood.terms(x)
     model = terms @ linear
@@ -186,9 +186,9 @@ def fit_rounded(whole: WindowFit, start: Candidate, step: float) -> Rounded:
         if best - before < _ENOUGH:
             break
     score, weight = scores(likelihood.error(model), step, noise)
-    left = (score / np.sqrt(weight))[whole.window.start :]
+    left = (score / np.sqrt(weight))[fits.window.start :]
     _, size, normal = likelihood.information(x, linear, terms, weight)
-    std = np.sqrt(np.linalg.pinv(normal)[0, 0]) / size[0] * whole.scales.dt
+    std = np.sqrt(np.linalg.pinv(normal)[0, 0]) / size[0] * fits.scales.dt
     candidate = Candidate(start.structure, x, start.cost, searched=False)
     return Rounded(candidate, linear, model, noise, float(std), correlation_time(left))
 

@@ -57,65 +57,65 @@ class Choice:
         return FREE_IN_A_CHAIN if self.chain is not None else own.order + own.zeros
 
 
-def chains_of(whole: WindowFit) -> list[LagChain]:
+def chains_of(fits: WindowFit) -> list[LagChain]:
     """Fit chains of lags if the best order suggests more lags than were tried."""
-    best = whole.best
-    setting = whole.problem, best, whole.scales, whole.variance, whole.penalty
+    best = fits.best
+    setting = fits.problem, best, fits.scales, fits.variance, fits.penalty
     tanks = fit_chains(*setting) if best.structure.order >= _LAGS_OF_TANKS else []
     diffusion = fit_diffusion(*setting) if best.structure.order >= _LAGS_OF_DIFFUSION else []
     return tanks + diffusion
 
 
-def flows_of(whole: WindowFit, chains: Sequence[LagChain]) -> list[DispersedFlow]:
+def flows_of(fits: WindowFit, chains: Sequence[LagChain]) -> list[DispersedFlow]:
     """Fit dispersion if there is more than one lag."""
-    best = whole.best
+    best = fits.best
     if best.structure.order < _LAGS_OF_DIFFUSION:
         return []
-    level = min([*whole.criterion.values(), *(chain.criterion for chain in chains)])
-    return fit_flows(whole.problem, best, whole.scales, whole.variance, whole.penalty, level)
+    level = min([*fits.criterion.values(), *(chain.criterion for chain in chains)])
+    return fit_flows(fits.problem, best, fits.scales, fits.variance, fits.penalty, level)
 
 
 def choose_model(
-    whole: WindowFit, tanks: Sequence[LagChain], flows: Sequence[DispersedFlow]
+    fits: WindowFit, tanks: Sequence[LagChain], flows: Sequence[DispersedFlow]
 ) -> Choice:
     """Choose by the lowest criterion; dispersion must be representable by lags.
 
     Diffusion is not among the chains here: friction has a similar response, so diffusion widens the
     interval and is never the model.
     """
-    lags = _among_lags(whole, tanks)
+    lags = _among_lags(fits, tanks)
     flow = min(flows, key=lambda flow: flow.criterion, default=None)
     if flow is None or flow.criterion >= lags.level:
         return lags
-    model = _behind(whole, flow)
+    model = _behind(fits, flow)
     return lags if model is None else Choice(model, flow.criterion, flow=flow)
 
 
-def _among_lags(whole: WindowFit, tanks: Sequence[LagChain]) -> Choice:
-    best = whole.best
-    level = whole.criterion[best.structure] + needless_parameters(best.structure)
-    chains = _beside_own_terms(whole, tanks)
+def _among_lags(fits: WindowFit, tanks: Sequence[LagChain]) -> Choice:
+    best = fits.best
+    level = fits.criterion[best.structure] + needless_parameters(best.structure)
+    chains = _beside_own_terms(fits, tanks)
     better = min(chains, key=lambda chain: chain.criterion, default=None)
     if better is not None and better.criterion < level:
         return Choice(better.candidate, better.criterion, better)
     return Choice(best, level)
 
 
-def _beside_own_terms(whole: WindowFit, tanks: Sequence[LagChain]) -> Sequence[LagChain]:
+def _beside_own_terms(fits: WindowFit, tanks: Sequence[LagChain]) -> Sequence[LagChain]:
     """Chains that may be the model: none beside a free response.
 
     Eight equal lags have a free response of eight initial values, which takes the place of the
     response to the step: gains 5 to 20 % too small in three of 22 simulated heaters, 0.20 for 0.27
     to 0.32 of a measured one. Ablation: no chain beside a free response.
     """
-    return tanks if whole.problem.segments is None else ()
+    return tanks if fits.problem.segments is None else ()
 
 
-def _behind(whole: WindowFit, flow: DispersedFlow) -> Candidate | None:
+def _behind(fits: WindowFit, flow: DispersedFlow) -> Candidate | None:
     """Lags and zeros with the dead time of dispersion that fit as well, if there are any."""
-    pinned = replace(whole.scales, earliest=flow.dead_time, latest=flow.dead_time)
-    limit = flow.cost + PLAUSIBLE * whole.variance
-    found = search(whole.problem, _BEHIND_A_FLOW, pinned)
+    pinned = replace(fits.scales, earliest=flow.dead_time, latest=flow.dead_time)
+    limit = flow.cost + PLAUSIBLE * fits.variance
+    found = search(fits.problem, _BEHIND_A_FLOW, pinned)
     # Their number is not penalised, since they only represent the dispersion model.
     good = {structure: model for structure, model in found.items() if model.cost <= limit}
-    return good[choose(whole.criteria(good))] if good else None
+    return good[choose(fits.criteria(good))] if good else None

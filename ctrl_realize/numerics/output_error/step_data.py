@@ -96,8 +96,8 @@ class StepData:
     @property
     def length(self) -> float:
         """Duration of the record from its first edge on, in s."""
-        whole = (self.input.size - self.edges[0][0]) * self.dt
-        return whole if self.span is None else self.span
+        fits = (self.input.size - self.edges[0][0]) * self.dt
+        return fits if self.span is None else self.span
 
     @property
     def since(self) -> IntArray:

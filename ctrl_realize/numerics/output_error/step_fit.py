@@ -153,15 +153,15 @@ def fit_step_record(
         data = _explained(
             [(way, _fit_until(way, way.output.size, few, latest, factor, huber)) for way in ways]
         )
-    whole = _fit_until(data, data.output.size, tried, latest, factor, huber)
-    if _takes_the_gain(data, whole, factor):
+    fits = _fit_until(data, data.output.size, tried, latest, factor, huber)
+    if _takes_the_gain(data, fits, factor):
         data = replace(data, drift=0.0, relaxing=False)
-        whole = _fit_until(data, data.output.size, tried, latest, factor, huber)
-    adequate = _is_noise(data, whole)
-    near = close_to("adequate", whole.normalized_rms, ADEQUATE * data.colour)
-    plain = whole
+        fits = _fit_until(data, data.output.size, tried, latest, factor, huber)
+    adequate = _is_noise(data, fits)
+    near = close_to("adequate", fits.normalized_rms, ADEQUATE * data.colour)
+    plain = fits
     if adequate and whiten:
-        whole = in_coloured_noise(whole, data)
+        fits = in_coloured_noise(fits, data)
     if structures is not None:
         better = better_structure(
             plain,
@@ -169,9 +169,9 @@ def fit_step_record(
             lambda: _fit_until(data, data.output.size, SIMPLE_STRUCTURES, latest, factor, huber),
         )
         if forms:
-            level = max(ADEQUATE * data.colour, whole.normalized_rms if adequate else 0.0)
+            level = max(ADEQUATE * data.colour, fits.normalized_rms if adequate else 0.0)
             return process_fit(
-                whole,
+                fits,
                 forms,
                 is_noise=lambda rms, _: rms <= level,
                 better=better,
@@ -179,26 +179,26 @@ def fit_step_record(
                 near=near,
             )
         given = likelihood_fit(
-            whole, adequate=adequate, relaxing=data.relaxing, better=better, near=near
+            fits, adequate=adequate, relaxing=data.relaxing, better=better, near=near
         )
         rounded = adequate and data.coarse
-        return in_rounded_data(given, whole, data.quantum) if rounded else given
+        return in_rounded_data(given, fits, data.quantum) if rounded else given
     likely: OutputErrorEstimate | None = None
     if adequate:
         assert data.motion is not None
-        chains = chains_of(whole)
+        chains = chains_of(fits)
         likely = likelihood_fit(
-            whole,
+            fits,
             adequate=True,
             chains=chains,
-            flows=_flows(data, whole, chains),
+            flows=_flows(data, fits, chains),
             onset=data.motion.onset * data.dt,
             may_stick=not data.coarse,  # what is rounded begins with a jump
             relaxing=data.relaxing,
             near=near,
         )
         if data.coarse:
-            likely = in_rounded_data(likely, whole, data.quantum)
+            likely = in_rounded_data(likely, fits, data.quantum)
         at_the_end = pinned(likely, data, plain)
         likely = told(likely, at_the_end)
         if at_the_end > 1:
@@ -227,13 +227,13 @@ def _explained(ways: list[tuple[StepData, WindowFit]]) -> StepData:
     A motion that goes on after the step needs strong evidence: it changes the gain of the model. A
     drift, which goes on to the end of the record, needs very strong evidence ([5]_).
     """
-    closest = min((whole for _, whole in ways), key=lambda whole: whole.sigma)
+    closest = min((fits for _, fits in ways), key=lambda fits: fits.sigma)
     worst = _WILD * closest.sigma
 
     def criterion(way: tuple[StepData, WindowFit]) -> float:
-        data, whole = way
-        best = whole.best.structure
-        error = whole.window.output - whole.window.predict(whole.problem, whole.best)
+        data, fits = way
+        best = fits.best.structure
+        error = fits.window.output - fits.window.predict(fits.problem, fits.best)
         squares = float(np.sum(np.clip(error, -worst, worst) ** 2))
         terms = best.order + best.zeros + (best.order if data.relaxing else bool(data.drift))
         value = squares / closest.variance + closest.penalty * terms + needless_parameters(best)
@@ -242,7 +242,7 @@ def _explained(ways: list[tuple[StepData, WindowFit]]) -> StepData:
     return min(ways, key=criterion)[0]
 
 
-def _takes_the_gain(data: StepData, whole: WindowFit, known: KnownFactor) -> bool:
+def _takes_the_gain(data: StepData, fits: WindowFit, known: KnownFactor) -> bool:
     """Whether a motion before the step takes the place of the response to it.
 
     Together with a slow pole, which is its opposite, it leaves the gain without a value or with the
@@ -250,32 +250,32 @@ def _takes_the_gain(data: StepData, whole: WindowFit, known: KnownFactor) -> boo
     """
     if not (data.drift or data.relaxing):
         return False
-    if data.relaxing and not _dies_away(data, whole, known):
+    if data.relaxing and not _dies_away(data, fits, known):
         return True
-    static = whole.static(whole.best)
+    static = fits.static(fits.best)
     return not static.resolved or static.reached * static.gain < 0
 
 
-def _dies_away(data: StepData, whole: WindowFit, known: KnownFactor) -> bool:
+def _dies_away(data: StepData, fits: WindowFit, known: KnownFactor) -> bool:
     """Whether the free response in the best model is mostly over when the step comes."""
-    best = whole.best
-    state = evaluate(whole.problem, best.structure, best.parameters[None])
-    forced = respond(whole.window.drive, known, state.numerator[0], best.parameters)
-    free = whole.window.predict(whole.problem, best) - forced
+    best = fits.best
+    state = evaluate(fits.problem, best.structure, best.parameters[None])
+    forced = respond(fits.window.drive, known, state.numerator[0], best.parameters)
+    free = fits.window.predict(fits.problem, best) - forced
     return bool(np.ptp(free[data.edge :]) <= _MOST_TO_COME * np.ptp(free[: data.edge]))
 
 
-def _is_noise(data: StepData, whole: WindowFit) -> bool:
+def _is_noise(data: StepData, fits: WindowFit) -> bool:
     """Whether the residual is at the noise level before the step, or at that long after it."""
-    if whole.normalized_rms <= ADEQUATE * data.colour:
+    if fits.normalized_rms <= ADEQUATE * data.colour:
         return True
-    if whole.normalized_rms > ADEQUATE * data.colour * _LOUDER:
+    if fits.normalized_rms > ADEQUATE * data.colour * _LOUDER:
         return False
-    if whole.correlation == 1.0:
+    if fits.correlation == 1.0:
         return True
-    state = evaluate(whole.problem, whole.best.structure, whole.best.parameters[None])
-    assert whole.window.bins is not None
-    first = whole.window.bins.first
+    state = evaluate(fits.problem, fits.best.structure, fits.best.parameters[None])
+    assert fits.window.bins is not None
+    first = fits.window.bins.first
     settled = settled_at(data)
     late = np.asarray(state.residual[0][first >= settled])
     moving = state.residual[0][(first >= data.edge) & (first < settled)]
@@ -286,13 +286,13 @@ def _is_noise(data: StepData, whole: WindowFit) -> bool:
     return bool(np.mean(moving**2) <= ADEQUATE**2 * np.mean(late**2))
 
 
-def _flows(data: StepData, whole: WindowFit, chains: Sequence[LagChain]) -> Sequence[DispersedFlow]:
+def _flows(data: StepData, fits: WindowFit, chains: Sequence[LagChain]) -> Sequence[DispersedFlow]:
     """Dispersion, unless rounding decides on how smoothly a response begins."""
-    return [] if data.coarse else flows_of(whole, chains)
+    return [] if data.coarse else flows_of(fits, chains)
 
 
 def _robust_fit(
-    whole: WindowFit,
+    fits: WindowFit,
     chosen: Candidate,
     views: tuple[tuple[RobustKey, float], ...],
     *,
@@ -302,13 +302,13 @@ def _robust_fit(
     dead_time = float(np.median([at for _, at in views[:-1]]))
     dead_times = np.sort([at for _, at in views])
     low, high = float(dead_times[1]), float(dead_times[-1])
-    profiles = {chosen.structure: profile_of(whole, chosen)}
-    fixed = at_dead_time(whole.problem, chosen, whole.scales, dead_time)
-    fixed, static = least_extrapolating(whole, fixed, dead_time_fixed=True)
+    profiles = {chosen.structure: profile_of(fits, chosen)}
+    fixed = at_dead_time(fits.problem, chosen, fits.scales, dead_time)
+    fixed, static = least_extrapolating(fits, fixed, dead_time_fixed=True)
     interval = DelayInterval(low, high, (high - low) / (2 * Z_95))
     own = profiles[chosen.structure]
     found = assembled(
-        whole, fixed, False, views, profiles, interval, own, static=static, relaxing=relaxing
+        fits, fixed, False, views, profiles, interval, own, static=static, relaxing=relaxing
     )
     return replace(
         found, process=found.process._replace(parameters=without_errors(found.process.parameters))
@@ -333,7 +333,7 @@ def _fit_until(
 
 
 def _views(
-    data: StepData, early: WindowFit, rise: WindowFit, whole: Candidate, latest: float | None
+    data: StepData, early: WindowFit, rise: WindowFit, fits: Candidate, latest: float | None
 ) -> tuple[tuple[RobustKey, float], ...]:
     """Six estimates in s with independent errors; the sixth only widens the interval."""
     assert data.motion is not None
@@ -345,6 +345,6 @@ def _views(
         ("two_lags_early", two),
         # by the criterion alone: the first part of a response does not show the gain
         ("model_of_rise", rise.candidates[choose(rise.criterion)].dead_time),
-        ("model_of_record", whole.dead_time),
+        ("model_of_record", fits.dead_time),
         ("three_lags_early", three),
     )

@@ -125,9 +125,9 @@ class WindowFit:
     ``variance`` is that of independent noise with the same effect on the estimates as the residual:
     the variance of the residual, plus that of a coarse `rounding` (neighbours are rounded alike),
     times its `correlation`; after prewhitening, times `colour`, the mean square of the whitened
-    residual. `misfit` is the root mean square of the residual of the chosen structure, in means
-    over bins, over the given noise level. `rivals` are the margins by which structures were chosen,
-    or not, for estimating the noise.
+    residual. `normalized_rms` is the root mean square of the residual of the chosen structure, in
+    means over bins, over the given noise level. `rivals` are the margins by which structures were
+    chosen, or not, for estimating the noise.
     """
 
     window: Window

@@ -138,34 +138,34 @@ def fit_sampled(
         unweighted = part.model
         part = in_coloured_noise(part)
     data, stretch = part.data, part.fit
-    whole = stretch
+    fits = stretch
     long = any(y.size > kept.size for y, kept in zip(outputs, data.outputs, strict=True))
     usable = long and not any(np.isnan(y).any() for y in outputs)
     sums = _condensed(outputs, inputs, data, stretch, huber) if usable else None
     if sums is not None:
-        whole = _fit_condensed(sums, stretch, factor)
-    if structures is None and whole.best.structure.order == ORDERS[-1].order:
-        whole = extended(whole, MORE_LAGS)
-    chains = chains_of(whole) if structures is None else []
+        fits = _fit_condensed(sums, stretch, factor)
+    if structures is None and fits.best.structure.order == ORDERS[-1].order:
+        fits = extended(fits, MORE_LAGS)
+    chains = chains_of(fits) if structures is None else []
     better = None
     if structures is not None:
         # On the part also if all samples were fitted: what is ruled out there is ruled out in any
         # case.
         every = partial(part.fit_of, ORDERS)
         better = better_structure(stretch, stretch.best, every)
-    white = whole.correlation <= WHITE
+    white = fits.correlation <= WHITE
     if forms:
         fit = process_fit(
-            whole, forms, is_noise=lambda _, correlation: correlation <= WHITE, better=better
+            fits, forms, is_noise=lambda _, correlation: correlation <= WHITE, better=better
         )
     else:
-        fit = likelihood_fit(whole, adequate=white, chains=chains, better=better)
+        fit = likelihood_fit(fits, adequate=white, chains=chains, better=better)
     if sums is not None:
         fit = replace(fit, fitted=_on_stretch(data, fit, factor))
     elif part.noise.size > 1:
         fit = replace(_of_measured(part, fit), unweighted=unweighted)
     elif fit.distributed.chain:
-        left = correlation_time(whole.window.output - fit.fitted)
+        left = correlation_time(fits.window.output - fit.fitted)
         fit = replace(fit, residual=fit.residual._replace(correlation=left), adequate=left <= WHITE)
     correlation = fit.residual.correlation
     # There is no baseline for the noise; correlation is estimated from means over bins.
@@ -260,10 +260,10 @@ def _parameters(fit: OutputErrorEstimate) -> FloatArray:
     return np.concatenate([[fit.dead_time], parameters_from_poles(fit.poles)])
 
 
-def _explained(whole: WindowFit) -> float:
+def _explained(fits: WindowFit) -> float:
     """Chi-square of the forced response: local terms alone against local terms and input."""
-    problem, best = whole.problem, whole.best
+    problem, best = fits.problem, fits.best
     assert problem.segments is not None
     own = problem.local_terms(best.poles[None])
     alone = float(np.sum(own.without(problem.data[None, :, None]) ** 2))
-    return (alone - best.cost) / max(whole.variance, 1e-300)
+    return (alone - best.cost) / max(fits.variance, 1e-300)

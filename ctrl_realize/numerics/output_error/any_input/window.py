@@ -100,13 +100,13 @@ def fit_windows(
     data = replace(data, starts=tuple(min(late, y.size // 2) for y in data.outputs))
     length = (max(data.lengths) - order) * dt
     scales = Scales(max(rough.dead_time, 0.5 * usual), max(lag, 2 * usual), length, dt, limit)
-    whole = _fit(data.whitened(noise), known, structures, scales, huber)
-    levels = _noise_levels(data.whitened(noise), whole)
+    fits = _fit(data.whitened(noise), known, structures, scales, huber)
+    levels = _noise_levels(data.whitened(noise), fits)
     if levels.max() > _UNLIKE * levels.min():
         mean = float(np.exp(np.mean(np.log(levels))))
         data = replace(data, scales=tuple(float(level) / mean for level in levels))
-        whole = _fit(data.whitened(noise), known, structures, scales, huber)
-    return SampledWindow(data, noise, scales, whole, known, huber)
+        fits = _fit(data.whitened(noise), known, structures, scales, huber)
+    return SampledWindow(data, noise, scales, fits, known, huber)
 
 
 def in_coloured_noise(plain: SampledWindow) -> SampledWindow:
@@ -157,8 +157,8 @@ def _fit(
     window = window_of(data, known)
     problem = window.problem
     # after a spike at the start there may be nothing left that moves
-    whole = 1e-9 * max(float(np.ptp(y[~np.isnan(y)])) for y in data.outputs)
-    sigma = _SMALLEST * max(float(np.ptp(problem.data)), whole)
+    fits = 1e-9 * max(float(np.ptp(y[~np.isnan(y)])) for y in data.outputs)
+    sigma = _SMALLEST * max(float(np.ptp(problem.data)), fits)
     noise = sigma, max(quantisation_step(y[~np.isnan(y)]) for y in data.outputs)
     return fit_window(window, structures, scales, noise, huber)
 
@@ -174,10 +174,10 @@ def modelled(
     return np.asarray(problem.data - own.without(rest)[0, :, 0])
 
 
-def _noise_levels(data: SampledData, whole: WindowFit) -> FloatArray:
+def _noise_levels(data: SampledData, fits: WindowFit) -> FloatArray:
     """Residual of the best model in every record, in its unit."""
-    error = whole.window.output - whole.window.predict(whole.problem, whole.best)
-    floor = _SMALLEST * float(np.ptp(whole.window.output))
+    error = fits.window.output - fits.window.predict(fits.problem, fits.best)
+    floor = _SMALLEST * float(np.ptp(fits.window.output))
     return np.array(
         [max(winsorised_sigma(part, 0.0), floor) for part in np.split(error, data.edges[1:-1])]
     )
