@@ -280,7 +280,8 @@ def test_a_file_name_that_is_no_utf8_does_not_lose_a_campaign(tmp_path):
     store = cr.io.CampaignStore(tmp_path / "rows")
     campaign = cr.identify_campaign(sources, method="scan", order=1, max_delay=9, store=store)
     assert (len(campaign.good), len(store)) == (1, 1)
-    assert ["udcff" in campaign.table().index[0], "udcfe" in campaign.table().index[1]] == [1, 1]
+    assert "udcff" in campaign.table().index[0]
+    assert "udcfe" in campaign.table().index[1]
     assert "udcff" in campaign.report()
     # the report's list of calls holds the names as well
     out = tmp_path / "out"

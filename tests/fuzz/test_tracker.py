@@ -90,27 +90,3 @@ def test_any_start_of_a_tracker_is_taken_or_refused(rng):
             min_delay=rng.choice([0, 0, 7, -1]),
             dynamics=rng.choice([True, False]),
         )
-
-
-@fuzz(6)
-def test_a_clean_stream_is_followed_to_its_delay(rng):
-    core, delay = rng.choice(CORES[:3]), rng.randint(0, 9)
-    # mostly from rest, where a few moves tell; seldom with what was before, which is forgotten
-    # only in a memory or more
-    at_rest = rng.randrange(40)
-    moves, hold = rng.choice(
-        [(7, 8), (10, 5), (5, 12)] if at_rest else [(15, 20), (30, 7), (30, 20)]
-    )
-    u = np.repeat(generator(rng).choice([-1.0, 1.0], moves), hold) * rng.choice([1.0, 1e-6, 1e20])
-    if at_rest:
-        u[0] = 0.0
-    y = cr.DelayedStateSpace(core, delay).simulate(u)
-    tracker = cr.DelayTracker(core, max_delay=delay + rng.randint(2, 6), forgetting_time=20.0)
-    with good_end():
-        for sample in zip(u, y, strict=True):
-            tracker.update(*sample)
-    told = tracker.estimate()
-    if told.resolved:
-        ends["tells"] += 1
-        assert told.delay_interval[0] <= delay <= told.delay_interval[1]
-        assert abs(told.delay - delay) <= (0 if at_rest else 1)

@@ -41,17 +41,15 @@ def random_levels(seed, n=600, held=5):
 def test_intervals_and_deviations_are_those_of_forty_records():
     forty = [cr.fit_output_error(lag_record(seed), **ONE).fit for seed in range(40)]
     # forty values tell a deviation to 11 %; a third is three of them
-    for name, std in (
-        ("dead_time", "std_given_structure"),
-        ("gain", "gain_std_given_structure"),
-    ):
+    claims = {"dead_time": "std_given_structure", "gain": "gain_std_given_structure"}
+    for name, std in claims.items():
         scatter = np.std([getattr(fit, name) for fit in forty], ddof=1)
         claimed = np.mean([getattr(fit, std) for fit in forty])
         assert claimed == pytest.approx(scatter, rel=0.33)
     # fewer than 35 of forty intervals of 95 % hold with a chance of 5 in 1000
-    for name, truth, least in (("interval", 0.73, 35), ("gain_interval", 3.0, 34),
-                               ("total_delay_interval", 1.73, 34)):  # fmt: skip
-        ends = [getattr(fit, name) for fit in forty]
+    truths = {"": (0.73, 35), "gain_": (3.0, 34), "total_delay_": (1.73, 34)}
+    for name, (truth, least) in truths.items():
+        ends = [getattr(fit, f"{name}interval") for fit in forty]
         assert sum(low <= truth <= high for low, high in ends) >= least
     widths = [np.diff(fit.interval)[0] / fit.std_given_structure for fit in forty]
     assert np.mean(widths) == pytest.approx(2 * 1.96, rel=0.05)
