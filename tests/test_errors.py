@@ -37,6 +37,10 @@ INTEGRAL = ct.tf([1, 0.5], [1, 0])
 PI = ct.ss([[1.0]], [[1.0]], [[0.02]], [[0.4]], 0.1)
 VALVE = cr.delayed_ss(PI, 3)
 LOOP = ct.feedback(VALVE, 0.1)
+AT_ONCE = [
+    cr.delayed_ss(PI, 0, name="P", inputs="u", outputs="y"),
+    ct.ss([], [], [], 2.5, 0.1, name="K", inputs="y", outputs="u"),
+]
 WIDE = cr.delayed_ss(ct.ss(0.5 * np.eye(2), np.eye(2), np.eye(2), np.zeros((2, 2)), 0.1), 300)
 BETWEEN = np.linspace(0, 1, 11)
 FOPDT = cr.design.ProcessModel(2.0, 1.0, 0.3)
@@ -131,17 +135,7 @@ ERRORS = {
         (lambda: cr.DelaySystem(ct.tf(PI), [1]), "ct.ss converts"),
         (lambda: ct.feedback(cr.delayed_ss(PI, 0), -2.5), "algebraic loop"),
         (lambda: ct.feedback(1 + LATE, -1), "algebraic loop"),
-        (
-            lambda: cr.interconnect(
-                [
-                    cr.delayed_ss(PI, 0, name="P", inputs="u", outputs="y"),
-                    ct.ss([], [], [], 2.5, 0.1, name="K", inputs="y", outputs="u"),
-                ],
-                inplist="P.u",
-                outlist="P.y",
-            ),
-            "algebraic loop",
-        ),
+        (lambda: cr.interconnect(AT_ONCE, inplist="P.u", outlist="P.y"), "algebraic loop"),
         (
             lambda: ct.feedback(VALVE, ct.ss(PI.A, PI.B, PI.C, PI.D, 0.2)),
             "different time bases: dt = 0.1 s and dt = 0.2 s",

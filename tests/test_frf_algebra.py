@@ -175,16 +175,6 @@ def test_coherence_and_deviation_go_with_the_channels(frf, key, rows, columns):
     assert part.repeats == part.between_hz(1.0, 2.0).repeats == 7
 
 
-def test_a_dead_time_is_found_the_same_after_scaling():
-    w = 2 * np.pi * np.geomspace(0.1, 5, 60)
-    true = cr.delayed_ss(ct.tf([1], [0.05, 1]), dead_time=9.45 * DT, dt=DT)
-    frf = cr.MeasuredFRF(true(np.exp(1j * w * DT)), w / (2 * np.pi), sample_time=DT)
-    before = cr.fit_frf(frf, 1).fit.dead_time
-    assert before / DT == pytest.approx(9.45, abs=0.02)
-    # 9.95 where the hold of half a sample was forgotten
-    assert cr.fit_frf(2 * frf, 1).fit.dead_time == pytest.approx(before, rel=1e-6)
-
-
 @pytest.mark.parametrize("operation", [*TWO, "plus number", "inverse"])
 def test_the_warning_stands_where_the_user_wrote_the_operation(operation):
     frf = {"plus number": lambda a, b: 1 + a, "inverse": lambda a, b: 1 / a}

@@ -84,7 +84,7 @@ def test_the_slider_of_the_front_page_shows_the_best_model_of_the_assumed_dead_t
     window, tmp_path
 ):
     picture = runpy.run_path(str(DOCS / "_ext" / "front_picture.py"))
-    drawn = picture["html"](picture["candidates"](np.arange(0.0, 41.0, 10.0)))
+    drawn = picture["html"](picture["candidates"](np.arange(0.0, 41.0, 20.0)))
     script = (DOCS / "_static" / "front.js").read_text(encoding="utf-8")
     page = tmp_path / "front.html"
     page.write_text(f"<meta charset='utf-8'><script>{script}</script>{drawn}", encoding="utf-8")
@@ -92,12 +92,12 @@ def test_the_slider_of_the_front_page_shows_the_best_model_of_the_assumed_dead_t
     window.open(page)
     assert not window.run(SLIDER)["outside"]  # it begins at the estimate
     window.click(".front-picture input")
-    for key, at in (("Home", 0), ("End", 4), ("ArrowLeft", 3)):
+    for key, at in (("Home", 0), ("End", 2), ("ArrowLeft", 1)):
         window.press(key)
         seen = window.run(SLIDER)
         assert seen["at"] == seen["curve"] == at
         low, high = seen["interval"]
-        assert seen["outside"] is not (low <= 10 * at <= high)
-        assert f"With {10 * at} s" in seen["said"]
+        assert seen["outside"] is not (low <= 20 * at <= high)
+        assert f"With {20 * at} s" in seen["said"]
         assert ("rule it out" in seen["said"]) is seen["outside"]
     assert window.complaints() == []

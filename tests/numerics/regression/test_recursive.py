@@ -20,30 +20,6 @@ def matrices(plant):
     return core.A, core.B[:, 0], core.C[0], float(core.D[0, 0])
 
 
-def test_sensitivities_are_the_slopes_of_the_pulse_response():
-    A, B, C, D = matrices(R3)
-    directions = pole_directions(np.linalg.eigvals(A), DT)
-    names = [what for what, _, _ in directions]
-    assert sorted(names) == ["damping", "speed", "speed"]
-    big = sensitivity_system(A, B, C, D, directions)
-    found = markov(big[0], big[1][:, None], big[2], big[3][:, None], 1500)[:, 0]
-
-    def pulse(real=0.0, speed=0.0, damping=0.0):
-        plant = lag(2.2 * (1 + real)) * pair(8 * (1 + speed), 0.7 + damping)
-        return cr.delayed_ss(plant, delay=0, dt=DT).markov(1500)
-
-    h = 1e-3
-    slopes = [
-        (pulse(**{what: h}) - pulse(**{what: -h})) / (2 * h)
-        for what in ("real", "speed", "damping")
-    ]
-    # The zeros of sampling are kept while the poles move: an error of the order of w dt / 12.
-    for slope in slopes:
-        distance = [np.linalg.norm(row - slope) / np.linalg.norm(slope) for row in found[1:]]
-        assert min(distance) < 1e-3
-    assert_allclose(found[0], pulse(), rtol=0, atol=1e-15)
-
-
 @pytest.mark.parametrize("restart", [0, 30])
 @pytest.mark.parametrize("low", [0, 3])
 def test_the_bank_solves_the_weighted_least_squares_of_every_delay(low, restart):
