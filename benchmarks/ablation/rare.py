@@ -61,6 +61,16 @@ def settling_in_a_long_rest(rng: Rng) -> Case:
     return plant.case(record(u[before:], y[before:]))
 
 
+def pulse_before(rng: Rng) -> Case:
+    """A pulse of the input ends just before the record, which starts while the output rises."""
+    plant = drawn(rng, ((0.1, 0.25), (0.4, 1.0)))
+    before, rest = 40, int(rng.uniform(60, 150))
+    u = step(500 + before + rest, before + rest)
+    u[10 : int(rng.uniform(30, 40))] = float(rng.uniform(0.5, 1.0))
+    y = noisy(rng, stepped(rng, plant, u), 0.002)
+    return plant.case(record(u[before:], y[before:]))
+
+
 def little_step_in_noise(rng: Rng) -> Case:
     """Noise of 40 to 80 % of the step."""
     plant, u = drawn(rng), step(1500, 300)
@@ -217,6 +227,7 @@ def swing_in_few_samples(rng: Rng) -> Case:
 WORLDS = (
     tanks_in_a_row,
     settling_in_a_long_rest,
+    pulse_before,
     little_step_in_noise,
     humming,
     slow_noise_in_a_short_rest,
@@ -239,6 +250,7 @@ MADE_FOR = {
     "slower poles beside zeros": faster_than_a_sample,
     "first motion in means": little_step_in_noise,
     "exponential before the step": settling_in_a_long_rest,
+    "bend before the step": pulse_before,
     "hum": humming,
     "coarse converter": steps_of_a_converter,
     "coloured noise of any input": slow_disturbance,

@@ -272,6 +272,7 @@ SWITCHES = (
         {f"{FITS}.step_data:StepData.explanations": _only(lambda way: not way.relaxing)},
     ),
     Switch("exponential before the step", {f"{FITS}.step_data:relaxation": giving(None)}),
+    Switch("bend before the step", {f"{FITS}.step_data:noise_about_a_bend": giving(0.0)}),
     Switch(
         "slope that was nothing",
         {f"{FITS}.step_data:StepData.explanations": _only(lambda way: way.drift or way.relaxing)},

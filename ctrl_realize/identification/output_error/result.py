@@ -235,7 +235,7 @@ class OutputErrorFit(FractionalDelayFit):
     @property
     def noise(self) -> float:
         """Standard deviation of the output's noise."""
-        return self.data.sigma
+        return self.data.bend if self.data.bend and self.estimate.relaxing else self.data.sigma
 
     @property
     def residual(self) -> float:

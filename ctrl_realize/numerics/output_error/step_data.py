@@ -20,7 +20,7 @@ from ..separable.responses import StepSequence
 from ..separable.structures import Scales
 from ..separable.varpro import KnownFactor, Problem
 from ..separable.window import Window
-from ..signals.baseline import relaxation
+from ..signals.baseline import noise_about_a_bend, relaxation
 from ..signals.bins import BINS_AT_REST, Bins, response_bins
 from ..signals.filters import moving_mean
 from ..signals.noise import (
@@ -71,6 +71,8 @@ class StepData:
         The output was not in steady state before the step: the model includes a free response.
     span : float or None
         Duration of records without a step, in s.
+    bend : float
+        Noise about a baseline that bends; 0 if it does not.
     """
 
     output: FloatArray
@@ -87,6 +89,7 @@ class StepData:
     quiet: FloatArray
     relaxing: bool = False
     span: float | None = None
+    bend: float = 0.0
 
     @property
     def edge(self) -> int:
@@ -120,8 +123,11 @@ class StepData:
     def explanations(self) -> list[StepData]:
         """Models of a slope before the step: drift, free response of the plant, or none.
 
-        A drift continues to the end.
+        A drift continues to the end. A baseline that bends is no drift, and its noise is that
+        about the bend if it is a free response.
         """
+        if self.bend:
+            return [replace(self, relaxing=True, sigma=self.bend, colour=1.0), self]
         if not self.drift:
             return [self]
         still = replace(self, drift=0.0)
@@ -145,7 +151,7 @@ def step_data(
     quantum = quantisation_step(output)
     sigma, drift = rest_noise(output[:edge], output, quantum, at_rest)
     hum: list[float] = []
-    colour, quiet, relaxing = 1.0, output, False
+    colour, quiet, relaxing, bend = 1.0, output, False, 0.0
     if edge >= 8:
         columns = np.stack([np.ones(edge), since[:edge] / edge], axis=1)
         line = columns @ np.linalg.lstsq(columns, output[:edge], rcond=None)[0]
@@ -162,13 +168,16 @@ def step_data(
         elif curve is not None:
             quiet, line, relaxing = output - curve, curve[:edge], True
             sigma, drift = rest_noise(quiet[:edge], quiet, quantum, at_rest)[0], 0.0
+        elif not drift:
+            bend = noise_about_a_bend(output[:edge], quantum, at_rest)
         colour = colouring(output[:edge] - line, sigma)
     span = float(np.ptp(output))
     sigma = max(sigma, 1e-4 * span)
     motion = first_motion(quiet, edge, sigma, quantum, drift, gaps)
-    return StepData(
+    data = StepData(
         output, signal, dt, edges, rows, sigma, quantum, drift, colour, hum, motion, quiet, relaxing
     )
+    return replace(data, bend=bend)
 
 
 def bare_data(

@@ -16,7 +16,7 @@ from scipy.ndimage import median_filter
 
 from ..arrays import FloatArray, IntArray
 from .edges import difference_noise
-from .noise import correlation_time, is_drift, rounding_error
+from .noise import correlation_time, is_drift, rounding_error, winsorised_sigma
 
 FEW = 5
 """With fewer samples before the step, those after it that are still at the baseline are added."""
@@ -68,6 +68,8 @@ FEWEST = 24
 """Samples before the step from which a curve can be told from a line: four for every parameter,
 after a median of five."""
 _SIGNIFICANT = 30.0  # chi-square to beat the line; ablation: exponential before the step
+_BEND_ERRORS = 5.0  # standard errors, as of a drift; ablation: bend before the step
+_ENOUGH = 4096  # samples that show a bend
 _RATES = np.geomspace(0.5, 30.0, 24)  # decay over the samples before the step, next ones 20 % apart
 
 
@@ -114,6 +116,35 @@ def relaxation(output: FloatArray, edge: int, rows: IntArray | None = None) -> F
     if float(straight @ straight) - best <= _SIGNIFICANT * variance:
         return None
     return np.asarray(_level_and_decay(rate, clock) @ weights)
+
+
+def noise_about_a_bend(before: FloatArray, quantum: float, rows: IntArray | None = None) -> float:
+    """Noise about a baseline that bends, as after an earlier pulse; 0 if it does not.
+
+    The free response of several lags may rise and fall, which neither a line nor an exponential
+    does. A polynomial of degree four stands for it.
+
+    Parameters
+    ----------
+    before : ndarray, shape (P,)
+        Samples before the step.
+    quantum : float
+        Quantisation step; the noise is at least ``quantum / sqrt(12)``.
+    rows : ndarray, shape (P,), optional
+        Their positions, if others are missing.
+    """
+    if before.size < FEWEST or np.ptp(before) <= rounding_error(before):
+        return 0.0
+    every = -(-before.size // _ENOUGH)
+    time = np.linspace(-1, 1, before.size) if rows is None else rows / np.abs(rows).max()
+    before, time = before[::every], time[::every]
+    powers = np.linalg.qr(np.vander(time, 5, increasing=True))[0]
+    tamed = median_filter(before, size=5, mode="mirror")
+    weights = powers.T @ tamed
+    left = before - powers @ weights
+    sigma = max(winsorised_sigma(left, quantum, lost=5), quantum / np.sqrt(12))
+    error = sigma * np.sqrt(correlation_time(left))
+    return float(sigma) if np.abs(weights[2:]).max() > _BEND_ERRORS * error else 0.0
 
 
 def _level_and_decay(rate: float, time: FloatArray) -> FloatArray:

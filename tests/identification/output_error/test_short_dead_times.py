@@ -97,6 +97,24 @@ def test_a_resonance_is_seen_through_slow_noise_and_a_coarse_encoder():
     assert system.fit.delay_interval[0] <= 2.5 <= system.fit.delay_interval[1]
 
 
+def test_a_baseline_that_rises_and_falls_is_a_free_response():
+    # Of a pulse that ends with the start of the record, and is not in it.
+    def clean(t):
+        t = np.maximum(t, 0.0)
+        return 1 - (100 * np.exp(-t / 100) - 12 * np.exp(-t / 12)) / 88
+
+    k = np.arange(-50, 110)
+    y = clean(2.0 * k - 3) + clean(2.0 * k + 106) - clean(2.0 * k + 100)
+    y += 5e-4 * np.random.default_rng(0).standard_normal(k.size)
+    assert np.ptp(y[:50]) > 20 * 5e-4
+    fit = cr.fit_output_error(cr.Record(2.0 * k, (k >= 0).astype(float), y), structures=FEW).fit
+    assert "not_at_rest" in codes(fit)
+    assert fit.interval[0] <= 3.0 <= fit.interval[1]
+    assert fit.gain == pytest.approx(1.0, rel=0.01)
+    assert fit.residual == pytest.approx(5e-4, rel=0.1)
+    assert fit.noise == pytest.approx(5e-4, rel=0.2)
+
+
 def late(samples: float, *, radiated: float = 0.0) -> cr.Record:
     """A lag of 8 samples whose input is stored some samples late; a switch may radiate."""
     k = np.arange(-60, 140)
