@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar, TypeAlias
@@ -17,7 +18,7 @@ from ..numerics.arrays import FloatArray
 State: TypeAlias = tuple[float, ...]
 
 
-class Actuator:
+class Actuator(ABC):
     """Base class of the models of this module: a command goes in, a position comes out.
 
     Both have the same unit, usually % of the travel, and the parameters of a model have it as well;
@@ -204,15 +205,15 @@ class Actuator:
         """
         return self._advance(state, command, dt)
 
-    def _rest(self, command: float) -> State:
-        raise NotImplementedError
+    @abstractmethod
+    def _rest(self, command: float) -> State: ...
 
-    def _advance(self, state: State, command: float, dt: float) -> tuple[State, float]:
-        raise NotImplementedError
+    @abstractmethod
+    def _advance(self, state: State, command: float, dt: float) -> tuple[State, float]: ...
 
+    @abstractmethod
     def _simulated(self, command: FloatArray, dt: float) -> FloatArray:
         """Simulate a checked command by the array kernel of the model."""
-        raise NotImplementedError
 
     def _checked(self, dt: float | None) -> float:
         """Return the sample time; 1 where none is needed."""

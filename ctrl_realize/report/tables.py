@@ -33,7 +33,7 @@ Paths = Sequence[str | os.PathLike[str]]
 _ABOVE = frozenset(
     {
         "transfer function", "dead time", "apparent dead time", "visible onset", "total delay",
-        "poles", "gain", "fit", "residual",
+        "poles", "gain", "fit", "residual", "actuator",
     }
 )  # fmt: skip
 """Rows of a fit that a report shows above."""
@@ -52,7 +52,7 @@ def fit_tables(fit: ModelFit | None, title: str = "Details of the fit") -> list[
 
 
 def parameter_table(fit: ModelFit) -> Table:
-    """List gain, dead time, lags, ... with standard errors and 95 % intervals."""
+    """List gain, dead time, lags, ... and those of an actuator, with errors and 95 % intervals."""
     columns = (
         Column("parameter"),
         Column("estimate", "number"),
@@ -60,10 +60,15 @@ def parameter_table(fit: ModelFit) -> Table:
         Column("95 % interval", "number"),
         Column("interval for"),
     )
-    return Table("Parameters", tuple(map(_parameter_row, fit.parameters)), columns)
+    rows = [_parameter_row(one) for one in fit.parameters]
+    actuator = fit.actuator
+    if actuator is not None:
+        rows += [_parameter_row(one, actuator.where) for one in actuator.parameters]
+    return Table("Parameters", tuple(rows), columns)
 
 
-def _parameter_row(one: Parameter) -> Row:
+def _parameter_row(one: Parameter, where: str = "") -> Row:
+    """Row of a parameter, of an actuator if it is told where that acts."""
     known = bool(np.isfinite([one.low, one.high]).all())
     if one.times == 1:
         ends = one.low, one.high
@@ -77,7 +82,10 @@ def _parameter_row(one: Parameter) -> Row:
         value = number_within(one.value, one.low, one.high) + unit
         interval = one.interval_text()
     holds = "all structures not ruled out" if one.all_structures else "this structure"
-    return Row((one.label, value, error, interval, holds if interval else ""))
+    if where:
+        holds, interval = "this actuator", interval or "one end is not told"
+    label = f"{one.label} (actuator, {where})" if where else one.label
+    return Row((label, value, error, interval, holds if interval else ""))
 
 
 def comparison_tables(

@@ -129,6 +129,23 @@ def test_the_transfer_function_stands_in_place_of_the_matrices(page, fitted):
     assert outside.count(interval_in_time(low, high)) == 2
 
 
+def test_the_parameters_of_an_actuator_stand_in_the_table_of_parameters(tmp_path):
+    command = 10.0 + 8.0 * (np.arange(400) > 80)
+    slow = cr.actuators.SlewRateLimit(16.0).simulate(command, 0.01)
+    smooth = np.concatenate([np.zeros(9), np.cumsum(0.1 * 0.9 ** np.arange(391))])
+    output = np.convolve(np.diff(slow, prepend=10.0), smooth)[:400]
+    noise = 0.005 * np.random.default_rng(1).standard_normal(400)
+    record = cr.Record(0.01 * np.arange(400), command, output + noise, units={"u": "%"})
+    fitted = cr.fit_output_error(record, structures=[(1, 1)], actuator="slew_rate")
+    rate = fitted.fit.actuator["slew_rate"]
+    text = parsed(report.write_identification(tmp_path / "page.html", fitted, record)).text
+    assert text.count(rate.interval_text()) == 1
+    where = text.index(f"{rate.label} (actuator, before the lags)")
+    assert text.index("Parameters") < where < text.index(rate.interval_text())
+    assert "%/s" in text[where:][:80]
+    assert where < text.index("Figures") < text.index("Details of the fit")
+
+
 def test_several_records_stand_each_beside_the_model_with_the_scatter_of_their_gains(
     tmp_path, valve, measured
 ):

@@ -22,10 +22,12 @@ from ..regression.marquardt import Damping, damped_step, descend
 from ..separable.structures import Scales, parameter_bounds
 from ..separable.varpro import Structure
 from .kinds import FORMS, Acting, Form, Kind, Place, Size
-from .motions import forced_response
+from .motions import forced_responses
 from .records import ActuatedRecord
 
 _OF_DT, _OF_LOG, _OF_START = 0.05, 1e-3, 1e-2  # steps of differences
+_AT_ONCE = 100_000  # samples of responses
+_ALIKE = 12  # decimals of residuals, and of sums of squares, over those of the data
 _MOST_TURNS = 30
 _LONGEST = 1.0  # of a logarithm, in one step
 _DAMPING = Damping(first=1e-2, rise=8.0, fall=5.0, least=1e-9, tries=6)
@@ -190,26 +192,47 @@ class Task:
         steps[1 : self.family.values.stop] = _OF_LOG
         return steps
 
+    def responses(self, xs: FloatArray) -> list[FloatArray]:
+        """Responses of unit gain (1 + zeros, K, M) of every record, for K members (K, ...)."""
+        family, parts = self.family, self.records.parts
+        actings = [Member(family, x, np.nan).acting for x in xs]
+        starts = xs[:, family.values.stop :]
+        if not starts.size:
+            starts = np.zeros((len(xs), len(parts)))
+        theta = xs[:, 1 : 1 + family.structure.order]
+        return [
+            forced_responses(part, actings, xs[:, 0], theta, start, family.structure.zeros)
+            for part, start in zip(parts, starts.T, strict=True)
+        ]
+
     def columns(self, x: FloatArray) -> list[FloatArray]:
         """Responses of unit gain (M, 1 + zeros) of every record."""
-        member = Member(self.family, x, np.nan)
-        starts = member.starts if member.starts.size else np.zeros(len(self.records.parts))
-        found = []
-        for part, start in zip(self.records.parts, starts.tolist(), strict=True):
-            response, slope = forced_response(
-                part, member.acting, member.dead_time, member.theta, start
-            )
-            zeros = self.family.structure.zeros
-            found.append(np.stack([response, slope][: 1 + zeros], axis=1))
-        return found
+        return [one[:, 0].T for one in self.responses(x[None])]
+
+    def residuals(self, xs: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Weighted residuals (K, M) of the best members with xs, and linear coefficients."""
+        zeros, data = self.family.structure.zeros, self.records.data
+        columns = self.records.projected(
+            [one.reshape(-1, one.shape[2]).T for one in self.responses(xs)]
+        )
+        size = np.sqrt((columns**2).sum(axis=0))
+        size[size == 0] = 1.0
+        columns /= size
+        table = columns.T.reshape(1 + zeros, len(xs), -1)
+        if zeros:
+            found = [
+                np.linalg.lstsq(one.T, data, rcond=1e-9)[0] for one in table.transpose(1, 0, 2)
+            ]
+            coefficients = np.array(found)
+        else:
+            coefficients = (table[0] @ data)[:, None]
+        fitted = np.einsum("jkm,kj->km", table, coefficients)
+        return data - fitted, coefficients / size.reshape(1 + zeros, -1).T
 
     def residual(self, x: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Weighted residual (M,) of the best member with x, and its linear coefficients."""
-        columns = self.records.projected(self.columns(x))
-        size = np.sqrt((columns**2).sum(axis=0))
-        size[size == 0] = 1.0
-        coefficients = np.linalg.lstsq(columns / size, self.records.data, rcond=1e-9)[0] / size
-        return self.records.data - columns @ coefficients, coefficients
+        left, coefficients = self.residuals(x[None])
+        return left[0], coefficients[0]
 
     def moved(self, x: FloatArray, index: int, value: float) -> FloatArray:
         """The same x with another entry; S and J move together, by which S - J is kept.
@@ -226,21 +249,26 @@ class Task:
             found[other] = np.log(max(along, least))
         return found
 
-    def cost(self, x: FloatArray) -> float:
-        """Sum of squares."""
-        residual = self.residual(x)[0]
-        return float(residual @ residual)
+    def best(self, xs: Sequence[FloatArray], count: int) -> list[FloatArray]:
+        """Best `count` of xs; the first of those that are alike, as rates that limit nothing."""
+        power = max(float(self.records.data @ self.records.data), 1e-300)
+        few = max(_AT_ONCE // self.records.data.size, 1)
+        costs = [
+            (self.residuals(np.array(xs[k : k + few]))[0] ** 2).sum(axis=1)
+            for k in range(0, len(xs), few)
+        ]
+        parts = np.round(np.concatenate([np.empty(0), *costs]) / power, _ALIKE)
+        return [xs[i] for i in np.argsort(parts, kind="stable")[:count]]
 
     def slopes(self, x: FloatArray, residual: FloatArray, free: BoolArray) -> FloatArray:
         """Derivatives (M, k) of the residual by the free entries of x."""
-        high = self.bounds[1]
-        found = []
-        for i in np.flatnonzero(free):
-            step = self.steps[i] if x[i] + self.steps[i] <= high[i] else -self.steps[i]
-            moved = x.copy()
-            moved[i] += step
-            found.append((self.residual(moved)[0] - residual) / step)
-        return np.stack(found, axis=1)
+        steps = np.where(x + self.steps <= self.bounds[1], self.steps, -self.steps)[free]
+        moved = x + np.eye(x.size)[free] * steps[:, None]
+        change = self.residuals(moved)[0] - residual
+        # What changes nothing has no slope: rounding would send it anywhere.
+        nothing = 10.0**-_ALIKE * float(np.abs(self.records.data).max())
+        change[np.abs(change).max(axis=1) <= nothing] = 0.0
+        return np.asarray((change / steps[:, None]).T)
 
     def improved(
         self,

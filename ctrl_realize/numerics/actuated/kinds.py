@@ -40,8 +40,8 @@ Kind: TypeAlias = Literal[
 ]
 Place: TypeAlias = Literal["input", "stem"]
 
-_RATES = np.geomspace(0.1, 10.0, 9)  # ranges of the command in the visible rise
-_RATIOS = (1 / 3, 1.0, 3.0)  # of the rate in closing to that in opening
+_RATES = np.geomspace(10.0, 0.1, 9)  # ranges of the command in the visible rise, fastest first
+_RATIOS = (3.0, 1.0, 1 / 3)  # of the rate in closing to that in opening
 _WIDTHS = np.geomspace(3e-3, 0.6, 10)  # parts of the range of the command
 _FINE_WIDTHS = np.geomspace(5e-3, 0.8, 36)
 _ENDS = (0.4, 0.6, 0.75, 0.9, 0.97)  # of the travel, as parts of the range of the commands

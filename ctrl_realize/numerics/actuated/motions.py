@@ -15,16 +15,19 @@ References
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 
-from ..arrays import ComplexArray, FloatArray
+from ..arrays import ComplexArray, FloatArray, IntArray
 from ..separable.poles import poles_from_parameters
 from ..separable.responses import SampledInput
 from .kinds import Acting
 from .records import ActuatedRecord
+
+_Case: TypeAlias = tuple[Acting, float]
 
 _AT_ONCE = 1e-9  # samples by which a move and a sample may be apart and be at one time
 _DECAYED = -60.0  # exponent of what has decayed: 1e-26
@@ -32,43 +35,70 @@ _DECAYED = -60.0  # exponent of what has decayed: 1e-26
 
 @dataclass(frozen=True, eq=False)
 class _Events:
-    """Jumps and changes of slope of a position, at times in s."""
+    """Jumps and changes of slope of K positions, (K, E) or (1, E), at times in s."""
 
     times: FloatArray
     jumps: FloatArray
     slopes: FloatArray
 
 
-def forced_response(
-    record: ActuatedRecord, acting: Acting, dead_time: float, theta: FloatArray, start: float
-) -> tuple[FloatArray, FloatArray]:
-    """Response of unit gain at every bin (M,), and its time derivative.
+def forced_responses(
+    record: ActuatedRecord,
+    actings: Sequence[Acting],
+    dead_times: FloatArray,
+    theta: FloatArray,
+    starts: FloatArray,
+    zeros: int = 0,
+) -> FloatArray:
+    """Responses of unit gain of K models at every bin, and their time derivatives.
 
     Parameters
     ----------
     record : ActuatedRecord
-    acting : Acting
-    dead_time : float
+    actings : sequence of Acting
+        K actuators of one kind at one place.
+    dead_times : ndarray, shape (K,)
         In s.
-    theta : ndarray, shape (n,)
+    theta : ndarray, shape (K, n)
         Parameters of the poles, see `poles_from_parameters`.
-    start : float
+    starts : ndarray, shape (K,)
         Where the actuator is within play or friction at first, -1...1.
+    zeros : {0, 1}
+        Whether the derivatives are wanted.
+
+    Returns
+    -------
+    ndarray, shape (1 + zeros, K, M)
     """
-    poles = poles_from_parameters(theta[None])[0][0]
-    if acting.place == "input":
+    poles = poles_from_parameters(theta)[0]
+    each = list(zip(actings, starts.tolist(), strict=True))
+    if actings[0].place == "input":
         if record.listed:
-            return _summed(_positions(record, acting, start), record.time, dead_time, poles)
-        return _filtered(record, _sampled(record, acting, start), dead_time, poles)
-    rest = Acting("none", "input")
+            return _summed(_positions(record, each), record.time, dead_times, poles, zeros)
+        sampled = _once(lambda one: _sampled(record, *one), each)
+        return _filtered(record, sampled, dead_times, poles, zeros)
+    # Models with other actuators behind the same lags have one demand.
+    lags = [(wait, *row.tolist()) for wait, row in zip(dead_times.tolist(), theta, strict=True)]
+    first = [lags.index(one) for one in dict.fromkeys(lags)]
+    own = [lags[k] for k in first]
+    dead_times, poles = dead_times[first], poles[first]
     if record.listed:
-        events = _positions(record, rest, 0.0)
-        demand, slope = _summed(events, record.time, dead_time, poles)
+        events = _positions(record, [(Acting("none", "input"), 0.0)])
+        demands = _summed(events, record.time, dead_times, poles, zeros)
     else:
-        demand, slope = _filtered(record, record.command, dead_time, poles)
-    if acting.form.static:
-        demand = demand + record.command[0]  # where the stem is, not how far it went
-    return _moved(acting, demand, record.time, start), slope
+        demands = _filtered(record, [record.command] * len(first), dead_times, poles, zeros)
+    found = demands[:, [own.index(one) for one in lags]]
+    for (acting, start), demand in zip(each, found[0], strict=True):
+        # Of a static actuator it matters where the stem is, not how far it went.
+        level = record.command[0] if acting.form.static else 0.0
+        demand[:] = _moved(acting, demand + level, record.time, start)
+    return found
+
+
+def _once(function: Callable[[_Case], FloatArray], cases: Sequence[_Case]) -> list[FloatArray]:
+    """Results for all cases, of which many are the same."""
+    known = {case: function(case) for case in dict.fromkeys(cases)}
+    return [known[case] for case in cases]
 
 
 def _moved(acting: Acting, demand: FloatArray, time: FloatArray, start: float) -> FloatArray:
@@ -86,30 +116,44 @@ def _rates(acting: Acting) -> tuple[float, float]:
 
 def _slewed(demand: FloatArray, time: FloatArray, up: float, down: float) -> FloatArray:
     """Follow a demand at no more than a rate. Exact while one of them alone decides."""
-    since = np.diff(time, prepend=time[0]).tolist()
-    current, out = float(demand[0]), []
-    for wanted, dt in zip(demand.tolist(), since, strict=True):
-        away, rise, fall = wanted - current, up * dt, down * dt
-        current = current + rise if away > rise else current - fall if away < -fall else wanted
-        out.append(current)
+    change, since = np.diff(demand, prepend=demand[0]), np.diff(time, prepend=time[0])
+    too_fast = np.flatnonzero((change > up * since) | (change < -down * since))
+    out, rises, falls = demand.tolist(), (up * since).tolist(), (-down * since).tolist()
+    k = 0  # caught up with the demand, until it is too fast again
+    for first in too_fast.tolist():
+        if first <= k:
+            continue
+        k, current = first, out[first - 1]
+        while k < len(out):
+            away = out[k] - current
+            if falls[k] <= away <= rises[k]:
+                break
+            current += rises[k] if away > 0 else falls[k]
+            out[k] = current
+            k += 1
     return np.array(out)
 
 
-def _positions(record: ActuatedRecord, acting: Acting, start: float) -> _Events:
-    """Position for a command that is a list of moves."""
-    form = acting.form
+def _positions(record: ActuatedRecord, cases: Sequence[_Case]) -> _Events:
+    """Positions for a command that is a list of moves."""
+    form = cases[0][0].form
     if form.position is None:
-        return _ramps(record, *_rates(acting))
+        ramps = np.stack(_once(lambda one: _ramps(record, *_rates(one[0])), cases))
+        return _Events(ramps[:, 0], np.zeros_like(ramps[:, 0]), ramps[:, 1])
+    position = form.position
     held, index = record.held
-    times = record.dt * index.astype(np.float64)
-    position = form.position(acting, held, start)
-    jumps = np.diff(position, prepend=position[0])
-    moving = jumps != 0
-    return _Events(times[moving], jumps[moving], np.zeros(int(moving.sum())))
+    positions = np.stack(_once(lambda one: position(one[0], held, one[1]), cases))
+    jumps = np.diff(positions, prepend=positions[:, :1])
+    moving = jumps.any(axis=0)
+    jumps = jumps[:, moving]
+    return _Events(record.dt * index[None, moving].astype(np.float64), jumps, np.zeros_like(jumps))
 
 
-def _ramps(record: ActuatedRecord, up: float, down: float) -> _Events:
-    """Ramps from level to level; a new one may begin before the last has ended."""
+def _ramps(record: ActuatedRecord, up: float, down: float) -> FloatArray:
+    """Ramps from level to level; a new one may begin before the last has ended.
+
+    Times in s and changes of the slope (2, E).
+    """
     times = (record.dt * record.moves.astype(np.float64)).tolist()
     levels = record.command[record.moves].tolist()
     current, found = float(record.command[0]), []
@@ -119,8 +163,7 @@ def _ramps(record: ActuatedRecord, up: float, down: float) -> _Events:
         end = min(at + (level - current) / slope, following)
         found += [(at, slope), (end, -slope)]
         current = level if end < following else current + slope * (end - at)
-    moments, slopes = np.array(found, dtype=np.float64).reshape(-1, 2).T
-    return _Events(moments, np.zeros(moments.size), slopes)
+    return np.array(found, dtype=np.float64).reshape(-1, 2).T
 
 
 def _sampled(record: ActuatedRecord, acting: Acting, start: float) -> FloatArray:
@@ -144,77 +187,104 @@ def _sampled(record: ActuatedRecord, acting: Acting, start: float) -> FloatArray
 
 
 def _residues(poles: ComplexArray) -> ComplexArray:
-    """Step response of unit gain: 1 + sum_j residue_j exp(pole_j t)."""
-    gap = poles[:, None] - poles[None]
-    np.fill_diagonal(gap, 1.0)
-    return np.asarray(np.prod(-poles) / (poles * gap.prod(axis=1)))
+    """Step responses of unit gain: 1 + sum_j residue_j exp(pole_j t); all are (K, n)."""
+    gap = poles[:, :, None] - poles[:, None]
+    gap[:, np.arange(poles.shape[1]), np.arange(poles.shape[1])] = 1.0
+    return np.asarray(np.prod(-poles, axis=1, keepdims=True) / (poles * gap.prod(axis=2)))
 
 
 def _summed(
-    events: _Events, time: FloatArray, dead_time: float, poles: ComplexArray
-) -> tuple[FloatArray, FloatArray]:
+    events: _Events, time: FloatArray, dead_times: FloatArray, poles: ComplexArray, zeros: int
+) -> FloatArray:
     """Sum the responses to all events; exact for jumps and ramps.
 
     Between two events each mode is one exponential, which is carried from event to event.
     """
+    count = dead_times.size
     if not events.times.size:
-        return np.zeros(time.size), np.zeros(time.size)
+        return np.zeros((1 + zeros, count, time.size))
     residues: Any = _residues(poles)
     rates: Any = poles
     if not poles.imag.any():
         rates, residues = poles.real, residues.real
-    arrivals = events.times + dead_time
-    weights = residues * (events.jumps[:, None] + events.slopes[:, None] / rates)
-    decays = np.exp(np.diff(events.times)[:, None] * rates)
-    carried = [weights[0]]
-    for decay, weight in zip(decays, weights[1:], strict=True):
-        carried.append(carried[-1] * decay + weight)
-    here = np.searchsorted(arrivals * (1 + _AT_ONCE), time, side="left")
-    before = np.maximum(here - 1, 0)
-    since = np.where(here > 0, time - arrivals[before], 0.0)
-    response, slope = _real_waves(since, rates, np.array(carried)[before])
-    slopes = np.cumsum(events.slopes)
-    level = np.cumsum(events.jumps)
-    level[1:] += np.cumsum(slopes[:-1] * np.diff(events.times))
-    bent = float(np.sum(residues / rates).real)
-    response += level[before] + slopes[before] * (since - bent)
-    slope += slopes[before]
-    return np.where(here > 0, response, 0.0), np.where(here > 0, slope, 0.0)
+    gaps = np.diff(events.times)
+    weights = residues[:, None] * (
+        events.jumps[..., None] + events.slopes[..., None] / rates[:, None]
+    )
+    carried = np.ascontiguousarray(weights.transpose(1, 0, 2))
+    decays = np.exp(gaps.T[..., None] * rates)
+    for last, here, decay in zip(carried, carried[1:], decays, strict=False):
+        here += last * decay
+    arrivals = events.times + dead_times[:, None]
+    passed = _passed(arrivals, time)
+    before, row = np.maximum(passed - 1, 0), np.arange(count)[:, None]
+    since = np.where(passed > 0, time - arrivals[row, before], 0.0)
+    found = _real_waves(since, rates, carried[before, row], zeros)
+    slopes = np.cumsum(events.slopes, axis=1)
+    level = np.cumsum(events.jumps, axis=1)
+    level[:, 1:] += np.cumsum(slopes[:, :-1] * gaps, axis=1)
+    bent = (residues / rates).sum(axis=1, keepdims=True).real
+    of_row = row if len(level) == count else 0
+    found[0] += level[of_row, before]
+    if slopes.any():
+        found[0] += slopes[of_row, before] * (since - bent)
+        found[1:] += slopes[of_row, before]
+    return np.where(passed > 0, found, 0.0)
 
 
-def _real_waves(since: FloatArray, rates: Any, weights: Any) -> tuple[FloatArray, FloatArray]:
-    """Sum of weights (M, n) times exponentials over the n modes, and its derivative."""
-    total, slope = np.zeros((2, since.size))
-    for rate, weight in zip(rates.tolist(), weights.T, strict=True):
-        if rate.imag < 0:
-            continue  # counted with its conjugate
+def _passed(arrivals: FloatArray, time: FloatArray) -> IntArray:
+    """How many of the arrivals (K, E) are before every time: (K, M)."""
+    found: list[IntArray] = []
+    for k, own in enumerate(arrivals):
+        same = k > 0 and np.array_equal(own, arrivals[k - 1])
+        here = np.searchsorted(own * (1 + _AT_ONCE), time, side="left")
+        found.append(found[-1] if same else here)
+    return np.stack(found)
+
+
+def _real_waves(since: FloatArray, rates: Any, weights: Any, zeros: int) -> FloatArray:
+    """Sums of weights (K, M, n) times exponentials over the n modes, and their derivatives."""
+    found = np.zeros((1 + zeros, *since.shape))
+    for j in range(rates.shape[1]):
+        rate, weight = rates[:, j, None], weights[..., j]
         # What has decayed is cut: denormal numbers take time.
         size = np.exp(np.maximum(since * rate.real, _DECAYED))
-        if not rate.imag:
+        if not rate.imag.any():
             wave = size * weight.real
-            total += wave
-            slope += rate.real * wave
+            found[0] += wave
+            found[1:] += rate.real * wave
+            continue
+        size *= 1 + np.sign(rate.imag)  # a pole below the axis is counted with its conjugate
+        if not size.any():
             continue
         angle = since * rate.imag
-        cosine, sine = 2 * size * np.cos(angle), 2 * size * np.sin(angle)
+        cosine, sine = size * np.cos(angle), size * np.sin(angle)
         wave = cosine * weight.real - sine * weight.imag
-        total += wave
-        turned = sine * weight.real + cosine * weight.imag
-        slope += rate.real * wave - rate.imag * turned
-    return total, slope
+        found[0] += wave
+        if zeros:
+            turned = sine * weight.real + cosine * weight.imag
+            found[1] += rate.real * wave - rate.imag * turned
+    return found
 
 
 def _filtered(
-    record: ActuatedRecord, position: FloatArray, dead_time: float, poles: ComplexArray
-) -> tuple[FloatArray, FloatArray]:
-    """Response to a position that is held over every sample."""
-    drive = SampledInput(position - position[0], record.dt)
-    static, mode, _ = drive.modes(np.array([dead_time]), poles[None])
+    record: ActuatedRecord,
+    positions: Sequence[FloatArray],
+    dead_times: FloatArray,
+    poles: ComplexArray,
+    zeros: int,
+) -> FloatArray:
+    """Responses to positions that are held over every sample."""
     residues = _residues(poles)
-    response = static[0] + _real_product(mode[0], residues)
-    slope = _real_product(mode[0], residues * poles)
-    rows = record.rows
-    return record.averaged(response[rows]), record.averaged(slope[rows])
+    found = []
+    for k, position in enumerate(positions):
+        drive = SampledInput(position - position[0], record.dt)
+        static, mode, _ = drive.modes(dead_times[k : k + 1], poles[k : k + 1])
+        own = [static[0] + _real_product(mode[0], residues[k])]
+        if zeros:
+            own.append(_real_product(mode[0], residues[k] * poles[k]))
+        found.append([record.averaged(one[record.rows]) for one in own])
+    return np.array(found).transpose(1, 0, 2)
 
 
 def _real_product(mode: Any, weights: ComplexArray) -> FloatArray:

@@ -55,8 +55,7 @@ def searched(
     task = Task(records, family, scales)
     linear = _linear_starts(family, scales, beside)
     best = [x for start in linear for x in _best_actuators(task, start)]
-    costs = [task.cost(x) for x in best]
-    best = [best[i] for i in np.argsort(costs)[:_MOST_STARTS]]
+    best = task.best(best, _MOST_STARTS)
     rough = sorted((task.improved(x, turns=_ROUGH) for x in best), key=_cost)
     slips = family.form.jump == 1  # behind the stick band
     if slips:
@@ -70,9 +69,7 @@ def searched(
 def _best_actuators(task: Task, linear: FloatArray) -> list[FloatArray]:
     """Starts with these dead time and poles, and the best actuators of a grid."""
     starts = [np.clip(np.concatenate([linear, more]), *task.bounds) for more in _actuators(task)]
-    costs = [task.cost(x) for x in starts]
-    few = 1 if task.family.form.own_lags else _ACTUATORS
-    return [starts[i] for i in np.argsort(costs)[:few]]
+    return task.best(starts, 1 if task.family.form.own_lags else _ACTUATORS)
 
 
 def _finer(task: Task, found: Member) -> list[FloatArray]:
@@ -86,8 +83,7 @@ def _finer(task: Task, found: Member) -> list[FloatArray]:
         for jump in sizes[: i + 1].tolist()
         for start in starts
     ]
-    costs = [task.cost(x) for x in grid]
-    return [grid[i] for i in np.argsort(costs)[:_FOLLOWED_FINER]]
+    return task.best(grid, _FOLLOWED_FINER)
 
 
 def _other_slips(task: Task, found: Member) -> Member:
@@ -100,8 +96,7 @@ def _other_slips(task: Task, found: Member) -> Member:
             x[at : at + 2] += stick, jump
             if x[at + 1] <= x[at]:
                 grid.append(x)
-    costs = [task.cost(x) for x in grid]
-    best = [task.improved(grid[i]) for i in np.argsort(costs)[:_FOLLOWED_FINER]]
+    best = [task.improved(x) for x in task.best(grid, _FOLLOWED_FINER)]
     return min([found, *best], key=_cost)
 
 

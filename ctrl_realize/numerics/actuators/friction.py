@@ -221,10 +221,21 @@ def choudhury_at_rest(command: float, stick: float, jump: float, start: float = 
 
 def choudhury(position: FloatArray, stick: float, jump: float, start: float = 0.0) -> FloatArray:
     """Stem positions (N,) for commands `position` by Choudhury's model; `start` as `kano`."""
-    state = choudhury_at_rest(float(position[0]), stick, jump, start)
+    last, stem, _, rest, moving, paused, slope = choudhury_at_rest(
+        float(position[0]), stick, jump, start
+    )
+    half, offset = (stick - jump) / 2, 0.0
     out = []
+    # `choudhury_step`, written out as in `kano`
     for command in position.tolist():
-        state, stem = choudhury_step(state, command, stick, jump)
+        change = command - last
+        if moving and change * slope <= 0:
+            moving, paused, rest = False, change == 0, last
+        if not moving and abs(command - rest) > (jump if paused else stick):
+            moving, offset = True, half if command > rest else -half
+        if moving:
+            stem = command - offset
+        last, slope = command, change
         out.append(stem)
     return np.array(out)
 

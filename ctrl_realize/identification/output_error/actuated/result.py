@@ -78,7 +78,12 @@ class ActuatorFit:
             f"{one.label} {one.text()} ({one.interval_text() or 'one end is not told'})"
             for one in self.parameters
         )
-        return f"{numbers}; {_PLACES[self.actuator_at]}"
+        return f"{numbers}; {self.where}"
+
+    @property
+    def where(self) -> str:
+        """Where it acts: "before the lags" or "behind the lags"."""
+        return _PLACES[self.actuator_at]
 
     def position(self, command: FloatArray, dt: float) -> FloatArray:
         """Pass a command (N,) through the actuator alone; a slew limit at its mean over samples."""
