@@ -67,7 +67,7 @@ def write_loop_report(
     >>> from pathlib import Path
     >>> import ctrl_realize as cr
     >>> from ctrl_realize import report
-    >>> loop = cr.bench.valve_loop(cr.actuators.Stiction(5, 2), noise=0.1).simulate(3000.0, rng=1)
+    >>> loop = cr.bench.valve_loop(cr.actuators.Stiction(5, 2), noise=0.1).simulate(1200.0, rng=1)
     >>> found = cr.valves.diagnose_loop(loop.record)
     >>> with tempfile.TemporaryDirectory() as folder:
     ...     path = report.write_loop_report(Path(folder) / "loop.html", found, simulated=True)

@@ -41,7 +41,7 @@ def loop_diagnosis_plot(
     Examples
     --------
     >>> import ctrl_realize as cr
-    >>> loop = cr.bench.valve_loop(cr.actuators.Stiction(5, 2), noise=0.1).simulate(3000.0, rng=1)
+    >>> loop = cr.bench.valve_loop(cr.actuators.Stiction(5, 2), noise=0.1).simulate(1200.0, rng=1)
     >>> cplt = cr.valves.diagnose_loop(loop.record).plot()
     >>> cplt.axes.shape
     (2, 2)
@@ -80,7 +80,7 @@ def loop_trend_plot(
     Examples
     --------
     >>> import ctrl_realize as cr
-    >>> loop = cr.bench.valve_loop(cr.actuators.Stiction(5, 2), noise=0.1).simulate(3000.0, rng=1)
+    >>> loop = cr.bench.valve_loop(cr.actuators.Stiction(5, 2), noise=0.1).simulate(1200.0, rng=1)
     >>> cplt = cr.plots.loop_trend_plot(cr.valves.diagnose_loop(loop.record))
     >>> [text.get_text() for text in cplt.figure.axes[0].get_legend().get_texts()]
     ['OP', 'PV']
@@ -108,7 +108,7 @@ def loop_phase_plot(
     Examples
     --------
     >>> import ctrl_realize as cr
-    >>> loop = cr.bench.valve_loop(cr.actuators.Stiction(5, 2), noise=0.1).simulate(3000.0, rng=1)
+    >>> loop = cr.bench.valve_loop(cr.actuators.Stiction(5, 2), noise=0.1).simulate(1200.0, rng=1)
     >>> cplt = cr.plots.loop_phase_plot(cr.valves.diagnose_loop(loop.record))
     >>> cplt.figure.axes[0].get_xlabel()
     'controller output OP'
@@ -136,7 +136,7 @@ def loop_correlation_plot(
     Examples
     --------
     >>> import ctrl_realize as cr
-    >>> loop = cr.bench.valve_loop(cr.actuators.Stiction(5, 2), noise=0.1).simulate(3000.0, rng=1)
+    >>> loop = cr.bench.valve_loop(cr.actuators.Stiction(5, 2), noise=0.1).simulate(1200.0, rng=1)
     >>> cplt = cr.plots.loop_correlation_plot(cr.valves.diagnose_loop(loop.record))
     >>> cplt.figure.axes[0].get_xlabel()
     'lag [s]'
@@ -166,7 +166,7 @@ def loop_shape_plot(
     Examples
     --------
     >>> import ctrl_realize as cr
-    >>> loop = cr.bench.valve_loop(cr.actuators.Stiction(5, 2), noise=0.1).simulate(3000.0, rng=1)
+    >>> loop = cr.bench.valve_loop(cr.actuators.Stiction(5, 2), noise=0.1).simulate(1200.0, rng=1)
     >>> cplt = cr.plots.loop_shape_plot(cr.valves.diagnose_loop(loop.record))
     >>> [text.get_text() for text in cplt.figure.axes[0].get_legend().get_texts()]
     ['mean', 'sine', 'triangle']

@@ -88,7 +88,7 @@ class LoopMethod:
     Examples
     --------
     >>> import ctrl_realize as cr
-    >>> loop = cr.bench.valve_loop(cr.actuators.Stiction(5, 2), noise=0.1).simulate(3000.0, rng=1)
+    >>> loop = cr.bench.valve_loop(cr.actuators.Stiction(5, 2), noise=0.1).simulate(1200.0, rng=1)
     >>> method = cr.valves.diagnose_loop(loop.record).method("curve_fit")
     >>> method.verdict, method.limit
     ('stiction', 'stiction from 0.6, none up to 0.4')

@@ -61,7 +61,7 @@ class LoopDiagnosis(Result):
     Examples
     --------
     >>> import ctrl_realize as cr
-    >>> loop = cr.bench.valve_loop(cr.actuators.Stiction(5, 2), noise=0.1).simulate(3000.0, rng=1)
+    >>> loop = cr.bench.valve_loop(cr.actuators.Stiction(5, 2), noise=0.1).simulate(1200.0, rng=1)
     >>> cr.valves.diagnose_loop(loop.record)
     <LoopDiagnosis: stiction>
     """
