@@ -2,10 +2,12 @@
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose
 from scipy.optimize import minimize
+from scipy.stats import norm
 
 import ctrl_realize as cr
-from ctrl_realize.numerics.output_error.rounded import fit_rounded, log_probability
+from ctrl_realize.numerics.output_error.rounded import fit_rounded, log_probability, scores
 from ctrl_realize.numerics.output_error.step_data import step_data, step_scales, window
 from ctrl_realize.numerics.separable.structures import Candidate
 from ctrl_realize.numerics.separable.varpro import KnownFactor, Structure
@@ -24,6 +26,27 @@ def rounded(seed, dead_time, noise):
     rng = np.random.default_rng(seed)
     y = response(dead_time, 20.0, 8.0) + rng.uniform(-0.5, 0.5) * STEP
     return np.round((y + noise * rng.standard_normal(COUNT)) / STEP) * STEP
+
+
+@pytest.mark.parametrize("noise", [0.05, 0.3, 2.0])
+def test_probabilities_of_all_levels_are_one_and_scores_are_their_slopes(noise):
+    levels = np.arange(-20, 21) + 0.13
+    assert_allclose(np.exp(log_probability(levels, 1.0, noise)).sum(), 1.0, rtol=1e-12)
+    error = np.array([-1.4, -0.52, 0.0, 0.3, 0.49, 2.0]) * max(noise, 0.5)
+    width = norm.cdf((error + 0.5) / noise) - norm.cdf((error - 0.5) / noise)
+    seen = width > 1e-9  # beyond, the difference of the two has no digits
+    probability = np.exp(log_probability(error, 1.0, noise))
+    assert_allclose(probability[seen], width[seen], rtol=1e-6)
+    h = 1e-6
+    apart = log_probability(error - h, 1.0, noise) - log_probability(error + h, 1.0, noise)
+    score, _ = scores(error, 1.0, noise)
+    assert_allclose(score, apart / (2 * h), rtol=1e-5, atol=1e-6)
+
+
+def test_information_of_fine_rounding_is_that_of_the_noise_with_the_rounding():
+    # Sheppard's correction: variance plus a twelfth of the squared step, up to fourth order.
+    _, information = scores(np.array([0.2, -0.4]), 1.0, 3.0)
+    assert_allclose(information, 1 / (9.0 + 1 / 12), rtol=1e-3)
 
 
 def test_the_maximum_is_that_of_a_search_over_all_parameters():

@@ -14,6 +14,7 @@ from ctrl_realize.numerics.output_error.step_data import (
     window,
 )
 from ctrl_realize.numerics.separable.profile_ends import profile_limits
+from ctrl_realize.numerics.separable.responses import SampledInput
 from ctrl_realize.numerics.separable.varpro import KnownFactor
 
 EDGE, DELAY, LAG, DT = 200, 40, 60.0, 0.5
@@ -150,6 +151,17 @@ def test_the_condensed_misfit_differs_from_that_of_all_samples_by_a_constant():
     # the pieces with a level of their own begin elsewhere, by a sample or so
     assert_allclose(np.diff(short), np.diff(whole), rtol=1e-4)
     assert abs(found.noise / 0.1 - 1) < 0.01
+
+
+def test_the_drive_is_the_response_to_a_pulse_times_the_factor():
+    y, u = record(3000)
+    found = condensed([y], [u], FINE, LAGS, huber=False)
+    tau, poles = np.array([0.023, 0.1]), np.array([[-3.0, -8 + 5j], [-20.0, -1.0 + 0j]])
+    pulse = np.zeros(LAGS)
+    pulse[0] = 1.0
+    exact = SampledInput(pulse, FINE).modes(tau, poles)
+    for one, other in zip(found.drive.modes(tau, poles), exact, strict=True):
+        assert_allclose(one, np.einsum("ml,bl...->bm...", found.drive.factor, other), atol=1e-9)
 
 
 def test_outliers_count_for_little_with_hubers_loss():
