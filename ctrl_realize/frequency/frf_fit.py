@@ -29,7 +29,7 @@ class FRFStructure:
         Estimate and its standard deviation in s; infinite if this structure does not determine the
         dead time.
     cost : float
-        Weighted misfit.
+        Weighted rms residual.
     bic : float
         Bayesian information criterion; smaller is better, only differences matter.
     """
@@ -197,7 +197,7 @@ class FRFFit(FractionalDelayFit):
                 f"{self.frequency_hz[-1]:.4g} Hz",
             ),
             (
-                "misfit",
+                "weighted residual",
                 f"{self.weighted_rms:.3g} x {unit}"
                 if self.noise_known
                 else f"{100 * self.weighted_rms:.3g} % of {unit}",

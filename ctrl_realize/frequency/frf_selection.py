@@ -44,7 +44,7 @@ _SMALL_WIDTH = 1e-3
 _ORDER_OF_LEAD = 4
 """Highest order that is asked whether the response leads."""
 _FAR_BETTER = 0.5
-"""Of the square of the misfit."""
+"""Of the square of the residual."""
 
 
 def chosen_model(
@@ -84,13 +84,14 @@ def chosen_model(
     chosen = fits[n, r]
     within = _profiles(data, fits, rows, scales, unit)
     interval, flags = _cover(rows, within, data.max_dead_time / unit, 1 / float(frequency[-1]))
-    misfit = float(np.sqrt(chosen.cost / (frequency.size - 0.5 * (2 * n + 2 - r))))
-    if noise_known and misfit > _POOR_MISFIT:
+    residual_ratio = float(np.sqrt(chosen.cost / (frequency.size - 0.5 * (2 * n + 2 - r))))
+    if noise_known and residual_ratio > _POOR_MISFIT:
         flags.append(
             Flag(
                 "misfit",
-                f"the residual is {plainly(misfit, 2)} times the measured noise: the plant is not "
-                f"exactly of order {n}, or is nonlinear; the interval is widened accordingly",
+                f"the residual is {plainly(residual_ratio, 2)} times the measured noise: the "
+                f"plant is not exactly of order {n}, or is nonlinear; the interval is widened "
+                "accordingly",
             )
         )
     flags.extend(_leading_phase(data, fits, chosen, unit))
@@ -111,7 +112,7 @@ def chosen_model(
         measured=locked(points.response),
         sigma=read_only(points.sigma),
         noise_known=noise_known,
-        weighted_rms=misfit,
+        weighted_rms=residual_ratio,
         matrices=(read_only(A * unit), read_only(B * unit), read_only(C), read_only(D)),
         poles=locked(poles * unit),
         pole_std=read_only(pole_std * unit),
@@ -186,7 +187,7 @@ def _leading_phase(
             "phase_leads",
             f"the response is non-causal: at order {n} a negative dead time of "
             f"{1e3 * dead_time / unit:.3g} ms leaves "
-            f"{100 * np.sqrt(earlier.cost / min(as_is)):.2g} % of the misfit; the FRF's time "
+            f"{100 * np.sqrt(earlier.cost / min(as_is)):.2g} % of the residual; the FRF's time "
             "axis starts late, perhaps because a delay was removed: add it back before the "
             "fit",
         )

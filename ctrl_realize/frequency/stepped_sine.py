@@ -192,7 +192,7 @@ def _averaged(
     """Average the repeats of each point."""
     response = np.empty(len(points), dtype=np.complex128)
     frequency, coherence, std = (np.empty(len(points)) for _ in range(3))
-    told = np.empty(len(points))
+    values_behind = np.empty(len(points))
     start = 0
     for k, point in enumerate(points):
         these = slice(start, start + len(point))
@@ -208,12 +208,17 @@ def _averaged(
         coherence[k] = min(abs(y @ u.conj()) ** 2 / total, 1.0) if total > 0 else 0.0
         if len(point) >= _ENOUGH:
             variance = np.var(values, ddof=1) / len(point)
-            told[k] = len(point)
+            values_behind[k] = len(point)
         else:
             variance = np.mean(np.abs(values) ** 2 * relative_variance[these]) / len(point)
             # No mean is subtracted: the number of bins corresponds to one repeat more.
-            told[k] = 1 + bins[these].sum()
+            values_behind[k] = 1 + bins[these].sum()
         std[k] = np.sqrt(variance)
     return MeasuredFRF(
-        response, frequency, coherence=coherence, std=std, repeats=float(told.min()), name=name
+        response,
+        frequency,
+        coherence=coherence,
+        std=std,
+        repeats=float(values_behind.min()),
+        name=name,
     )

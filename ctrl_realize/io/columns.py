@@ -116,5 +116,5 @@ def check_lengths(table: Table, indices: Iterable[int]) -> None:
     """Refuse arrays of different lengths, which text tables cannot have."""
     sizes = {k: table.columns[k].cells.size for k in indices}
     if len(set(sizes.values())) > 1:
-        told = ", ".join(f"{table.title(k)} {size}" for k, size in sizes.items())
-        raise DataError(f"{table.path}: the columns have different lengths: {told}")
+        lengths = ", ".join(f"{table.title(k)} {size}" for k, size in sizes.items())
+        raise DataError(f"{table.path}: the columns have different lengths: {lengths}")

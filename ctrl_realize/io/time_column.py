@@ -69,18 +69,18 @@ def time_axis(
         return _since_first(table, index, cells)
     named = table.columns[index].unit or unit_named(table.columns[index].name)
     if time_format is not None or not holds_numbers(table, index):
-        told = named if unit == "auto" else unit
-        stamps, doubt = _parsed_dates(table, index, time_format, told, date)
+        unit_used = named if unit == "auto" else unit
+        stamps, doubt = _parsed_dates(table, index, time_format, unit_used, date)
         return _since_first(table, index, stamps)._replace(doubt=doubt)
-    untold = unit == "auto" and not named
-    if untold:
+    unknown = unit == "auto" and not named
+    if unknown:
         _check_epoch(table, index, cells)
     unit = checked_time_unit((named or "s") if unit == "auto" else unit)
     if cells.dtype.kind in "iu" and cells.size and int(np.max(cells)) > _EXACT_INTEGERS:
         # nanoseconds since 1970 do not fit into a double, but their differences do
         return TimeAxis(to_seconds((cells - cells[0]).astype(np.float64), unit), None)
     values = table.numbers(index)
-    if untold:
+    if unknown:
         _check_day_count(table, index, values)
     return TimeAxis(to_seconds(values, unit), None)
 

@@ -82,24 +82,26 @@ def delay_comparison_plot(
     'dead time, or bound ◂ [ms]'
     """
     size = (8.0, 1.6 + 0.5 * len(check.estimates))
-    factor, unit = time_unit(max(view.high for view in check.estimates))
+    factor, unit = time_unit(max(estimate.high for estimate in check.estimates))
     with style.canvas(ax, title=title, size=size) as (axes,):
         lines: list[Line2D] = []
-        for place, view in enumerate(reversed(check.estimates)):
-            bound = view.kind == "upper bound"
+        for place, estimate in enumerate(reversed(check.estimates)):
+            bound = estimate.kind == "upper bound"
             looks = {"color": style.NOISE if bound else style.MODEL, "linewidth": 3.0, **kwargs}
-            if view.doubt:  # it does not count
+            if estimate.doubt:  # it does not count
                 looks = {**looks, "alpha": 0.35}
-            lines += axes.plot(factor * np.array([view.low, view.high]), [place, place], **looks)
+            lines += axes.plot(
+                factor * np.array([estimate.low, estimate.high]), [place, place], **looks
+            )
             mark = "<" if bound else "o"
             points = {"color": looks["color"], "alpha": looks.get("alpha"), "markersize": 8}
-            axes.plot(factor * view.value, place, mark, **points)
+            axes.plot(factor * estimate.value, place, mark, **points)
         if check.common is not None:
             low, high = (factor * edge for edge in check.common)
             axes.axvspan(low, high, color=style.BAND, alpha=0.3, label="all agree", linewidth=0)
         names = [
-            f"{view.method}\n({view.source}{', in doubt' if view.doubt else ''})"
-            for view in reversed(check.estimates)
+            f"{estimate.method}\n({estimate.source}{', in doubt' if estimate.doubt else ''})"
+            for estimate in reversed(check.estimates)
         ]
         axes.set_yticks(range(len(names)), names)
         axes.set_ylim(-0.6, len(names) - 0.4)

@@ -48,7 +48,7 @@ COMPOSED = {
     "gain_not_resolved": "structures that the data cannot rule out differ in gain or total delay, "
     "or the interval of the gain contains zero",
     "actuator_not_resolved": "S, J, or another parameter of an actuator, lies between … and …, and "
-    "the records do not tell it closer; … would",
+    "the records do not determine it more closely; … would",
     "estimates_disagree": "delay estimates far from their median: …",
 }
 """Messages that are put together from parts."""

@@ -253,7 +253,7 @@ def _by_fit(
         first, second = ([float(x) for x in p[:lags]] + [0.0, 0.0])[:2]
         return max(first, second), min(first, second), float(p[-1])
 
-    def misfit(p: FloatArray) -> FloatArray:
+    def deviation(p: FloatArray) -> FloatArray:
         lag, second, later = unpack(p)
         return process_step(time, lag, second, later, integrating=integrating) - shape
 
@@ -266,7 +266,7 @@ def _by_fit(
             lags, [(1 - share) * 0.7 * total, (1 - share) * 0.3 * total, share * total]
         )
         start = np.clip(parts, lower + tiny, upper)
-        found = least_squares(misfit, start, bounds=(lower, upper), x_scale=total)
+        found = least_squares(deviation, start, bounds=(lower, upper), x_scale=total)
         if best is None or found.cost < best.cost:
             best = found
     lag, second, dead_time = unpack(best.x)

@@ -42,17 +42,17 @@ def _different_gains(rows: Rows) -> list[Flag]:
     apart = float(np.max(np.abs(ratios - 1)))
     statistic, chance = homogeneity(gains, errors)
     differ = chance < BY_CHANCE and apart > SAME
-    told = f"chi-square {statistic:.3g}, p = {chance:.2g}"
+    statistics = f"chi-square {statistic:.3g}, p = {chance:.2g}"
     if not np.isfinite(errors).any():
         # The error of a gain from a scan is unknown; noise causes a few percent.
-        differ, told = apart > NO_COMMON_GAIN, "their errors are unknown"
+        differ, statistics = apart > NO_COMMON_GAIN, "their errors are unknown"
     if not differ:
         return []
     flags = [
         Flag(
             "gains_differ",
             f"the gains of the records differ, {gains.min():.3g} to {gains.max():.3g} "
-            f"({told}): the plant is nonlinear, or has changed between the records",
+            f"({statistics}): the plant is nonlinear, or has changed between the records",
         )
     ]
     if apart > NO_COMMON_GAIN:

@@ -172,8 +172,8 @@ def through_arx(
                 "the output moves too little compared with its level; subtract the level, or "
                 "record more digits"
             ) from None
-        misfit = equations.rows * np.linalg.slogdet(fit.noise)[1]
-        fits[misfit + p * len(columns) * np.log(equations.rows)] = (order, fit)
+        prediction_error = equations.rows * np.linalg.slogdet(fit.noise)[1]
+        fits[prediction_error + p * len(columns) * np.log(equations.rows)] = (order, fit)
     order, fit = fits[min(fits)]
     growth = count * np.log10(np.abs(np.linalg.eigvals(arx_state_space(fit)[0])).max() + 1e-9)
     if growth > MOST_GROWTH:

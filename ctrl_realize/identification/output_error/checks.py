@@ -144,11 +144,11 @@ def against_one_model(shown: Shown, delay: float) -> tuple[Flag, ...]:
     late = shown.earlier(round(delay))
     parts = np.minimum(3 * np.arange(size) // size, 2)
     flags = []
-    if told := _told(parameter_change(residual, fitted, parts, shown.rows), delay):
+    if changes := _changes(parameter_change(residual, fitted, parts, shown.rows), delay):
         flags.append(
             Flag(
                 "time_varying",
-                f"between the thirds of the record, {told}: the plant is time-varying; the "
+                f"between the thirds of the record, {changes}: the plant is time-varying; the "
                 "model reported is an average",
             )
         )
@@ -157,11 +157,11 @@ def against_one_model(shown: Shown, delay: float) -> tuple[Flag, ...]:
         ("level of the output", _thirds(fitted)),
         ("direction", (np.gradient(fitted) > 0).astype(np.int64)),
     ):
-        if told := _told(parameter_change(residual, fitted, groups, shown.rows), delay):
+        if changes := _changes(parameter_change(residual, fitted, groups, shown.rows), delay):
             flags.append(
                 Flag(
                     "not_linear",
-                    f"depending on the {what}, {told}: the plant is nonlinear; the model "
+                    f"depending on the {what}, {changes}: the plant is nonlinear; the model "
                     "reported is an average",
                 )
             )
@@ -201,7 +201,7 @@ def _thirds(values: FloatArray) -> IntArray:
     return np.searchsorted(bounds, values, side="right").astype(np.int64)
 
 
-def _told(change: ParameterChange | None, delay: float) -> str:
+def _changes(change: ParameterChange | None, delay: float) -> str:
     """Describe the differences of gains and delays; empty if they are small."""
     if change is None or change.chance >= RARE:
         return ""

@@ -196,7 +196,7 @@ def _nothing(dt: float, fit: OutputErrorEstimate) -> Flag | None:
 
 
 def _many_lags(fit: OutputErrorEstimate, firm: str) -> Flag | None:
-    if not fit.distributed.endless:
+    if not fit.distributed.unlimited:
         return None
     return Flag(
         "many_lags",

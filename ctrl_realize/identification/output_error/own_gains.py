@@ -105,7 +105,7 @@ def fit_own_gains(
             break
         ratios = turned
     gains = _gains(records, result, found, moved, used)
-    told = replace(
+    repeats = replace(
         found,
         gains=found.gains * ratios,
         gain_errors=found.gain_errors * ratios,
@@ -118,7 +118,7 @@ def fit_own_gains(
     result = replace(
         result,
         gains=gains,
-        repeatability=told,
+        repeatability=repeats,
         flags=(*kept, *_flags(gains)),
         choices=(*result.choices, reason),
     )

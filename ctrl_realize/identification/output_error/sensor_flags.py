@@ -21,7 +21,7 @@ _HELD = 0.5
 noise of one quantisation step repeats 28 %. Ablation: held output."""
 # The following thresholds for flags are a matter of presentation.
 _BEYOND = 20.0  # ranges: no overshoot goes as far
-_WILD = 5.0  # standard deviations: Gaussian noise has none of a million samples beyond
+_OUTLIER = 5.0  # standard deviations: Gaussian noise has none of a million samples beyond
 _MANY = 0.002  # of the samples beyond, from which on they are named
 _GAP = 3.0  # usual distances of samples that a gap has at least
 _OF_THE_ONSET = 0.2  # part of the time to the first sample of the response that it takes at least
@@ -50,13 +50,14 @@ def outliers(output: FloatArray, fitted: FloatArray, sigma: float | None) -> lis
         return [Flag("outliers", code)]
     if sigma is None:
         return []
-    wild = float(np.mean(np.abs(output - fitted) > _WILD * sigma))
-    if wild <= _MANY:
+    outlying = float(np.mean(np.abs(output - fitted) > _OUTLIER * sigma))
+    if outlying <= _MANY:
         return []
     return [
         Flag(
             "outliers",
-            f"{100 * wild:.2g} % of the samples are outliers, {_WILD:g} standard deviations or "
+            f"{100 * outlying:.2g} % of the samples are outliers, {_OUTLIER:g} "
+            "standard deviations or "
             "more from the model",
         )
     ]
@@ -141,7 +142,7 @@ def _onset_in_gap(fit: OutputErrorFit) -> list[Flag]:
         Flag(
             "onset_in_gap",
             f"there are no samples between {ends} after the step, where the response begins: the "
-            "record does not tell the dead time any closer",
+            "record does not determine the dead time more closely",
         )
     ]
 
@@ -162,7 +163,7 @@ def _lead(fit: OutputErrorFit, output: FloatArray, fitted: FloatArray) -> list[F
     moved = moved[: k + 2] - np.median(moved[: k - _LEAD + 1])
     rest = moved[: k - _LEAD + 1]
     # A rest may be padded, or quieter than what follows.
-    least = _WILD * max(winsorised_sigma(rest, data.quantum), data.sigma, fit.residual)
+    least = _OUTLIER * max(winsorised_sigma(rest, data.quantum), data.sigma, fit.residual)
     goes_on = (output[k + 1] - fitted[k]) * data.motion.sign
     if moved[k] <= least or goes_on < _STAYS * moved[k]:
         return []

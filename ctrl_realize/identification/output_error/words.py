@@ -47,7 +47,7 @@ def model_words(model: LagChain | DispersedFlow) -> str:
     """Name a model other than the structures."""
     if isinstance(model, DispersedFlow):
         return "axial-dispersion model"
-    if model.hidden:
+    if model.truncated:
         return "diffusion model"
     return f"model of {model.candidate.structure.order} nearly equal lags"
 

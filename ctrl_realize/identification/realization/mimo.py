@@ -23,9 +23,9 @@ from .mimo_cores import (
     Assembly,
     RealizationOptions,
     aligned_core,
+    channel_iae,
     cores_by_columns,
     cores_by_rows,
-    misfit,
 )
 from .realize import HANKEL
 
@@ -269,16 +269,16 @@ def realize_mimo(
     models: dict[str, Assembly] = {}
     if choice in ("common", "auto"):
         candidates = [aligned_core(data, count, *split, options) for split in splits]
-        models["common"] = min(candidates, key=lambda c: float(misfit(c, data).sum()))
+        models["common"] = min(candidates, key=lambda c: float(channel_iae(c, data).sum()))
     if choice in ("rows", "auto"):
         models["rows"] = cores_by_rows(data, count, found, options)
     if choice in ("columns", "auto"):
         models["columns"] = cores_by_columns(data, count, found, options)
-    misfits = {way: misfit(pieces, data) for way, pieces in models.items()}
+    errors = {way: channel_iae(pieces, data) for way, pieces in models.items()}
     # The fewest states among those that explain the data about as well as the best.
-    enough = max(ALIKE * min(m.sum() for m in misfits.values()), EXACT * len(markov))
+    enough = max(ALIKE * min(m.sum() for m in errors.values()), EXACT * len(markov))
     way = min(
-        (way for way in models if misfits[way].sum() <= enough), key=lambda w: models[w].states
+        (way for way in models if errors[way].sum() <= enough), key=lambda w: models[w].states
     )
     pieces = models[way]
     behind, before = (np.array(d, dtype=np.int64) for d in (pieces.outputs, pieces.inputs))
@@ -292,7 +292,7 @@ def realize_mimo(
             structure=way,
             orders=pieces.orders,
             states=pieces.states,
-            relative_iae=read_only(misfits[way]),
+            relative_iae=read_only(errors[way]),
             impulse=data,
             flags=pieces.flags,
         ),

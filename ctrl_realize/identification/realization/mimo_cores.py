@@ -60,7 +60,7 @@ class Assembly:
         return DelayedStateSpace(core, self.inputs, output_delay=self.outputs, fit=fit)
 
 
-def misfit(pieces: Assembly, data: ImpulseResponse) -> FloatArray:
+def channel_iae(pieces: Assembly, data: ImpulseResponse) -> FloatArray:
     """Return the IAE of every entry relative to its data."""
     markov = channels(data)
     model = np.reshape(pieces.system(data.dt).markov(data.n_samples), markov.shape)

@@ -12,7 +12,12 @@ from numpy.typing import ArrayLike
 from ..._checks import integer, one_of
 from ...data import ImpulseResponse
 from ...numerics.arrays import FloatArray
-from ...numerics.hankel.delay_models import DelayModels, hankel_size, misfit, realize_at_delays
+from ...numerics.hankel.delay_models import (
+    DelayModels,
+    hankel_size,
+    iae_of_models,
+    realize_at_delays,
+)
 from .impulses import as_impulse, channels, check_samples, noise_floor, settled_samples
 from .realize import HANKEL
 
@@ -87,6 +92,6 @@ def scan_surface(
         hankel=hankel,
         models=models,
         direct=direct,
-        iae=np.stack([misfit(markov, delays, models, order, direct) for order in orders]),
+        iae=np.stack([iae_of_models(markov, delays, models, order, direct) for order in orders]),
         noise_floor=noise_floor(data, hankel_size(samples, padded=padded)),
     )

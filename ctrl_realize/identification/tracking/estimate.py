@@ -142,11 +142,11 @@ def _interval(excess: FloatArray, noise: float, low: int) -> tuple[int, int]:
     return low + int(np.searchsorted(below, 0.025)), low + last
 
 
-def _fraction(misfit: FloatArray, best: int) -> float:
+def _fraction(cost: FloatArray, best: int) -> float:
     """Minimum of a parabola through the smallest misfit and its neighbours, -0.5...0.5."""
-    if not 0 < best < misfit.size - 1:
+    if not 0 < best < cost.size - 1:
         return 0.0
-    before, here, after = misfit[best - 1 : best + 2]
+    before, here, after = cost[best - 1 : best + 2]
     bend = before - 2 * here + after
     return float((before - after) / (2 * bend)) if bend > 0 else 0.0
 

@@ -107,17 +107,17 @@ def compare_delay_estimates(
         integer(max_delay, "max_delay", 0)
     if order is not None:
         integer(order, "order", 1)
-    views: list[DelayEstimate] = []
+    estimates: list[DelayEstimate] = []
     flags: list[Flag] = []
     if record is not None:
-        _from_record(record, max_delay, order, views, flags)
+        _from_record(record, max_delay, order, estimates, flags)
     if frf is not None:
-        _from_frf(frf, views, flags)
-    if not views:
+        _from_frf(frf, estimates, flags)
+    if not estimates:
         raise DataError("no method found a delay: " + "; ".join(map(str, flags)))
-    common, conflicts = common_dead_time(views)
+    common, conflicts = common_dead_time(estimates)
     return DelayComparison(
-        estimates=tuple(views),
+        estimates=tuple(estimates),
         agree=common is not None,
         common=common,
         conflicts=conflicts,
@@ -130,7 +130,7 @@ def _from_record(
     record: Record,
     max_delay: int | None,
     order: int | None,
-    views: list[DelayEstimate],
+    estimates: list[DelayEstimate],
     flags: list[Flag],
 ) -> None:
     check_complete(record, "compare_delay_estimates")
@@ -143,26 +143,28 @@ def _from_record(
     except CtrlRealizeError as problem:
         flags.append(Flag("no_output_error", f"output error: {problem}"))
     else:
-        views.append(
+        estimates.append(
             DelayEstimate("output error", "record", "dead time", fit.dead_time, *fit.interval)
         )
         stepped = bool(np.isfinite(fit.onset))
         if stepped:
             # Back to the last sample at the baseline; the motion started within the sample before.
             first = max(fit.onset, 0.0)
-            views.append(DelayEstimate("onset", "record", "upper bound", first, 0.0, first + dt))
+            estimates.append(
+                DelayEstimate("onset", "record", "upper bound", first, 0.0, first + dt)
+            )
         total, model_order = max(fit.total_delay, fit.dead_time), min(fit.order, 3)
     most = int(np.ceil(total / dt)) + 10 if max_delay is None else max_delay
     try:
-        views.append(_scan(record, stepped, most, order or model_order, total))
+        estimates.append(_scan(record, stepped, most, order or model_order, total))
     except CtrlRealizeError as problem:
         flags.append(Flag("no_scan", f"scan: {problem}"))
     if not stepped:
-        _from_correlation(record, most, views, flags)
+        _from_correlation(record, most, estimates, flags)
 
 
 def _from_correlation(
-    record: Record, most: int, views: list[DelayEstimate], flags: list[Flag]
+    record: Record, most: int, estimates: list[DelayEstimate], flags: list[Flag]
 ) -> None:
     lags = int(min(MOST_LAGS, max(most, 20), record.n_samples // 4))
     seen = correlation_onset(record.input.ravel(), record.output.ravel(), lags, 1 - UNSEEN)
@@ -173,7 +175,7 @@ def _from_correlation(
         return
     # With a hold, the first visible response at lag k started within the sample before.
     value = seen.onset * record.dt
-    views.append(DelayEstimate("cross-correlation", "record", "upper bound", value, 0.0, value))
+    estimates.append(DelayEstimate("cross-correlation", "record", "upper bound", value, 0.0, value))
 
 
 def _scan(record: Record, stepped: bool, most: int, order: int, total: float) -> DelayEstimate:
@@ -202,7 +204,7 @@ def _doubt(flags: tuple[Flag, ...]) -> str:
     return "; ".join(str(flag) for flag in flags if flag.code in DOUBTFUL)
 
 
-def _from_frf(frf: MeasuredFRF, views: list[DelayEstimate], flags: list[Flag]) -> None:
+def _from_frf(frf: MeasuredFRF, estimates: list[DelayEstimate], flags: list[Flag]) -> None:
     # Not imported at the top: most comparisons have no FRF, and its fit is a large part of the
     # package.
     from ...frequency.fit_frf import fit_frf
@@ -215,7 +217,9 @@ def _from_frf(frf: MeasuredFRF, views: list[DelayEstimate], flags: list[Flag]) -
     else:
         low, high = fit.interval
         doubt = _doubt(fit.flags)
-        views.append(DelayEstimate("FRF fit", "FRF", "dead time", fit.dead_time, low, high, doubt))
+        estimates.append(
+            DelayEstimate("FRF fit", "FRF", "dead time", fit.dead_time, low, high, doubt)
+        )
     omega = 2 * np.pi * np.asarray(frf.frequency_hz)
     values = np.asarray(frf.complex, dtype=np.complex128).ravel()
     if omega.size < 4:
@@ -224,4 +228,4 @@ def _from_frf(frf: MeasuredFRF, views: list[DelayEstimate], flags: list[Flag]) -
     phase = unwrap_with_dead_time(omega, values, dead_time_from_phase(omega, values))
     slope, std = phase_slope(omega, phase, TOP_BAND)
     low, high = max(slope - 2 * std, 0.0), slope + 2 * std
-    views.append(DelayEstimate("phase slope", "FRF", "upper bound", slope, low, high))
+    estimates.append(DelayEstimate("phase slope", "FRF", "upper bound", slope, low, high))

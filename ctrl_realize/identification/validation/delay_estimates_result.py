@@ -103,16 +103,16 @@ class DelayComparison(Result):
     @property
     def rely_on(self) -> str | None:
         """Method with the narrowest interval of the dead time among those that count."""
-        times = [view for view in counted(self.estimates) if view.kind == "dead time"]
+        times = [estimate for estimate in counted(self.estimates) if estimate.kind == "dead time"]
         if not self.agree or not times:
             return None
-        return min(times, key=lambda view: view.high - view.low).method
+        return min(times, key=lambda estimate: estimate.high - estimate.low).method
 
     def table(self) -> pd.DataFrame:
         """Tabulate the estimates, one per row, in s and in samples."""
         import pandas as pd
 
-        rows = pd.DataFrame([vars(view) for view in self.estimates]).set_index("method")
+        rows = pd.DataFrame([vars(estimate) for estimate in self.estimates]).set_index("method")
         if self.dt is not None:
             rows["samples"] = rows["value"] / self.dt
         return rows
@@ -121,7 +121,10 @@ class DelayComparison(Result):
         return "Comparison of delay estimates"
 
     def _rows(self) -> list[tuple[str, str]]:
-        rows = [(f"{view.method} ({view.source})", self._words(view)) for view in self.estimates]
+        rows = [
+            (f"{estimate.method} ({estimate.source})", self._words(estimate))
+            for estimate in self.estimates
+        ]
         if self.common is not None:
             agreed = f"yes, on {interval_in_time(*self.common)}"
         elif self.conflicts:
@@ -133,37 +136,42 @@ class DelayComparison(Result):
             rows.append(
                 ("rely on", f"{self.rely_on}: the narrowest interval among the reliable estimates")
             )
-        rows += [(f"{view.method} in doubt", view.doubt) for view in self.estimates if view.doubt]
+        rows += [
+            (f"{estimate.method} in doubt", estimate.doubt)
+            for estimate in self.estimates
+            if estimate.doubt
+        ]
         return rows
 
-    def _words(self, view: DelayEstimate) -> str:
-        samples = "" if self.dt is None else f" = {view.value / self.dt:.4g} samples"
-        kind = "" if view.kind == "dead time" else ", upper bound"
-        doubt = "; in doubt" if view.doubt else ""
-        ends = interval_in_time(view.low, view.high)
-        return f"{time_within(view.value, view.low, view.high)}{samples} ({ends}{kind}{doubt})"
+    def _words(self, estimate: DelayEstimate) -> str:
+        samples = "" if self.dt is None else f" = {estimate.value / self.dt:.4g} samples"
+        kind = "" if estimate.kind == "dead time" else ", upper bound"
+        doubt = "; in doubt" if estimate.doubt else ""
+        ends = interval_in_time(estimate.low, estimate.high)
+        value = time_within(estimate.value, estimate.low, estimate.high)
+        return f"{value}{samples} ({ends}{kind}{doubt})"
 
     def __repr__(self) -> str:
         verdict = "agree" if self.agree else "do not agree" if self.conflicts else "are in doubt"
         return f"<DelayComparison: {len(self.estimates)} estimates that {verdict}>"
 
 
-def counted(views: Sequence[DelayEstimate]) -> list[DelayEstimate]:
+def counted(estimates: Sequence[DelayEstimate]) -> list[DelayEstimate]:
     """Leave out the estimates in doubt."""
-    return [view for view in views if not view.doubt]
+    return [estimate for estimate in estimates if not estimate.doubt]
 
 
 def common_dead_time(
-    views: Sequence[DelayEstimate],
+    estimates: Sequence[DelayEstimate],
 ) -> tuple[tuple[float, float] | None, tuple[tuple[str, str], ...]]:
     """Find the dead times that no estimate rules out, or the pairs that exclude each other."""
-    views = counted(views)
-    times = [view for view in views if view.kind == "dead time"]
-    bounds = [view for view in views if view.kind == "upper bound"]
-    if not views:
+    estimates = counted(estimates)
+    times = [estimate for estimate in estimates if estimate.kind == "dead time"]
+    bounds = [estimate for estimate in estimates if estimate.kind == "upper bound"]
+    if not estimates:
         return None, ()
-    low = max((view.low for view in times), default=0.0)
-    high = min(view.high for view in views)
+    low = max((estimate.low for estimate in times), default=0.0)
+    high = min(estimate.high for estimate in estimates)
     if low <= high:
         return (low, high), ()
     pairs = [*combinations(times, 2), *product(times, bounds)]

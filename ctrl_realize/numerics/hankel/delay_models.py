@@ -183,7 +183,7 @@ def _single_channel(
     return DelayModels(A, B, C, singular_values, following)
 
 
-def misfit(
+def iae_of_models(
     markov: FloatArray,
     delays: IntArray,
     models: DelayModels,

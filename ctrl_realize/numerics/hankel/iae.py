@@ -82,8 +82,8 @@ def integrated_absolute_error(
         end = window - 1 - last
         beyond = np.arange(end, count) >= (window - 1 - delays)[:, np.newaxis]
         difference[:, end:][beyond] = 0.0
-        misfit: FloatArray = difference.sum(axis=1)
-    misfit += np.concatenate([[0.0], np.cumsum(np.abs(markov))])[delays]
-    misfit += np.abs(markov[delays] - D)
-    misfit[~np.isfinite(misfit)] = np.inf
-    return misfit
+        iae: FloatArray = difference.sum(axis=1)
+    iae += np.concatenate([[0.0], np.cumsum(np.abs(markov))])[delays]
+    iae += np.abs(markov[delays] - D)
+    iae[~np.isfinite(iae)] = np.inf
+    return iae

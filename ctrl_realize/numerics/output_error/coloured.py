@@ -32,7 +32,9 @@ _COLOURED = 2.0  # samples at rest that count as one, from which on: white noise
 _FEWEST = 100  # samples at rest, and
 _ENOUGH = 100_000  # of a kind, where there are more: time
 _TIMES = 8  # correlation times, that tell its colour. Ablation of all of them: noise made white
-_WILD = 5.0  # standard deviations, beyond which Gaussian noise has none of a million samples: cut
+_OUTLIER = (
+    5.0  # standard deviations, beyond which Gaussian noise has none of a million samples: cut
+)
 _NEAR = np.arange(-6, 6.5, 0.5)  # samples from the dead time of before, where it starts again
 _ENDS = 4  # of these starts that are followed to the bottom: time
 _UNLIKE = 3.0
@@ -61,7 +63,7 @@ def in_coloured_noise(fits: WindowFit, data: StepData) -> WindowFit:
     if samples < max(_COLOURED, 0.5 * fits.correlation) or rest.size < _TIMES * samples:
         return fits
     # Not the pseudo-values of Huber's loss, which distort smooth noise.
-    limit = _WILD * max(mad_sigma(error), fits.sigma)
+    limit = _OUTLIER * max(mad_sigma(error), fits.sigma)
     plain = fits.window.with_output(fits.window.output - error + np.clip(error, -limit, limit))
     covariance = noise_covariance(_quiet(error, data), error.size)
     if covariance.size == 1:

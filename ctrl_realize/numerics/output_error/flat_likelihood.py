@@ -60,9 +60,9 @@ def closer(early: WindowFit, lags: Structure, found: OutputErrorEstimate) -> flo
     return float(2 * Z_95 * error / max(found.high - found.low, SMALLEST))
 
 
-def later(found: OutputErrorEstimate, views: tuple[tuple[RobustKey, float], ...]) -> float:
+def later(found: OutputErrorEstimate, estimates: tuple[tuple[RobustKey, float], ...]) -> float:
     """Below 1 if most delay estimates agree with each other that the output moves later."""
-    dead_times = np.array([at for _, at in views[:-1]])
+    dead_times = np.array([at for _, at in estimates[:-1]])
     middle = float(np.median(dead_times))
     apart = float(np.median(np.abs(dead_times - middle)))
     later = middle - found.dead_time
@@ -70,10 +70,10 @@ def later(found: OutputErrorEstimate, views: tuple[tuple[RobustKey, float], ...]
 
 
 def moved(
-    found: OutputErrorEstimate, fits: WindowFit, views: tuple[tuple[RobustKey, float], ...]
+    found: OutputErrorEstimate, fits: WindowFit, estimates: tuple[tuple[RobustKey, float], ...]
 ) -> OutputErrorEstimate:
     """Put the dead time at the median of the delay estimates; the interval is not changed."""
-    dead_time = float(np.clip(np.median([at for _, at in views[:-1]]), found.low, found.high))
+    dead_time = float(np.clip(np.median([at for _, at in estimates[:-1]]), found.low, found.high))
     own = fits.candidates[found.structure]
     fixed = at_dead_time(fits.problem, own, fits.scales, dead_time)
     fixed, static = least_extrapolating(fits, fixed, dead_time_fixed=True)
@@ -86,7 +86,7 @@ def moved(
         fitted=fits.window.predict(fits.problem, fixed),
         followed=followed_by(fits, fixed, state.numerator[0]),
         static=static,
-        delay_estimates=views,
+        delay_estimates=estimates,
         process=found.process._replace(
             parameters=process_parameters(
                 fixed.poles, state.numerator[0], dead_time, fits.scales.length

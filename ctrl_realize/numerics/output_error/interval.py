@@ -77,8 +77,8 @@ def likelihood_fit(
     `may_stick` the interval reaches to where a stem behind the lags may come loose. `relaxing`
     and `better` are those of the result, `near` are close decisions made before.
     """
-    tanks = [chain for chain in chains if not chain.hidden]
-    fits, choice, kept = _compared(fits, tanks, chains, flows)
+    equal_lags = [chain for chain in chains if not chain.truncated]
+    fits, choice, kept = _compared(fits, equal_lags, chains, flows)
     chosen, scales = choice.model, fits.scales
     own = kept.profile_of(choice, scales)
     if choice.chain is not None:
@@ -89,7 +89,7 @@ def likelihood_fit(
     limits += [(other.low, other.high) for other in others]
     low = min(chosen.dead_time, *(first for first, _ in limits))
     high = max(chosen.dead_time, *(last for _, last in limits))
-    if endless := still_improving(tanks):
+    if unlimited := still_improving(equal_lags):
         low = scales.earliest
     open_start = onset is not None and choice.flow is None and chosen.structure.zeros > 0
     if onset is not None and open_start:
@@ -123,7 +123,7 @@ def likelihood_fit(
         process = process._replace(parameters=without_errors(process.parameters))
     distributed = DistributedLags(
         choice.chain,
-        endless,
+        unlimited,
         tuple(flow for flow, _ in kept.flows),
         choice.flow is not None,
         tuple(others),
@@ -159,14 +159,14 @@ class _Kept:
 
 def _compared(
     fits: WindowFit,
-    tanks: Sequence[LagChain],
+    equal_lags: Sequence[LagChain],
     chains: Sequence[LagChain],
     flows: Sequence[DispersedFlow],
 ) -> tuple[WindowFit, Choice, _Kept]:
     """Choose, and lay the profiles of what is not ruled out: again where these lead lower."""
     points: dict[Structure, Points] = {}
     for _ in range(_MOST_ROUNDS):
-        choice = choose_model(fits, tanks, flows)
+        choice = choose_model(fits, equal_lags, flows)
         values = charged(fits.criterion, fits.penalty)
         level = _charged_level(fits, choice)
         free = plausible(fits.candidates, values, fits.variance, choice.model, level)

@@ -159,7 +159,7 @@ class DistributedLags(NamedTuple):
     """
 
     chain: LagChain | None = None
-    endless: bool = False
+    unlimited: bool = False
     flows: tuple[DispersedFlow, ...] = ()
     follows_flow: bool = False
     not_ruled_out: tuple[OtherModel, ...] = ()

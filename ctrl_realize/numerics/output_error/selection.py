@@ -61,9 +61,9 @@ def chains_of(fits: WindowFit) -> list[LagChain]:
     """Fit chains of lags if the best order suggests more lags than were tried."""
     best = fits.best
     setting = fits.problem, best, fits.scales, fits.variance, fits.penalty
-    tanks = fit_chains(*setting) if best.structure.order >= _LAGS_OF_TANKS else []
+    equal_lags = fit_chains(*setting) if best.structure.order >= _LAGS_OF_TANKS else []
     diffusion = fit_diffusion(*setting) if best.structure.order >= _LAGS_OF_DIFFUSION else []
-    return tanks + diffusion
+    return equal_lags + diffusion
 
 
 def flows_of(fits: WindowFit, chains: Sequence[LagChain]) -> list[DispersedFlow]:
@@ -76,14 +76,14 @@ def flows_of(fits: WindowFit, chains: Sequence[LagChain]) -> list[DispersedFlow]
 
 
 def choose_model(
-    fits: WindowFit, tanks: Sequence[LagChain], flows: Sequence[DispersedFlow]
+    fits: WindowFit, equal_lags: Sequence[LagChain], flows: Sequence[DispersedFlow]
 ) -> Choice:
     """Choose by the lowest criterion; dispersion must be representable by lags.
 
     Diffusion is not among the chains here: friction has a similar response, so diffusion widens the
     interval and is never the model.
     """
-    lags = _among_lags(fits, tanks)
+    lags = _among_lags(fits, equal_lags)
     flow = min(flows, key=lambda flow: flow.criterion, default=None)
     if flow is None or flow.criterion >= lags.level:
         return lags
@@ -91,24 +91,24 @@ def choose_model(
     return lags if model is None else Choice(model, flow.criterion, flow=flow)
 
 
-def _among_lags(fits: WindowFit, tanks: Sequence[LagChain]) -> Choice:
+def _among_lags(fits: WindowFit, equal_lags: Sequence[LagChain]) -> Choice:
     best = fits.best
     level = fits.criterion[best.structure] + needless_parameters(best.structure)
-    chains = _beside_own_terms(fits, tanks)
+    chains = _beside_own_terms(fits, equal_lags)
     better = min(chains, key=lambda chain: chain.criterion, default=None)
     if better is not None and better.criterion < level:
         return Choice(better.candidate, better.criterion, better)
     return Choice(best, level)
 
 
-def _beside_own_terms(fits: WindowFit, tanks: Sequence[LagChain]) -> Sequence[LagChain]:
+def _beside_own_terms(fits: WindowFit, equal_lags: Sequence[LagChain]) -> Sequence[LagChain]:
     """Chains that may be the model: none beside a free response.
 
     Eight equal lags have a free response of eight initial values, which takes the place of the
     response to the step: gains 5 to 20 % too small in three of 22 simulated heaters, 0.20 for 0.27
     to 0.32 of a measured one. Ablation: no chain beside a free response.
     """
-    return tanks if fits.problem.segments is None else ()
+    return equal_lags if fits.problem.segments is None else ()
 
 
 def _behind(fits: WindowFit, flow: DispersedFlow) -> Candidate | None:

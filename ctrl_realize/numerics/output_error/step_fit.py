@@ -94,7 +94,7 @@ ADEQUATE = 1.3
 known from 30 samples at rest is off by 13 % (one standard deviation). Ablation: views (the
 likelihood always)."""
 
-_WILD = 3.0  # standard deviations at which residuals are cut where explanations are compared
+_OUTLIER = 3.0  # standard deviations at which residuals are cut where explanations are compared
 
 _STRONG = 6.0
 """Difference of criteria that is strong evidence ([5]_, section 3.2). Ablation: strong evidence of
@@ -215,12 +215,12 @@ def fit_step_record(
     simple = among(plain, SIMPLE_STRUCTURES)
     chosen = simple.best_of({s: simple.criterion[s] for s in SIMPLE_STRUCTURES})
     rise = _fit_until(data, stop_at(data, 0.63), SIMPLE_STRUCTURES, latest, factor, huber)
-    views = _views(data, early, rise, chosen, latest)
+    estimates = _views(data, early, rise, chosen, latest)
     if likely is not None:
-        agreed = later(likely, views)
+        agreed = later(likely, estimates)
         likely = told(likely, agreed)
-        return likely if agreed > 1 else moved(likely, plain, views)
-    found = _robust_fit(simple, chosen, views, relaxing=data.relaxing)
+        return likely if agreed > 1 else moved(likely, plain, estimates)
+    found = _robust_fit(simple, chosen, estimates, relaxing=data.relaxing)
     return replace(found, close=near)
 
 
@@ -231,7 +231,7 @@ def _explained(ways: list[tuple[StepData, WindowFit]]) -> StepData:
     drift, which goes on to the end of the record, needs very strong evidence ([5]_).
     """
     closest = min((fits for _, fits in ways), key=lambda fits: fits.sigma)
-    worst = _WILD * closest.sigma
+    worst = _OUTLIER * closest.sigma
 
     def criterion(way: tuple[StepData, WindowFit]) -> float:
         data, fits = way
@@ -298,13 +298,13 @@ def _flows(data: StepData, fits: WindowFit, chains: Sequence[LagChain]) -> Seque
 def _robust_fit(
     fits: WindowFit,
     chosen: Candidate,
-    views: tuple[tuple[RobustKey, float], ...],
+    estimates: tuple[tuple[RobustKey, float], ...],
     *,
     relaxing: bool,
 ) -> OutputErrorEstimate:
     """Determine dead time and interval from the delay estimates (points 3 and 4 of the rule)."""
-    dead_time = float(np.median([at for _, at in views[:-1]]))
-    dead_times = np.sort([at for _, at in views])
+    dead_time = float(np.median([at for _, at in estimates[:-1]]))
+    dead_times = np.sort([at for _, at in estimates])
     low, high = float(dead_times[1]), float(dead_times[-1])
     profiles = {chosen.structure: profile_of(fits, chosen)}
     fixed = at_dead_time(fits.problem, chosen, fits.scales, dead_time)
@@ -312,7 +312,7 @@ def _robust_fit(
     interval = DelayInterval(low, high, (high - low) / (2 * Z_95))
     own = profiles[chosen.structure]
     found = assembled(
-        fits, fixed, False, views, profiles, interval, own, static=static, relaxing=relaxing
+        fits, fixed, False, estimates, profiles, interval, own, static=static, relaxing=relaxing
     )
     return replace(
         found, process=found.process._replace(parameters=without_errors(found.process.parameters))

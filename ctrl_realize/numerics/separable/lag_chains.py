@@ -61,7 +61,7 @@ class LagChain:
     candidate: Candidate
     criterion: float
     error: float
-    hidden: float = 0.0
+    truncated: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -149,8 +149,8 @@ def fit_diffusion(
     slowest, second = np.sort(np.abs(chain.candidate.poles))[:2]
     root = float(np.sqrt(second / slowest))  # (2 - c) / (1 - c)
     first = 1 / (root - 1)  # 1 - c
-    hidden = first**2 / (LONGEST - 0.5 + first) / float(slowest)
-    return [replace(chain, criterion=chain.criterion + _DIFFUSION_CHARGE, hidden=hidden)]
+    truncated = first**2 / (LONGEST - 0.5 + first) / float(slowest)
+    return [replace(chain, criterion=chain.criterion + _DIFFUSION_CHARGE, truncated=truncated)]
 
 
 def _over_within_a_sample(chain: LagChain, scales: Scales) -> bool:
@@ -185,7 +185,7 @@ def chain_profile(chain: LagChain, scales: Scales) -> tuple[FloatArray, FloatArr
 def chain_limits(chain: LagChain, scales: Scales) -> tuple[float, float]:
     """Ends of the 95 % interval of the dead time; the hidden lags are subtracted from the lower."""
     dead_time, half = chain.candidate.dead_time, Z_95 * chain.error
-    low = max(dead_time - half - chain.hidden, scales.earliest)
+    low = max(dead_time - half - chain.truncated, scales.earliest)
     return low, min(dead_time + half, scales.latest)
 
 

@@ -238,20 +238,22 @@ def fit_window(
     candidates = search(problem, others, scales, first if len(others) < len(structures) else None)
     passes = _PASSES if huber else 0
     rivals: dict[Structure, float] = {}
-    for turn in range(passes + 1):
-        rest = _left(window, problem, candidates, (sigma, quantum), huber)
+    for iteration in range(passes + 1):
+        rest = _residual(window, problem, candidates, (sigma, quantum), huber)
         setting = rest.variance, rest.independent
         del rest  # to save the memory of a long record
-        candidates = converged(problem, candidates, scales, *setting, last=turn > 0 or not huber)
-        rest = _left(window, problem, candidates, (sigma, quantum), huber)
-        if turn == 0 and rest.best.ends is not None:
+        candidates = converged(
+            problem, candidates, scales, *setting, last=iteration > 0 or not huber
+        )
+        rest = _residual(window, problem, candidates, (sigma, quantum), huber)
+        if iteration == 0 and rest.best.ends is not None:
             # The structure that determines the pseudo-values has converged.
             candidates[rest.best.structure] = settled(problem, rest.best, scales)
             del rest
-            rest = _left(window, problem, candidates, (sigma, quantum), huber)
+            rest = _residual(window, problem, candidates, (sigma, quantum), huber)
         # Huber's pseudo-values are those of the structure chosen in each pass.
         rivals = {s: min(v, rivals.get(s, v)) for s, v in rest.rivals.items()}
-        if turn == passes or (turn == 1 and not rest.wild):
+        if iteration == passes or (iteration == 1 and not rest.has_outliers):
             break
         problem = window.with_output(rest.values)
         candidates = on_new_data(problem, candidates)
@@ -259,7 +261,7 @@ def fit_window(
     # One initial value more for a pole reduces the cost by one variance for noise alone.
     criterion = {s: value + problem.local_count(s.order) for s, value in criterion.items()}
     chosen = candidates[choose(criterion)]
-    freedom = max(problem.data.size - rest.lost, 1)
+    freedom = max(problem.data.size - rest.n_parameters, 1)
     misfit = float(np.sqrt(chosen.cost / freedom)) / max(sigma, SMALLEST)
     rounding = quantum / np.sqrt(12) if is_coarse(sigma, quantum) else 0.0
     return WindowFit(
@@ -269,7 +271,7 @@ def fit_window(
 
 
 @dataclass(frozen=True, eq=False)
-class _Left:
+class _Residual:
     """Residual of the best of some candidates on a window: the noise, if the fit is good.
 
     `values` (N,) are the data that Huber's loss asks for, `wild` tells of outliers; `level` is the
@@ -280,10 +282,10 @@ class _Left:
 
     best: Candidate
     values: FloatArray
-    wild: bool
+    has_outliers: bool
     level: float
     correlation: float
-    lost: int
+    n_parameters: int
     independent: float
     rivals: dict[Structure, float]
     counted: float
@@ -293,13 +295,13 @@ class _Left:
         return self.level**2 * weighted_correlation(self.correlation, self.counted)
 
 
-def _left(
+def _residual(
     window: Window,
     problem: Problem,
     candidates: dict[Structure, Candidate],
     noise: tuple[float, float],
     huber: bool,
-) -> _Left:
+) -> _Residual:
     """Determine the residual of the structure with the lowest criterion.
 
     Not that of the lowest cost, because with superfluous parameters many values are equally good.
@@ -322,18 +324,26 @@ def _left(
     error = window.output - window.predict(problem, best)
     kept = _clipped(error, max(0.5 * quantum, 0.1 * sigma)) if huber else error.copy()
     after = kept[window.start :]
-    lost = 1 + best.structure.order + best.structure.zeros + window.columns.shape[1]
-    lost += problem.local_count(best.structure.order)
-    level = float(np.sqrt(float(after @ after) / max(after.size - lost, 1)))
+    n_parameters = 1 + best.structure.order + best.structure.zeros + window.columns.shape[1]
+    n_parameters += problem.local_count(best.structure.order)
+    level = float(np.sqrt(float(after @ after) / max(after.size - n_parameters, 1)))
     # Far below the noise the residual is rounding, and its correlation has no meaning.
     floor = 0.3 * sigma
     correlation = correlation_time(after) if level > floor else 1.0
     independent = after.size / correlation
-    wild = _wild(error)
+    has_outliers = _has_outliers(error)
     kept -= error
     kept += window.output
-    return _Left(
-        best, kept, wild, max(level, floor), correlation, lost, independent, rivals, window.counted
+    return _Residual(
+        best,
+        kept,
+        has_outliers,
+        max(level, floor),
+        correlation,
+        n_parameters,
+        independent,
+        rivals,
+        window.counted,
     )
 
 
@@ -361,7 +371,7 @@ def _clipped(error: FloatArray, least: float) -> FloatArray:
     return np.divide(left, max(inside, 0.5), out=left)
 
 
-def _wild(error: FloatArray) -> bool:
+def _has_outliers(error: FloatArray) -> bool:
     """Whether there are more residuals beyond four sigma than in Gaussian noise."""
     return bool(np.mean(np.abs(error) > 4 * mad_sigma(error)) > 0.002)
 

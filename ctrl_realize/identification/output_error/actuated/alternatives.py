@@ -41,9 +41,12 @@ class Alternative(NamedTuple):
     test: str
 
     def wanted(self, parts: Sequence[ActuatedRecord]) -> list[tuple[Kind, Place]]:
-        """Kinds that the commands can tell, with the places that are tried."""
+        """Kinds that the commands can identify, with the places that are tried."""
         return [
-            (kind, place) for kind, places, told in self.kinds if told(parts) for place in places
+            (kind, place)
+            for kind, places, identifiable in self.kinds
+            if identifiable(parts)
+            for place in places
         ]
 
 

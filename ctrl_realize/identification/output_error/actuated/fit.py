@@ -58,18 +58,18 @@ def with_actuator(
     Raises
     ------
     DataError
-        The commands cannot tell the actuator that was asked for.
+        The commands cannot identify the actuator that was requested.
     """
     parts = _parts(result)
     names = tuple(ALTERNATIVES) if asked == "auto" else (asked,)
     tried = {name: ALTERNATIVES[name].wanted(parts) for name in names}
-    told = [name for name in names if tried[name]]
-    if asked != "auto" and not told:
+    identifiable = [name for name in names if tried[name]]
+    if asked != "auto" and not identifiable:
         raise DataError(cannot_tell(asked))
-    untold = [name for name in names if name not in told]
-    skipped = (missing_tests(untold),) if untold else ()
+    not_identifiable = [name for name in names if name not in identifiable]
+    skipped = (missing_tests(not_identifiable),) if not_identifiable else ()
     # A kind may belong to two of those that were asked for.
-    wanted = list(dict.fromkeys(one for name in told for one in tried[name]))
+    wanted = list(dict.fromkeys(one for name in identifiable for one in tried[name]))
     scales = _scales(result)
     found = fit_actuated(
         parts, scales, wanted, rivals=_rivals(result, parts), structures=structures
@@ -77,7 +77,7 @@ def with_actuator(
     if found is None:
         return replace(result, choices=result.choices + skipped)
     if not found.chosen:
-        said = (*skipped, not_needed(told, found.evidence))
+        said = (*skipped, not_needed(identifiable, found.evidence))
         return replace(_both(result, found), choices=result.choices + said)
     return _replaced(result, parts, scales, found, skipped)
 
@@ -208,8 +208,8 @@ def _replaced(
         actuator=actuator,
     )
     flags = [flag for flag in result.flags if of_the_record(flag.code)]
-    told = model_flags(estimate, result.dt, scales.length, None)
-    flags += [flag for flag in told if flag is not None]
+    of_model = model_flags(estimate, result.dt, scales.length, None)
+    flags += [flag for flag in of_model if flag is not None]
     if actuator.unresolved:
         flags.append(not_told(actuator.unresolved))
     if not estimate.adequate:
@@ -232,10 +232,10 @@ def _estimate(
     if stepped:
         noise = result.data.sigma
         free = max(found.task.records.data.size - member.parameters, 1)
-        misfit = float(np.sqrt(member.cost / free)) / noise
-        adequate = misfit <= ADEQUATE * max(result.data.colour, 1.0)
+        normalized_rms = float(np.sqrt(member.cost / free)) / noise
+        adequate = normalized_rms <= ADEQUATE * max(result.data.colour, 1.0)
     else:
-        misfit, adequate = float(np.sqrt(found.correlation)), found.correlation <= WHITE
+        normalized_rms, adequate = float(np.sqrt(found.correlation)), found.correlation <= WHITE
     row = StructureFit(
         structure, member.dead_time, errors.static.total, 0.0, (low, high), found.poles,
         errors.static.gain,
@@ -251,7 +251,7 @@ def _estimate(
         poles=found.poles,
         numerator=found.numerator,
         adequate=bool(adequate),
-        residual=Residual(mad_sigma(measured - fitted), misfit, found.correlation),
+        residual=Residual(mad_sigma(measured - fitted), normalized_rms, found.correlation),
         structures=(row,),
         delay_estimates=(),
         fitted=fitted,
@@ -272,19 +272,19 @@ def _actuator_fit(result: OutputErrorFit, found: ActuatedFit, errors: Errors) ->
     member, family = found.member, found.member.family
     start = float(member.starts[0]) if member.starts.size else 0.0
     shown = SHOWN[family.kind]
-    told = Found(member.values, start, family.levels, result.input_unit)
+    shown_as = Found(member.values, start, family.levels, result.input_unit)
     timed = shown.unit == "u/s"
-    unit = shown.unit and told.unit and told.unit + shown.unit[1:]
+    unit = shown.unit and shown_as.unit and shown_as.unit + shown.unit[1:]
     parameters = []
     for name, value, std, ends in zip(
-        shown.names(told), member.values, errors.value_std, found.value_ends, strict=True
+        shown.names(shown_as), member.values, errors.value_std, found.value_ends, strict=True
     ):
-        number, low, high = (shown.number(told, one) for one in (value, *ends))
+        number, low, high = (shown.number(shown_as, one) for one in (value, *ends))
         # Their scale may differ, by which the error does as well.
-        away = shown.number(told, value + std) - number
+        away = shown.number(shown_as, value + std) - number
         parameters.append(Parameter(name, number, away, low, high, False, unit, -1 if timed else 0))
     return ActuatorFit(
-        model=shown.model(told),
+        model=shown.model(shown_as),
         actuator_at=family.place,
         parameters=tuple(parameters),
         starts=tuple(member.starts.tolist()),

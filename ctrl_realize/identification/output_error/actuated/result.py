@@ -75,7 +75,7 @@ class ActuatorFit:
     def in_words(self) -> str:
         """Write the actuator with its parameters and intervals."""
         numbers = ", ".join(
-            f"{one.label} {one.text()} ({one.interval_text() or 'one end is not told'})"
+            f"{one.label} {one.text()} ({one.interval_text() or 'one end is unknown'})"
             for one in self.parameters
         )
         return f"{numbers}; {self.where}"

@@ -38,18 +38,18 @@ def of_the_record(code: str) -> bool:
 
 
 def missing_tests(names: Sequence[str]) -> str:
-    """Say which tests would tell what the command cannot."""
+    """Say which tests would identify what the command cannot."""
     every = [ALTERNATIVES[name] for name in names]
     tests = "; ".join(f"{one.words} ({one.test.rstrip(',')})" for one in every)
-    return f"not tried, since the command cannot tell them, with the test that would: {tests}"
+    return f"not tried, since the command cannot identify them (with a test that can): {tests}"
 
 
 def cannot_tell(name: str) -> str:
-    """Say why an actuator that was asked for is not fitted."""
+    """Say why an actuator that was requested is not fitted."""
     one = ALTERNATIVES[name]
     return (
-        f"actuator={name!r}: expected {one.expected}, got records that cannot tell {one.words} "
-        f"from gain and dead time; try {one.test} or actuator='auto'"
+        f"actuator={name!r}: expected {one.expected}, got records that cannot distinguish "
+        f"{one.words} from gain and dead time; try {one.test} or actuator='auto'"
     )
 
 
@@ -65,7 +65,7 @@ def not_needed(names: Sequence[str], evidence: float) -> str:
 def unresolved(
     parameters: Sequence[Parameter], family: Family, ends: Sequence[Ends]
 ) -> tuple[str, ...]:
-    """List the parameters that the records tell badly, with the test that would do better."""
+    """List the parameters that the records determine badly, with a test that would help."""
     better = SHOWN[family.kind].better
     found = []
     for one, (low, high) in zip(parameters, ends, strict=True):
@@ -74,20 +74,21 @@ def unresolved(
         if not high - low <= 2 * _WELL * size:
             found.append(
                 f"{one.label} lies between {one.low:.3g} and {one.high:.3g}, and the records do "
-                f"not tell it closer; {better} would"
+                f"not determine it more closely; {better} would"
             )
     return tuple(found)
 
 
 def not_told(sentences: Sequence[str]) -> Flag:
-    """Report parameters of an actuator that the records tell badly."""
+    """Report parameters of an actuator that the records determine badly."""
     return Flag("actuator_not_resolved", "; ".join(sentences))
 
 
-def structured(misfit: float) -> Flag:
+def structured(normalized_rms: float) -> Flag:
     """Report a residual above the noise."""
     return Flag(
         "structured_misfit",
-        f"with the actuator, too, the residual is {plainly(misfit, 3)} times the noise: the "
-        "valve does something that neither says; dead time and actuator are apparent values",
+        f"with the actuator, too, the residual is {plainly(normalized_rms, 3)} times the noise: "
+        "the valve does something that neither model describes; dead time and actuator are "
+        "apparent values",
     )
