@@ -32,6 +32,14 @@ def positive(value: Any, name: str, what: str) -> float:
     return number
 
 
+def not_negative(value: Any, name: str, what: str) -> float:
+    """Return `value` as a float; it must be a finite number, 0 or above."""
+    number = real(value, name, what)
+    if number < 0:
+        raise OptionError(f"{name}={value!r}; expected a value >= 0: {what}")
+    return number
+
+
 def real(value: Any, name: str, what: str) -> float:
     """Return `value` as a float; it must be a finite real number."""
     if isinstance(value, bool) or not isinstance(value, Real) or not math.isfinite(value):

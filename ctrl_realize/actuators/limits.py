@@ -7,7 +7,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from .._checks import positive, real
+from .._checks import not_negative, positive, real
 from ..errors import OptionError
 from ..numerics.actuators.friction import backlash
 from ..numerics.actuators.limits import resolved, saturated, slew_limited, without_dead_zone
@@ -120,8 +120,7 @@ class Backlash(_OfTwoSamples):
     start: float = 0.0
 
     def __post_init__(self) -> None:
-        if real(self.width, "width", "width of the play") < 0:
-            raise OptionError(f"width={self.width!r}; expected a value >= 0")
+        not_negative(self.width, "width", "width of the play")
         within_start(self.start)
 
     def __str__(self) -> str:

@@ -7,7 +7,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from .._checks import positive, real
+from .._checks import not_negative, positive
 from ..errors import OptionError
 from ..numerics.actuators.lugre import LuGre, lugre_stem, lugre_step
 from ..numerics.arrays import FloatArray
@@ -81,8 +81,7 @@ class LuGreFriction(Actuator):
         for name in ("mass", "spring", "coulomb", "static", "stribeck", "bristle"):
             positive(getattr(self, name), name, "parameter of the stem")
         for name in ("damping", "viscous"):
-            if real(getattr(self, name), name, "parameter of the stem") < 0:
-                raise OptionError(f"{name}={getattr(self, name)!r}; expected a value >= 0")
+            not_negative(getattr(self, name), name, "parameter of the stem")
         if self.coulomb > self.static:
             raise OptionError(
                 f"coulomb={self.coulomb!r}, static={self.static!r}; expected coulomb <= static"
@@ -96,10 +95,7 @@ class LuGreFriction(Actuator):
 
     @property
     def _stem(self) -> LuGre:
-        return LuGre(
-            self.mass, self.spring, self.coulomb, self.static, self.stribeck, self.bristle,
-            self.damping, self.viscous,
-        )  # fmt: skip
+        return LuGre(**vars(self))
 
     def _rest(self, command: float) -> State:
         return (command, 0.0, 0.0)

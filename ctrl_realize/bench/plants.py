@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from .._checks import positive, real
+from .._checks import not_negative, positive, real
 from ..errors import OptionError
 from .linear import Core, chain, integrator, lag
 from .plant import Plant
@@ -81,15 +81,10 @@ def heater(
         ("%", "degC"),
         steady_state=(20.0, 40.0),
         amplitude=30.0,
-        dead_time=dead_time,
-        noise=noise,
-        disturbance=disturbance,
-        disturbance_time=disturbance_time,
-        resolution=resolution,
-        dt=dt,
-        pre_step_time=pre_step_time,
-        hold=hold,
-    )
+        dead_time=dead_time, noise=noise, disturbance=disturbance,
+        disturbance_time=disturbance_time, resolution=resolution, dt=dt,
+        pre_step_time=pre_step_time, hold=hold,
+    )  # fmt: skip
 
 
 def tank(
@@ -160,15 +155,10 @@ def tank(
         ("%", "%"),
         steady_state=(50.0, 30.0),
         amplitude=10.0,
-        dead_time=dead_time,
-        noise=noise,
-        disturbance=disturbance,
-        disturbance_time=disturbance_time,
-        resolution=resolution,
-        dt=dt,
-        pre_step_time=pre_step_time,
-        hold=hold,
-    )
+        dead_time=dead_time, noise=noise, disturbance=disturbance,
+        disturbance_time=disturbance_time, resolution=resolution, dt=dt,
+        pre_step_time=pre_step_time, hold=hold,
+    )  # fmt: skip
 
 
 def flow_loop(
@@ -236,15 +226,10 @@ def flow_loop(
         ("%", "m3/h"),
         steady_state=(40.0, 48.0),
         amplitude=10.0,
-        dead_time=dead_time,
-        noise=noise,
-        disturbance=disturbance,
-        disturbance_time=disturbance_time,
-        resolution=resolution,
-        dt=dt,
-        pre_step_time=pre_step_time,
-        hold=hold,
-    )
+        dead_time=dead_time, noise=noise, disturbance=disturbance,
+        disturbance_time=disturbance_time, resolution=resolution, dt=dt,
+        pre_step_time=pre_step_time, hold=hold,
+    )  # fmt: skip
 
 
 def _plant(
@@ -265,13 +250,9 @@ def _plant(
     hold: float,
 ) -> Plant:
     """Check what all plants share."""
-    for value, name in (
-        (dead_time, "dead_time"),
-        (noise, "noise"),
-        (disturbance, "disturbance"),
-    ):
-        if real(value, name, "a number") < 0:
-            raise OptionError(f"{name}={value!r}; expected a value >= 0")
+    not_negative(dead_time, "dead_time", "dead time in s")
+    not_negative(noise, "noise", "standard deviation")
+    not_negative(disturbance, "disturbance", "standard deviation")
     if resolution is not None:
         positive(resolution, "resolution", "step in units of the output, or None")
     step = positive(dt, "dt", "sample time in s")

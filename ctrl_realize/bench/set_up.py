@@ -6,10 +6,9 @@ from collections.abc import Sequence
 from typing import Literal
 
 from .. import paper
-from .._checks import integer, one_of, positive, real
+from .._checks import integer, not_negative, one_of, positive, real
 from ..actuators import Actuator, Backlash, SlewRateLimit
 from ..actuators.base import actuators_of
-from ..errors import OptionError
 from .control_valve import Valve
 from .instruments import STROKE_MM
 from .linear import butterworth, chain, lag, second_order_lag
@@ -125,8 +124,7 @@ def valve(
       total delay at DC  134.42 ms
     """
     positive(dt, "dt", "sample time in s")
-    if real(dead_time, "dead_time", "dead time in s") < 0:
-        raise OptionError(f"dead_time={dead_time!r}; expected a value >= 0 s")
+    not_negative(dead_time, "dead_time", "dead time in s")
     for value, argument in (
         (noise, "noise"),
         (input_noise, "input_noise"),
@@ -135,8 +133,7 @@ def valve(
         (hum, "hum"),
         (dead_time_scatter, "dead_time_scatter"),
     ):
-        if real(value, argument, "a fraction or a count") < 0:
-            raise OptionError(f"{argument}={value!r}; expected a value >= 0")
+        not_negative(value, argument, "a fraction or a count")
     real(drift, "drift", "fraction of the stroke per second")
     positive(pre_step_time, "pre_step_time", "time in s")
     positive(hold, "hold", "time in s")

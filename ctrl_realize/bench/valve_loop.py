@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from .._checks import band, one_of, positive, real
+from .._checks import band, not_negative, one_of, positive, real
 from ..actuators import Actuator
 from ..actuators.base import actuators_of
 from ..errors import OptionError
@@ -99,12 +99,10 @@ def valve_loop(
         lag = positive(time_constant, "time_constant", "time in s")
     if dead_time is None:
         dead_time = typical[2]
-    elif real(dead_time, "dead_time", "dead time in s") < 0:
-        raise OptionError(f"dead_time={dead_time!r}; expected a value >= 0 s")
+    not_negative(dead_time, "dead_time", "dead time in s")
     positive(dt, "dt", "sample time in s")
     positive(tightness, "tightness", "factor")
-    if real(noise, "noise", "standard deviation in %") < 0:
-        raise OptionError(f"noise={noise!r}; expected a value >= 0")
+    not_negative(noise, "noise", "standard deviation in %")
     if oscillation is not None:
         amplitude, period = band(oscillation, "oscillation", "amplitude in %, period in s")
         positive(amplitude, "oscillation", "amplitude in %")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .._checks import numbers, positive, real
+from .._checks import not_negative, numbers, positive
 from ..errors import DataError, OptionError, TimeAxisError
 from ..numerics.arrays import FloatArray
 from ..numerics.signals.time_axis import axis_fault, sample_time
@@ -19,8 +19,7 @@ def resampled(
     time: ArrayLike, input: ArrayLike, output: ArrayLike, dt: float | None, max_jitter: float
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Interpolate time, input and output; see `Record.resampled`."""
-    if real(max_jitter, "max_jitter", "in sample steps, >= 0") < 0:
-        raise OptionError(f"max_jitter={max_jitter:g}; expected a value >= 0, in sample steps")
+    not_negative(max_jitter, "max_jitter", "in sample steps")
     stamps = numbers(time, "time")
     if stamps.ndim != 1 or stamps.size < MIN_SAMPLES:
         raise DataError(f"time has shape {stamps.shape}; expected (N,), N >= {MIN_SAMPLES}")

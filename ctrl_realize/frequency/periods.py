@@ -7,7 +7,8 @@ import numpy as np
 from ..errors import DataError
 from ..numerics.arrays import BoolArray
 from ..numerics.rational.spectra import PeriodStatistics, period_statistics
-from .spectral_estimate import Estimate, Stream
+from .points import MeasuredPoints
+from .welch import Stream
 
 _MIN_LINE_POWER = 1e-4
 """Relative to the strongest line."""
@@ -15,8 +16,8 @@ _MIN_LINE_TO_NOISE = 10.0
 """Least power of a line relative to the variance of its mean."""
 
 
-def from_periods(stream: Stream, period: int, skip: int) -> tuple[Estimate, float]:
-    """Estimate by averaging whole periods; returns the estimate and the sample time."""
+def from_periods(stream: Stream, period: int, skip: int) -> tuple[MeasuredPoints, float]:
+    """MeasuredPoints by averaging whole periods; returns the estimate and the sample time."""
     stats, dt = _statistics(stream, period, skip)
     excited, count = _excited_lines(stats, period), stats.count
     U, Y = stats.mean_u[excited], stats.mean_y[excited]
@@ -29,7 +30,7 @@ def from_periods(stream: Stream, period: int, skip: int) -> tuple[Estimate, floa
     uu, yy = np.abs(U) ** 2 + share * var_u, np.abs(Y) ** 2 + share * var_y
     coherence = np.minimum(np.abs(Y * U.conj() + share * cov) ** 2 / (uu * yy), 1.0)
     frequency = np.asarray(np.fft.rfftfreq(period, dt)[excited], dtype=np.float64)
-    return Estimate(frequency, response, coherence, std, count), dt
+    return MeasuredPoints(frequency, response, coherence, std, count), dt
 
 
 def _statistics(stream: Stream, period: int, skip: int) -> tuple[PeriodStatistics, float]:

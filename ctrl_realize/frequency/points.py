@@ -122,7 +122,7 @@ def _smoothed(std: FloatArray) -> FloatArray:
 
 @dataclass(frozen=True, eq=False)
 class MeasuredPoints:
-    """Frequencies and measured values; all arrays have shape (K,)."""
+    """Increasing frequencies (K,) and measured values, (K,) or, of several channels, (p, m, K)."""
 
     frequency_hz: FloatArray
     response: ComplexArray

@@ -12,8 +12,7 @@ from ..data import MeasuredFRF, Record
 from ..data.given import as_records, check_complete
 from ..errors import DataError, OptionError, TimeAxisError
 from .periods import from_periods
-from .spectral_estimate import Stream
-from .welch import from_segments
+from .welch import Stream, from_segments
 
 
 def spectral_frf(

@@ -7,7 +7,7 @@ from typing import TypeAlias
 
 import numpy as np
 
-from .._checks import numbers, real
+from .._checks import not_negative, numbers
 from ..data import MeasuredFRF, Record
 from ..data.given import as_records, check_complete
 from ..errors import DataError, OptionError
@@ -105,8 +105,8 @@ def stepped_sine_frf(
     points = _as_points(records)
     flat = [record for point in points for record in point]
     starts = _start_frequencies(points, flat, frequency_hz)
-    if settle is not None and real(settle, "settle", "time in s") < 0:
-        raise OptionError(f"settle={settle!r}; expected a value >= 0 s")
+    if settle is not None:
+        not_negative(settle, "settle", "time in s")
 
     omega = np.empty(len(flat))
     phasors = np.empty((len(flat), 2), dtype=np.complex128)

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from typing import TypeAlias
+
 import numpy as np
 from scipy.signal import get_window
 
@@ -9,7 +12,10 @@ from .._checks import integer
 from ..errors import DataError, OptionError
 from ..numerics.arrays import FloatArray
 from ..numerics.rational.spectra import SpectralSums, independent_segments, segment_sums
-from .spectral_estimate import Estimate, Stream
+from .points import MeasuredPoints
+
+Stream: TypeAlias = Iterator[tuple[FloatArray, FloatArray, float]]
+"""Input (m, N), output (p, N) and sample time of each record."""
 
 _LONGEST_DEFAULT_SEGMENT = 8192
 _INDEPENDENT = 1e-6
@@ -22,8 +28,8 @@ def from_segments(
     segment: int | None,
     window: str | tuple[str, float],
     overlap: float,
-) -> tuple[Estimate, float]:
-    """Estimate by Welch's method: averaged spectra of overlapping windowed segments.
+) -> tuple[MeasuredPoints, float]:
+    """MeasuredPoints by Welch's method: averaged spectra of overlapping windowed segments.
 
     Returns the estimate and the sample time.
     """
@@ -58,7 +64,7 @@ def from_segments(
 
 def _one_channel(
     sums: SpectralSums, frequency: FloatArray, lines: slice, method: str, averages: float
-) -> Estimate:
+) -> MeasuredPoints:
     """Divide the spectra of one input and one output."""
     uu, yy, yu = sums.uu[0, 0, lines].real, sums.yy[0, lines], sums.yu[0, 0, lines]
     if not np.any(uu > 0):
@@ -71,12 +77,12 @@ def _one_channel(
     response = {"H1": h1, "H2": h2, "Hv": yu / np.abs(yu) * np.sqrt(yy / uu)}[method]
     coherence = np.minimum(np.abs(yu) ** 2 / (uu * yy), 1.0)
     std = np.abs(h1) * np.sqrt((1 - coherence) / (coherence * (averages - 1)))
-    return Estimate(frequency[lines][excited], response, coherence, std, averages)
+    return MeasuredPoints(frequency[lines][excited], response, coherence, std, averages)
 
 
 def _many_channels(
     sums: SpectralSums, frequency: FloatArray, lines: slice, method: str, averages: float
-) -> Estimate:
+) -> MeasuredPoints:
     """Solve ``S_yu = H S_uu`` at every frequency (H1)."""
     uu = np.moveaxis(sums.uu[..., lines], -1, 0)
     yu, yy = np.moveaxis(sums.yu[..., lines], -1, 0), sums.yy[:, lines].T
@@ -104,7 +110,7 @@ def _many_channels(
     left = yy * (1 - coherence) / (averages - m)
     share = np.einsum("fii->fi", inverse).real
     std = np.sqrt(left[:, :, None] * share[:, None, :])
-    return Estimate(
+    return MeasuredPoints(
         frequency[lines][excited],
         np.moveaxis(response, 0, -1),
         np.moveaxis(np.broadcast_to(coherence[:, :, None], response.shape), 0, -1),

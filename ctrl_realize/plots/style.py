@@ -202,6 +202,11 @@ def finished(
     )
 
 
+def no_curve(axes: Axes, reason: str) -> None:
+    """Write in empty axes why they have no curve."""
+    axes.text(0.5, 0.5, reason, ha="center", va="center", transform=axes.transAxes)
+
+
 def _objects(things: Sequence[Any]) -> np.ndarray[Any, np.dtype[np.object_]]:
     """Make an array of objects that may be lists themselves."""
     array = np.empty(len(things), dtype=object)

@@ -151,7 +151,7 @@ class Residual(NamedTuple):
 class DistributedLags(NamedTuple):
     """What models with many lags say: chains of equal lags, and axial dispersion.
 
-    `chain` is the chain of lags that the model is, if it is one; `endless`: chains fit the better
+    `chain` is the chain of lags that the model is, if it is one; `unlimited`: chains fit the better
     the longer they are, so that all of the dead time may be lags. `flows` are dispersion models
     that are not ruled out; with `follows_flow` the dead time is that of the best of them, and the
     model approximates it. `not_ruled_out` are models with their intervals that are not in the table

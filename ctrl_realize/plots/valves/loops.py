@@ -224,7 +224,7 @@ def _draw_phase(axes: Axes, diagnosis: LoopDiagnosis, looks: dict[str, Any]) -> 
 def _draw_correlation(axes: Axes, diagnosis: LoopDiagnosis, looks: dict[str, Any]) -> list[Line2D]:
     found = diagnosis.cross_correlation
     if found is None:
-        _say_nothing(axes, "no oscillation")
+        style.no_curve(axes, "no oscillation")
         return []
     dt = diagnosis.signals.dt
     unit, name = style.axis_time_unit(float(found.lags[-1]) * dt, axes)
@@ -242,7 +242,7 @@ def _draw_shapes(axes: Axes, diagnosis: LoopDiagnosis, looks: dict[str, Any]) ->
     found: HalfCycles | None = diagnosis.pv_shapes if integrating else diagnosis.op_shapes
     axes.set(xlabel="part of the half cycle", ylabel=f"half cycles of {name}")
     if found is None:
-        _say_nothing(axes, "no half cycles")
+        style.no_curve(axes, "no half cycles")
         return []
     inside = np.linspace(0, 1, POINTS)
     few = found.shapes[:: max(len(found.shapes) // _MOST_SHAPES, 1)]
@@ -260,7 +260,3 @@ def _draw_shapes(axes: Axes, diagnosis: LoopDiagnosis, looks: dict[str, Any]) ->
         fitted = shape * (shape @ mean) / (shape @ shape)
         lines += axes.plot(inside, fitted, color=colour, linestyle=dash, label=label)
     return list(lines)
-
-
-def _say_nothing(axes: Axes, why: str) -> None:
-    axes.text(0.5, 0.5, why, ha="center", va="center", transform=axes.transAxes)

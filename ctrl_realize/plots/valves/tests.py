@@ -254,7 +254,7 @@ def _draw_steps(axes: Axes, report: ValveReport, looks: dict[str, Any]) -> list[
     axes.set_xlim(0, longest * unit if longest > 0 else 1.0)
     axes.set_ylim(-0.3, 1.5)
     if not lines:
-        _say_nothing(axes, "no step with a complete response")
+        style.no_curve(axes, "no step with a complete response")
     return lines
 
 
@@ -287,7 +287,7 @@ def _draw_sizes(
         low, high = min(0.0, *ends), max(0.0, *ends)
         axes.set_ylim(low - (0.08 * (high - low) if low < 0 else 0.0), high + 0.08 * (high - low))
     else:
-        _say_nothing(axes, "unknown for all sizes")
+        style.no_curve(axes, "unknown for all sizes")
     name = "slew rate" if metric == "slew_rate" else definition.name
     axes.set(xlabel="step size [% of span]", ylabel=f"{name} [{unit}]")
     return lines
@@ -327,7 +327,7 @@ def _draw_signature(axes: Axes, report: ValveReport, looks: dict[str, Any]) -> l
         if np.isfinite(values).sum() > 1:
             lines += axes.plot(curve.command, values - curve.command, **own)
     if not lines:
-        _say_nothing(axes, "needs a slow ramp, or several levels in one record")
+        style.no_curve(axes, "needs a slow ramp, or several levels in one record")
     axes.set(xlabel="command [% of span]", ylabel="position - command [%]")
     return lines
 
@@ -336,7 +336,3 @@ def _colours(count: int) -> Sequence[Any]:
     """Colours of ordered sizes: Okabe and Ito's first, then again."""
     base = (style.OTHERS[3], style.MEASURED, style.TRUTH, style.BAND, style.MODEL, style.OTHERS[0])
     return [base[k % len(base)] for k in range(max(count, 1))]
-
-
-def _say_nothing(axes: Axes, why: str) -> None:
-    axes.text(0.5, 0.5, why, ha="center", va="center", transform=axes.transAxes)
