@@ -53,9 +53,9 @@ _WORSE = 100.0  # in the criterion: a longer chain will not come back from there
 class LagChain:
     """Best fit of a chain of lags, with the standard error of its dead time in s.
 
-    `criterion` includes the penalty on the kind of chain. `hidden` is the sum of the lags, in s, of
-    the law beyond those fitted: they are too fast to be visible in a record, and part of the dead
-    time.
+    `criterion` includes the penalty on the kind of chain. `truncated` is the sum of the lags, in s,
+    of the law beyond those fitted: they are too fast to be visible in a record, and part of the
+    dead time.
     """
 
     candidate: Candidate
@@ -183,7 +183,7 @@ def chain_profile(chain: LagChain, scales: Scales) -> tuple[FloatArray, FloatArr
 
 
 def chain_limits(chain: LagChain, scales: Scales) -> tuple[float, float]:
-    """Ends of the 95 % interval of the dead time; the hidden lags are subtracted from the lower."""
+    """Ends of the 95 % interval of the dead time; the lower is without the truncated lags."""
     dead_time, half = chain.candidate.dead_time, Z_95 * chain.error
     low = max(dead_time - half - chain.truncated, scales.earliest)
     return low, min(dead_time + half, scales.latest)

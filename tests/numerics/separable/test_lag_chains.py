@@ -58,7 +58,7 @@ def test_the_modes_of_diffusion_are_found_and_the_hidden_ones_counted(shift):
     assert abs(chain.candidate.dead_time - beyond - 20) < 0.2
     # What comes after the forty modes of this plant: 1 / (k - c)^2 sums to 1 / (40.5 - c).
     endless = beyond + (1 - shift) ** 2 / (40.5 - shift) / 0.01
-    assert chain.hidden == pytest.approx(endless, rel=0.05)
+    assert chain.truncated == pytest.approx(endless, rel=0.05)
 
 
 def residence(mean: float, spread: float):
