@@ -33,6 +33,7 @@ from .svg import inline_svg, laid_out, missing_glyphs_allowed
 
 MOST_DRAWN = 60
 """Largest number of step responses in one plot."""
+_LINEAR = " The model is the linear part, without the actuator."
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,11 +103,12 @@ def identification_sketches(
     step = _step_of(record) if _from_a_step(system.fit) else None
     sketches = []
     if step is not None:
+        linear = system.fit is not None and system.fit.actuator is not None
         sketches.append(
             Sketch(
                 "onset",
                 "Start of the response",
-                "Dead time of the model (line) and its interval (band).",
+                f"Dead time of the model (line) and its interval (band).{_LINEAR * linear}",
                 lambda figure: plots.onset_plot(step, system, ax=figure),
             )
         )

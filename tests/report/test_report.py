@@ -143,6 +143,7 @@ def test_the_parameters_of_an_actuator_stand_in_the_table_of_parameters(tmp_path
     where = text.index(f"{rate.label} (actuator, before the lags)")
     assert text.index("Parameters") < where < text.index(rate.interval_text())
     assert "%/s" in text[where:][:80]
+    assert text.count("the linear part, without the actuator") == 1
     assert where < text.index("Figures") < text.index("Details of the fit")
 
 
