@@ -47,6 +47,16 @@ def test_delays_of_outputs_and_inputs_are_found_from_their_sums(outputs, inputs)
     assert behind.sum() + before.sum() == least + common * min(len(outputs), len(inputs))
 
 
+def test_what_no_split_explains_is_shared_out_inputs_first_and_outputs_first():
+    # the third input has no response
+    delays = np.array([[3, 20, -1], [5, 20, -1]])
+    _, first, second = split_delays(delays, delays >= 0)
+    assert [share.tolist() for share in first] == [[0, 0], [3, 20, 0]]
+    # outputs of 3 and 5 samples leave 0 and 15 to the inputs; two outputs, three inputs: what
+    # is common lies at the outputs
+    assert [share.tolist() for share in second] == [[3, 5], [0, 15, 0]]
+
+
 def reduced(lags, leads, dead_time, order=1):
     factor, kept, theta = half_rule(np.array(lags), np.array(leads), np.zeros(0), dead_time, order)
     return factor, kept.tolist(), theta
