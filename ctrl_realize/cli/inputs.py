@@ -30,7 +30,7 @@ class Source:
 
 @dataclass(frozen=True)
 class Reading:
-    """How to read records: arguments of `read_record`, and how tests in a file are told apart."""
+    """How to read records: arguments of `read_record`, and how tests in a file are separated."""
 
     keywords: Mapping[str, Any]
     tests: Mapping[str, Any]

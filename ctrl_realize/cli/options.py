@@ -117,7 +117,7 @@ Separate = Annotated[
     bool, _OPTION("--separate", help="Treat the records as different plants: one folder each.")
 ]
 By = Annotated[
-    str | None, _OPTION(help="A file holds several tests: the column that tells them apart.")
+    str | None, _OPTION(help="A file holds several tests: the column that separates them.")
 ]
 Split = Annotated[
     bool, _OPTION("--split", help="A file holds several tests: split it where its time jumps.")

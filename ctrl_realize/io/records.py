@@ -189,7 +189,7 @@ def read_records(
     ----------
     path : path-like
     by : str or int, optional
-        Column that tells the tests apart, by its name or number. Default: a new test begins where
+        Column that separates the tests, by its name or number. Default: a new test begins where
         time jumps back, or forward by more than ten usual steps.
     **options
         Arguments of `read_record`.

@@ -53,7 +53,7 @@ def time_axis(
     unit : str
         Unit of numbers, or ``"auto"``: that of the header, otherwise s.
     time_format : str or None
-        Format of dates (as for `datetime.strptime`), if it cannot be told from the cells.
+        Format of dates (as for `datetime.strptime`), if it cannot be inferred from the cells.
     date : int, optional
         Position of a column with the dates of times of day.
 
@@ -62,7 +62,7 @@ def time_axis(
     DataError
         A cell is not a time.
     OptionError
-        Not a unit of time, or dates whose day and month cannot be told apart.
+        Not a unit of time, or dates whose day and month cannot be distinguished.
     """
     cells = table.columns[index].cells
     if cells.dtype.kind in "mM":

@@ -196,18 +196,20 @@ def track_plot(
     >>> cplt.figure.axes[0].get_ylabel()
     'dead time [ms]'
     """
-    told = np.asarray(track.resolved, dtype=bool)
+    resolved = np.asarray(track.resolved, dtype=bool)
     with style.canvas(ax, 2, title=title, size=(8.0, 5.2), heights=(2.0, 1.0)) as axes:
         factor, unit = axis_time_unit(float(np.max(np.abs(track.time))), axes[1])
         time = factor * track.time
         scale, name = time_unit(float(np.nanmax(track.high)))
         looks = {"color": style.MODEL, "label": "dead time", **kwargs}
         axes[0].fill_between(
-            time, scale * track.low, scale * track.high, where=told,
+            time, scale * track.low, scale * track.high, where=resolved,
             color=style.BAND, alpha=0.3, linewidth=0, label="95 % interval",
         )  # fmt: skip
-        upper = list(axes[0].plot(time, np.where(told, scale * track.dead_time, np.nan), **looks))
-        gain = np.where(told, track.gain_ratio, np.nan)
+        upper = list(
+            axes[0].plot(time, np.where(resolved, scale * track.dead_time, np.nan), **looks)
+        )
+        gain = np.where(resolved, track.gain_ratio, np.nan)
         lower = list(axes[1].plot(time, gain, color=style.MEASURED))
         axes[0].set_ylabel(f"dead time [{name}]")
         axes[1].set_ylabel("gain over\nthe model's")

@@ -108,7 +108,7 @@ def _largest(found: list[tuple[Interval, str]]) -> tuple[Interval, str]:
 
 
 def _rate(groups: list[SizeAndDirection]) -> tuple[Interval, str]:
-    """Largest rate; whether it is a limit, is told by the rates of the two largest sizes."""
+    """Largest rate; the rates of the two largest sizes show whether it is a limit."""
     known = [one for one in groups if one.estimates["slew_rate"].is_known]
     if not known:
         return Interval(), ""

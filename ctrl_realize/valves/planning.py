@@ -67,8 +67,8 @@ def valve_test_plan(
     repeats : int, default 1
         Of each size; each gives two steps of each direction. Two give a scatter.
     small_step : float, default 0.25
-        Step of the staircase in % of the span: the dead band and the resolution are told to about
-        this step.
+        Step of the staircase in % of the span: the dead band and the resolution are determined to
+        about this step.
     stairs : int, default 8
         Small steps in one direction from the center, 3 to 16; they must exceed the dead band.
     strokes : int, default 1

@@ -14,7 +14,7 @@ from ..output_error.flags import model_flags
 from .result import JointFit
 
 _SMOOTHED_POINTS = 3  # a single bad point is not a band
-_MUCH = 0.5  # of the largest shift of a response: where it is told to be
+_MUCH = 0.5  # of the largest shift of a response: where it is reported to be
 
 
 def joint_flags(fit: JointFit, max_delay: float | None) -> tuple[Flag, ...]:

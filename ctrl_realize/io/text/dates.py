@@ -48,7 +48,7 @@ def stamps_of(cells: list[str], time_format: str | None) -> Dates:
     Raises
     ------
     OptionError
-        `time_format` is not a format, or day and month cannot be told apart.
+        `time_format` is not a format, or day and month cannot be distinguished.
     """
     if time_format is not None:
         return Dates(_parsed(cells, time_format), time_format)
@@ -83,7 +83,7 @@ def _plain(cell: str) -> str:
 
 
 def _formats(cells: list[str]) -> list[str]:
-    """Formats that the cells may have: one, or two if day and month cannot be told apart."""
+    """Formats that the cells may have: one, or two if day and month cannot be distinguished."""
     found = [match for match in map(_DATE.fullmatch, cells) if match]
     first = found[0]
     clock = _clock_format(first["clock"])

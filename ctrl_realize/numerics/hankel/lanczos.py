@@ -253,7 +253,7 @@ def _fall_back(
     operator = LinearOperator(
         (size, size), matvec=lambda v: stack(v.reshape(1, -1))[0].copy(), dtype=np.float64
     )
-    # ARPACK restarts Lanczos. One pair more than wanted: users are told when there is no gap.
+    # ARPACK restarts Lanczos. One pair more than wanted: users are warned when there is no gap.
     values, vectors = eigsh(operator, k=count + 1, which="LM", v0=start)
     order = np.argsort(-np.abs(values), kind="stable")
     leading = order[:count]

@@ -219,7 +219,7 @@ def unstable_count(form: DelayForm, grid: FloatArray, *, dt: float) -> tuple[int
     -------
     count : int
     marginal : bool
-        A pole is so close to the border that no side can be told.
+        A pole is so close to the border that its side cannot be determined.
     """
 
     def curve(omega: FloatArray) -> ComplexArray:

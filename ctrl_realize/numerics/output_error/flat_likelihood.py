@@ -34,7 +34,7 @@ _PINNED = 0.25
 up to which it counts as pinned there. Ablation: estimates against a pinned likelihood."""
 
 
-def told(found: OutputErrorEstimate, ratio: float) -> OutputErrorEstimate:
+def with_close_decision(found: OutputErrorEstimate, ratio: float) -> OutputErrorEstimate:
     """Add a decision on the source of the dead time to the close ones, if its ratio is near 1."""
     return replace(found, close=found.close + close_to("likelihood", ratio, 1.0))
 

@@ -79,7 +79,7 @@ from ..separable.window import WindowFit, among, fit_window
 from .better_structure import better_structure
 from .coloured import in_coloured_noise
 from .extrapolation import least_extrapolating
-from .flat_likelihood import closer, later, moved, pinned, told
+from .flat_likelihood import closer, later, moved, pinned, with_close_decision
 from .interval import likelihood_fit
 from .margins import close_to
 from .process_models import process_fit
@@ -203,13 +203,13 @@ def fit_step_record(
         if data.coarse:
             likely = in_rounded_data(likely, fits, data.quantum)
         at_the_end = pinned(likely, data, plain)
-        likely = told(likely, at_the_end)
+        likely = with_close_decision(likely, at_the_end)
         if at_the_end > 1:
             return likely
     early = _fit_until(data, stop_at(data, 0.15), _LAGS, latest, factor, huber)
     if likely is not None:
         nearer = closer(early, _LAGS[-1], likely)
-        likely = told(likely, nearer)
+        likely = with_close_decision(likely, nearer)
         if nearer > 1:
             return likely
     simple = among(plain, SIMPLE_STRUCTURES)
@@ -218,7 +218,7 @@ def fit_step_record(
     estimates = _views(data, early, rise, chosen, latest)
     if likely is not None:
         agreed = later(likely, estimates)
-        likely = told(likely, agreed)
+        likely = with_close_decision(likely, agreed)
         return likely if agreed > 1 else moved(likely, plain, estimates)
     found = _robust_fit(simple, chosen, estimates, relaxing=data.relaxing)
     return replace(found, close=near)

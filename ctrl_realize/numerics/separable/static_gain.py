@@ -27,8 +27,8 @@ from .structures import Candidate
 from .varpro import Problem, partial_fractions, responses
 
 INTEGRATOR = 5e-3
-"""Poles slower than this, times the length of the record, cannot be told from integrators: over it
-they bend by an eighth of that, 0.06 % of the way."""
+"""Poles slower than this, times the length of the record, cannot be distinguished from integrators:
+over the record they bend by an eighth of that, 0.06 % of the excursion."""
 
 SIGNIFICANT = Z_95  # standard errors: a gain of less may as well be none, or have the other sign
 
@@ -45,7 +45,7 @@ class StaticGain:
     `gain` is that at zero frequency (the slope per second of a model with an integrator) and
     `total` dead time and lags less leads, in s. `slowest` is the length of the record in units of
     the slowest time constant that is no integrator's; `integrates`: there is one. `reached` is the
-    response to a unit step at the end of the record. `sign_known`: the sign of the gain is told if
+    response to a unit step at the end of the record. `sign_known`: the sign of the gain is known if
     poles slower than the record are taken for integrators.
     """
 
@@ -103,15 +103,16 @@ def static_gain(
     point = np.concatenate([theta, numerator])
     moves = _moves(candidate, numerator, length)
 
-    def told(at: FloatArray) -> FloatArray:
-        return np.array(_told(at[: theta.size], at[theta.size :], length))
+    def steady_values(at: FloatArray) -> FloatArray:
+        return np.array(_steady_values(at[: theta.size], at[theta.size :], length))
 
     gradient = np.stack(
-        [(told(point + m) - told(point - m)) / (2 * m.sum()) for m in moves], axis=1
+        [(steady_values(point + m) - steady_values(point - m)) / (2 * m.sum()) for m in moves],
+        axis=1,
     )
     errors = local_errors(problem, candidate, numerator, length)
     gain_std, total_std, rate_std = errors.std(gradient, variance)
-    gain, total, rate = (float(value) for value in told(point))
+    gain, total, rate = (float(value) for value in steady_values(point))
     slow = np.abs(candidate.poles)
     # An integrator has no slowest time constant, but a constant slope.
     slow = slow[slow * length >= INTEGRATOR]
@@ -226,7 +227,9 @@ def reached_after(poles: ComplexArray, numerator: FloatArray, length: float) -> 
     return float(modes.real @ numerator + level[0] * numerator[0])
 
 
-def _told(theta: FloatArray, numerator: FloatArray, length: float) -> tuple[float, float, float]:
+def _steady_values(
+    theta: FloatArray, numerator: FloatArray, length: float
+) -> tuple[float, float, float]:
     """Gain, total delay, and the gain that is integrated by poles slower than the record."""
     poles = poles_from_parameters(theta[None, 1:])[0][0]
     pace = np.abs(poles) * length

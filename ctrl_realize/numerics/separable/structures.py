@@ -28,7 +28,7 @@ from .poles import parameters_from_poles, poles_from_parameters
 from .varpro import Bounds, Problem, Structure
 
 ALL_STRUCTURES = tuple(Structure(n, r) for n in range(1, 6) for r in range(n, 0, -1))
-"""Further lags are those of a chain or a flow: free ones would not be told apart."""
+"""Further lags are those of a chain or a flow: free ones could not be distinguished."""
 SIMPLE_STRUCTURES = tuple(s for s in ALL_STRUCTURES if s.order <= 3)  # for the delay estimates
 NEEDLESS_ZERO, NEEDLESS_POLE = 6.0, 4.0
 """Charged for every zero, and for every pole beyond the third, when a structure is chosen: needless

@@ -65,8 +65,8 @@ def _level_from_start(values: FloatArray) -> float:
 
 
 FEWEST = 24
-"""Samples before the step from which a curve can be told from a line: four for every parameter,
-after a median of five."""
+"""Samples before the step from which a curve can be distinguished from a line: four for every
+parameter, after a median of five."""
 _SIGNIFICANT = 30.0  # chi-square to beat the line; ablation: exponential before the step
 _BEND_ERRORS = 5.0  # standard errors, as of a drift; ablation: bend before the step
 _ENOUGH = 4096  # samples that show a bend

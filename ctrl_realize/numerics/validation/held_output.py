@@ -19,7 +19,7 @@ from ..signals.noise import rounding_error
 _FAST = 0.2
 """Part of the steepest slope of a model from which its output counts as moving: of one lag, until
 it has made 80 % of its way."""
-_FEWEST = 8  # moving samples of which a part can be told
+_FEWEST = 8  # moving samples of which a part can be judged
 _SELDOM = 0.2
 """Part of equal neighbours up to which an output is said to have noise."""
 _LONG = 20  # samples: with a fifth of equal neighbours noise stands for so long by 0.2^19

@@ -31,7 +31,7 @@ _CLEAR = 3.0
 
 @dataclass(frozen=True)
 class Estimate:
-    """A number and its standard error; NaN if it cannot be told."""
+    """A number and its standard error; NaN if it is not known."""
 
     value: float
     std: float

@@ -15,7 +15,7 @@ from .. import style
 from ..shared_docs import documented
 
 _CYCLES = 10
-"""Of the trends that are shown: more cannot be told apart."""
+"""Of the trends that are shown: more cannot be distinguished."""
 _MOST_SHAPES = 40
 
 

@@ -1,4 +1,4 @@
-"""The actuators that can be asked for, and how each is told: one entry of a table each."""
+"""The actuators that can be requested, and what identifies each: one entry of a table each."""
 
 from __future__ import annotations
 

@@ -29,7 +29,7 @@ _OF_THE_RECORD = frozenset(
     }
 )
 """Flags about a record, whatever the model is."""
-_WELL = 0.25  # relative half width of an interval up to which a parameter is told
+_WELL = 0.25  # relative half width of an interval up to which a parameter is resolved
 
 
 def of_the_record(code: str) -> bool:

@@ -113,9 +113,9 @@ def in_coloured_noise(plain: SampledWindow) -> SampledWindow:
     """Fit filtered records; the noise model is the autoregression of the residual.
 
     Where the residual does not become whiter, the previous fit remains. The filter removes the low
-    frequencies, by which a slow pole is told from a disturbance: structures whose response does not
-    settle within the record, or whose gain is not significant, are left out; if no other is left,
-    as for an integrator, the previous fit remains too.
+    frequencies, which distinguish a slow pole from a disturbance: structures whose response does
+    not settle within the record, or whose gain is not significant, are left out; if no other is
+    left, as for an integrator, the previous fit remains too.
     """
     found = plain
     for _ in range(_NOISE_TURNS):
