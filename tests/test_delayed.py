@@ -120,6 +120,13 @@ def test_several_channels_have_their_own_delays():
     assert_allclose(S(z), S.delay_free(z) * z ** -total[:, :, None], rtol=1e-12)
     assert_array_equal(S.delay, total)
     assert S.nstates == 2 + 7 + 4
+    t = S.dt * np.arange(40)
+    pulses = S.dt * ct.impulse_response(ct.ss(S), t).outputs
+    assert_allclose(S.markov(40), pulses, rtol=0, atol=1e-12)
+    u = np.random.default_rng(1).standard_normal((2, 40))
+    forced = ct.forced_response(ct.ss(S), t, u).outputs
+    assert_allclose(S.simulate(u), forced, rtol=0, atol=1e-12)
+    assert_allclose(S.step(40), ct.step_response(ct.ss(S), t).outputs, rtol=0, atol=1e-12)
 
 
 @pytest.mark.parametrize("delay", [0, 37, 300])
