@@ -202,7 +202,7 @@ DEFECTS = (
     _d("output delays", "responses leave out the delays of the outputs",
        "later(free[i, j], before + behind)", "later(free[i, j], before)", "delayed", SYSTEMS),
     _d("part of a sample", "a part of a sample moves the input into a wrong state",
-       "Gamma1 = early @ partial", "Gamma1 = partial", "sampling", KERNELS),
+       "Gamma1 = early @ partial", "Gamma1 = partial", "sampling delayed", KERNELS),
     _d("forgetting", "the mean of the output never forgets",
        "self._total = keep * self._total + y", "self._total = self._total + y",
        "recursive tracker", KERNELS),
