@@ -17,6 +17,7 @@ from ...numerics.constants import Z_95
 from ...numerics.validation.innovations import nonlinear_chance
 from ...numerics.validation.parameter_change import ParameterChange, parameter_change
 from ...results import Flag
+from .flags import right_zeros
 from .loop_flags import (
     RARE,
     REGRESSED,
@@ -221,18 +222,18 @@ def _earlier_input(fit: OutputErrorFit, codes: set[str]) -> list[Flag]:
 
     This is possible if the response starts together with the step; or if the response to an earlier
     change may still have been on its way: the output was moving and was recorded for less than a
-    total delay before the step, or it first responds in the wrong direction and was recorded for
-    less than the dead time.
+    total delay before the step, or the model has zeros in the right half-plane, with which it
+    imitates a second response, and less than the dead time was recorded.
     """
     before = float(fit.records[0].time[0])
     rest = _first_move(fit.records[0]) - before
     moving, short = "not_at_rest" in codes, rest < fit.total_delay
     at_once = "no_delay_resolved" in codes
-    inverse = "inverse_response" in codes and rest < fit.interval[1]
-    if not ((at_once and moving) or (short and (at_once or moving)) or inverse):
+    detour = rest < fit.interval[1] and right_zeros(fit.estimate).size > 0
+    if not ((at_once and moving) or (short and (at_once or moving)) or detour):
         return []
     facts = ["the output starts to move together with the input"] * at_once
-    facts += ["the output first responds in the wrong direction"] * inverse
+    facts += ["the model has zeros in the right half-plane"] * detour
     facts += ["the output was moving before the step"] * moving
     facts += [f"only {in_time(rest)} was recorded before the step"] * short
     return [

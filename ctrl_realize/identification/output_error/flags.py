@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..._wording import in_time, interval_in_time, plainly, rate_in_time, time_within
+from ...numerics.arrays import ComplexArray
 from ...numerics.output_error.margins import CLOSE, DecisionKey
 from ...numerics.output_error.result import OutputErrorEstimate
 from ...numerics.output_error.step_data import StepData
@@ -249,13 +250,19 @@ def _only_total(fit: OutputErrorEstimate) -> str:
     return "; only the total delay is well determined" if firm else ""
 
 
-def _inverse(fit: OutputErrorEstimate) -> Flag | None:
+def right_zeros(fit: OutputErrorEstimate) -> ComplexArray:
+    """Zeros in the right half-plane that are not far faster than the poles."""
     if fit.distributed.follows_flow:
-        # Right half-plane zeros delay the onset, as dispersion does.
-        return None
-    zeros = np.roots(fit.numerator[::-1])
-    right = np.sort(zeros[(zeros.imag == 0) & (zeros.real > 0)].real)
-    right = right[right <= 3 * np.abs(fit.poles).max()]
+        # They delay the onset, as dispersion does.
+        return np.empty(0, dtype=np.complex128)
+    zeros = np.roots(fit.numerator[::-1]).astype(np.complex128)
+    near = np.abs(zeros) <= 3 * np.abs(fit.poles).max()
+    return np.asarray(zeros[(zeros.real > 0) & near])
+
+
+def _inverse(fit: OutputErrorEstimate) -> Flag | None:
+    zeros = right_zeros(fit)
+    right = np.sort(zeros[zeros.imag == 0].real)
     # A response begins in the wrong direction if the number of its real zeros there is odd.
     if right.size % 2 == 0:
         return None
