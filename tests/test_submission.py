@@ -70,7 +70,7 @@ def test_errors_in_the_paper_are_those_of_the_table_of_peers(stated, row, digits
     ("stated", "row"),
     [
         (37, "| ctrl_realize: identify | nothing |"),
-        (27, "| pysib: OE(3, 3) for 26 delays |"),
+        (26, "| pysib: OE(3, 3) for 26 delays |"),
         (18, "| SIPPY: ARX(3, 3) for each delay |"),
         (7, "| SciPy: curve_fit, second order and dead time |"),
     ],
