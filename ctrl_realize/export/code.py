@@ -24,7 +24,8 @@ def to_c(system: Any, path: str | os.PathLike[str], *, name: str | None = None) 
     path : path-like
         File to write, ending in ``.c``; the header stands beside it.
     name : str, optional
-        Prefix of the names in the code. Default: that of the system.
+        Prefix of the names in the code. Default: that of the system. It becomes an identifier of
+        at most 48 letters and digits; a word of one of the languages gets ``_1``.
 
     Returns
     -------

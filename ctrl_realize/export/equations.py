@@ -8,7 +8,8 @@ from typing import Any
 from ..delayed import DelayedStateSpace
 from ..design import PIDAlgorithm, PIDController
 from ..errors import UnsuitableSystemError
-from .program import Assign, If, Program, Statement, Variable, identifier, weighted_sum
+from .names import identifier
+from .program import Assign, If, Program, Statement, Variable, weighted_sum
 
 MOST_TERMS = 10_000
 """Largest number of products in a step of exported code."""
@@ -98,7 +99,7 @@ def pid_program(algorithm: PIDAlgorithm, name: str) -> Program:
         (
             f"PID algorithm {algorithm.name}, call every {algorithm.dt:g} s",
             f"kp = {algorithm.kp:.6g}, ti = {algorithm.ti:.6g} s, td = {algorithm.td:.6g} s, "
-            f"tf = {algorithm.tf:.6g} s, {algorithm.method} rule",
+            f"tf = {algorithm.tf:.6g} s{_rules(algorithm)}",
         ),
         (
             Variable("setpoint", "set-point"),
@@ -117,6 +118,13 @@ def pid_program(algorithm: PIDAlgorithm, name: str) -> Program:
         ),
         tuple(body),
     )
+
+
+def _rules(algorithm: PIDAlgorithm) -> str:
+    """How integral and derivative are discretized, for those that there are."""
+    c = algorithm.coefficients
+    integral = f", integral by the {algorithm.method} rule" if c.integral else ""
+    return integral + (", derivative by the backward rule" if c.slope else "")
 
 
 def plant_program(plant: DelayedStateSpace, name: str) -> Program:

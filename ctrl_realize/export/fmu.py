@@ -6,6 +6,7 @@ import os
 import shutil
 import sys
 import tempfile
+from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -14,14 +15,15 @@ from ..errors import MissingPackageError, OptionError
 from ..io.atomic import replaced_when_complete
 from .equations import program_of
 from .languages import python_class
+from .names import one_line
 from .program import Program
 
 TEMPLATE = """
 
-from pythonfmu import Boolean, Fmi2Causality, Fmi2Initial, Fmi2Slave, Fmi2Variability, Real
+import pythonfmu
 
 
-class {unit}(Fmi2Slave):
+class {unit}(pythonfmu.Fmi2Slave):
     def __init__(self, **settings):
         super().__init__(**settings)
         self.description = {words!r}
@@ -110,17 +112,20 @@ def _script(program: Program, dt: float) -> str:
             boolean = each.kind == "boolean"
             kind, start = ("Boolean", "False") if boolean else ("Real", "0.0")
             # An output of known initial value has no unknown for the importer to ask for.
-            initial = ", initial=Fmi2Initial.exact" if causality == "output" else ""
-            initial += ", variability=Fmi2Variability.discrete" if boolean else ""
+            initial = ", initial=pythonfmu.Fmi2Initial.exact" if causality == "output" else ""
+            initial += ", variability=pythonfmu.Fmi2Variability.discrete" if boolean else ""
             lines += [
                 f"self.{each.name} = {start}",
-                f"self.register_variable({kind}({each.name!r}, "
-                f"causality=Fmi2Causality.{causality}, description={each.words!r}{initial}))",
+                f"self.register_variable(pythonfmu.{kind}({each.name!r}, "
+                f"causality=pythonfmu.Fmi2Causality.{causality}, "
+                f"description={one_line(each.words)!r}{initial}))",
             ]
-    return python_class(program) + TEMPLATE.format(
+    # A name that hides no function of Python, as a class called `round` would.
+    own = f"{program.name}_program"
+    return python_class(replace(program, name=own)) + TEMPLATE.format(
         unit=f"{program.name}_unit",
-        name=program.name,
-        words=program.words[0],
+        name=own,
+        words=one_line(program.words[0]),
         dt=dt,
         variables="\n".join(f"        {line}" for line in lines),
         results=", ".join(f"self.{each.name}" for each in program.outputs),

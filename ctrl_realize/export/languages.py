@@ -6,6 +6,7 @@ import re
 from collections.abc import Callable
 from typing import Any
 
+from .names import plain
 from .program import If, Program, Statement, Variable, literal
 
 C_TYPES = {"real": "double", "integer": "long", "boolean": "int"}
@@ -25,7 +26,7 @@ def structured_text(program: Program, real: str = "LREAL") -> str:
             if each.length:
                 kind = f"ARRAY[0..{each.length - 1}] OF {kind}"
             start = f" := {literal(each.value)}" if values else ""
-            comment = f" (* {_plain(each.words)} *)" if each.words else ""
+            comment = f" (* {plain(each.words)} *)" if each.words else ""
             lines.append(f"    {each.name} : {kind}{start};{comment}")
         return [*lines, "END_VAR"]
 
@@ -38,7 +39,7 @@ def structured_text(program: Program, real: str = "LREAL") -> str:
             return [*lines, "END_IF;"]
         return [f"{statement.target} := {statement.expression.replace('true', 'TRUE')};"]
 
-    lines = [f"(* {_plain(line)} *)" for line in program.words]
+    lines = [f"(* {plain(line)} *)" for line in program.words]
     lines.append(f"FUNCTION_BLOCK {program.name}")
     lines += declared("VAR_INPUT", program.inputs)
     lines += declared("VAR_OUTPUT", program.outputs)
@@ -52,11 +53,11 @@ def structured_text(program: Program, real: str = "LREAL") -> str:
 def c_header(program: Program) -> str:
     """Declarations for C."""
     guard = f"{program.name.upper()}_H"
-    lines = [f"/* {_plain(line)} */" for line in program.words]
+    lines = [f"/* {plain(line)} */" for line in program.words]
     lines += [f"#ifndef {guard}", f"#define {guard}", "", "typedef struct {"]
     for each in program.states:
         size = f"[{each.length}]" if each.length else ""
-        comment = f" /* {_plain(each.words)} */" if each.words else ""
+        comment = f" /* {plain(each.words)} */" if each.words else ""
         lines.append(f"    {C_TYPES[each.kind]} {each.name}{size};{comment}")
     if not program.states:
         lines.append("    int unused; /* C has no empty structures */")
@@ -91,10 +92,10 @@ def c_source(program: Program, header: str) -> str:
             return [*lines, "}"]
         return [f"{places(statement.target)} = {places(statement.expression)};"]
 
-    lines = [f"/* {_plain(line)} */" for line in program.words]
+    lines = [f"/* {plain(line)} */" for line in program.words]
     lines += ["#include <string.h>", f'#include "{header}"', ""]
     for each in program.constants:
-        comment = f" /* {_plain(each.words)} */" if each.words else ""
+        comment = f" /* {plain(each.words)} */" if each.words else ""
         lines.append(f"static const double {upper[each.name]} = {literal(each.value)};{comment}")
     lines += ["", f"void {program.name}_init({program.name}_state *s)", "{"]
     lines += ["    memset(s, 0, sizeof *s);", "}", "", _c_signature(program), "{"]
@@ -139,12 +140,12 @@ def python_class(program: Program) -> str:
             return lines
         return [f"{places(statement.target)} = {places(statement.expression)}"]
 
-    lines = [f'"""{_plain(program.words[0])}."""', "", "", f"class {program.name}:"]
-    lines += [f'    """{_plain(program.words[0])}.', ""]
-    lines += [f"    {_plain(line)}" for line in program.words[1:]]
+    lines = [f'"""{plain(program.words[0])}."""', "", "", f"class {program.name}:"]
+    lines += [f'    """{plain(program.words[0])}.', ""]
+    lines += [f"    {plain(line)}" for line in program.words[1:]]
     lines += ['    """', ""]
     for each in program.constants:
-        lines.append(f"    {each.name} = {literal(each.value)}  # {_plain(each.words)}")
+        lines.append(f"    {each.name} = {literal(each.value)}  # {plain(each.words)}")
     lines += [*([""] if program.constants else []), "    def __init__(self):"]
     for each in program.states:
         start = f"[0.0] * {each.length}" if each.length else PYTHON_ZERO[each.kind]
@@ -172,9 +173,3 @@ def _block(
     statements: tuple[Any, ...], written: Callable[[Any], list[str]], depth: int = 1
 ) -> list[str]:
     return [f"{'    ' * depth}{line}" for each in statements for line in written(each)]
-
-
-def _plain(text: str) -> str:
-    """Text for a comment, in ASCII: no language's comment may end in it."""
-    ascii_only = text.encode("ascii", "replace").decode()
-    return re.sub(r"\*\)|\*/|/\*|\(\*|\"\"\"|\\", "?", ascii_only).replace("\n", " ")

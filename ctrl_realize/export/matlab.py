@@ -14,8 +14,10 @@ from ..delayed import DelayedStateSpace, DelaySystem
 from ..design import ContinuousModel, PIDAlgorithm, PIDController, ProcessModel, to_continuous
 from ..errors import OptionError, UnsuitableSystemError
 from ..io.atomic import write_text
-from .program import identifier
+from .names import identifier, one_line
 
+CALLED = ("ss", "tf", "pid", "pid2", "zeros", "setDelayModel", "Inf")
+"""Functions that the scripts call: a variable of that name hides them when a script runs again."""
 FORMULAS = {"tustin": "Trapezoidal", "forward": "ForwardEuler", "backward": "BackwardEuler"}
 
 
@@ -80,15 +82,15 @@ def to_matlab(
     elif continuous:
         one_of(type(system).__name__, "continuous=True for", ("DelayedStateSpace",))
     if isinstance(system, PIDController | PIDAlgorithm):
-        text = _pid(system, identifier(name or str(system.name), "C"))
+        text = _pid(system, identifier(name or str(system.name), "C", CALLED))
     elif isinstance(system, ProcessModel):
-        text = _process(system, identifier(name or "plant", "plant"))
+        text = _process(system, identifier(name or "plant", "plant", CALLED))
     elif isinstance(system, ContinuousModel):
-        variable = identifier(name or str(system.core.name), "plant")
+        variable = identifier(name or str(system.core.name), "plant", CALLED)
         delays = [system.dead_time] * system.core.ninputs
         text = _state_space(system.core, str(system.core.name), variable, "0", delays, [])
     elif isinstance(system, DelayedStateSpace):
-        variable = identifier(name or str(system.name), "plant")
+        variable = identifier(name or str(system.name), "plant", CALLED)
         text = _state_space(
             system.delay_free,
             str(system.name),
@@ -98,7 +100,7 @@ def to_matlab(
             list(system.output_delays),
         )
     elif isinstance(system, DelaySystem):
-        text = _internal_delays(system, identifier(name or str(system.name), "plant"))
+        text = _internal_delays(system, identifier(name or str(system.name), "plant", CALLED))
     else:
         raise UnsuitableSystemError(
             f"to_matlab got a {type(system).__name__}; expected a DelayedStateSpace, a "
@@ -126,7 +128,7 @@ def _state_space(
 ) -> str:
     unit = "s" if dt == "0" else "samples"
     lines = [
-        f"% {_comment(name)}: {core.nstates} states, sample time {dt} s (0: continuous), "
+        f"% {one_line(name)}: {core.nstates} states, sample time {dt} s (0: continuous), "
         f"delays in {unit}"
     ]
     for letter in "ABCD":
@@ -145,7 +147,7 @@ def _state_space(
 def _names(variable: str, system: ct.StateSpace) -> list[str]:
     lines = []
     for what, labels in (("InputName", system.input_labels), ("OutputName", system.output_labels)):
-        names = ", ".join("'" + _comment(str(each)).replace("'", "''") + "'" for each in labels)
+        names = ", ".join("'" + one_line(str(each)).replace("'", "''") + "'" for each in labels)
         lines.append(f"{variable}.{what} = {{{names}}};")
     return lines
 
@@ -168,7 +170,7 @@ def _pid(system: PIDController | PIDAlgorithm, variable: str) -> str:
             f", {_number(float(system.dt))}, 'IFormula', '{FORMULAS[system.method]}', "
             "'DFormula', 'BackwardEuler'"
         )
-    lines = [f"% {_comment(str(system.name))}: Kp, Ki, Kd, Tf in s"]
+    lines = [f"% {one_line(str(system.name))}: Kp, Ki, Kd, Tf in s"]
     if isinstance(system, PIDController):
         return "\n".join([*lines, f"{variable} = pid({gains}{sampled});", ""])
     weights = f"{_number(system.setpoint_weight)}, {_number(system.derivative_weight)}"
@@ -190,7 +192,3 @@ def _number(value: Any) -> str:
     if np.isinf(number):
         return "Inf" if number > 0 else "-Inf"
     return str(int(number)) if number.is_integer() and abs(number) < 1e15 else repr(number)
-
-
-def _comment(text: str) -> str:
-    return text.encode("ascii", "replace").decode().replace("\n", " ")

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import re
-import unicodedata
 from dataclasses import dataclass
 from typing import Literal
 
@@ -98,33 +96,3 @@ def weighted_sum(weights: list[float], names: list[str]) -> str:
         sign = (" - " if weight < 0 else " + ") if text else ("-" if weight < 0 else "")
         text += f"{sign}{literal(abs(weight))} * {name}"
     return text or "0.0"
-
-
-WORDS = """
-action array auto bool break by case char configuration const continue def default del do double
-else elsif end enum except exit extern false float for from function global goto if import in
-int interface is lambda limit long lreal max method min mod none nonlocal not of or pass program
-raise real register repeat resource retain return short signed sizeof static step struct switch
-task then to transition true try type typedef union until var void volatile while with xor yield
-"""
-RESERVED = frozenset(WORDS.split())
-"""Words of C, Python and IEC 61131-3 that are no names (in lower case)."""
-
-
-def identifier(name: str, fallback: str) -> str:
-    """Turn a name into an identifier that all languages accept.
-
-    Examples
-    --------
-    >>> from ctrl_realize.export.program import identifier
-    >>> identifier("FIC 101.OP", "plant"), identifier("für", "plant"), identifier("step", "plant")
-    ('FIC_101_OP', 'fur', 'step_1')
-    """
-    # IEC 61131-3 allows ASCII letters, digits and single underscores.
-    plain = unicodedata.normalize("NFKD", name).encode("ascii", "ignore").decode()
-    text = re.sub(r"[^A-Za-z0-9]+", "_", plain).strip("_")
-    if not text:
-        return fallback
-    if text[0].isdigit():
-        text = f"{fallback}_{text}"
-    return f"{text}_1" if text.lower() in RESERVED else text

@@ -1,6 +1,7 @@
 """Exported code is compiled or parsed, run, and compared with the simulation."""
 
 import ctypes
+import keyword
 import re
 import shutil
 import subprocess
@@ -146,6 +147,87 @@ def test_names_become_identifiers_and_short_numbers_are_a_choice(tmp_path):
     assert text.isascii()
     path = export.to_python(PID, tmp_path / "a.py", name="while")
     assert "class while_1:" in path.read_text()
+
+
+# IEC 61131-3: elementary types (table 10), standard functions (tables 22 to 38) and function
+# blocks (tables 43 to 46), keywords; each of its kind.
+IEC_WORDS = """TIME WORD LREAL TIME_OF_DAY LDT WSTRING INT_TO_REAL TO_DINT BCD_TO_UINT TRUNC ABS
+EXPT ATAN2 SHL MUX LE MID CONCAT_DATE_TOD SPLIT_DT SR RS R_TRIG CTUD TP TON TOF END_IF INITIAL_STEP
+VAR_IN_OUT NAMESPACE OVERRIDE REF_TO Private by AT ENO ANY_NUM LDN"""
+MATLAB_WORDS = "catch otherwise parfor spmd classdef end"
+
+
+@pytest.mark.parametrize("word", [*IEC_WORDS.split(), *MATLAB_WORDS.split(), *keyword.kwlist])
+def test_a_word_of_any_language_is_no_name(word, tmp_path):
+    expected = f"{word}_1"
+    text = export.to_structured_text(PID, tmp_path / "a.st", name=word).read_text()
+    assert f"FUNCTION_BLOCK {expected}\n" in text
+    text = export.to_python(PID, tmp_path / "a.py", name=word).read_text()
+    scope = {}
+    exec(compile(text, "a.py", "exec"), scope)
+    assert expected in scope
+    assert f"\n{expected} = pid(" in export.to_matlab(PID, tmp_path / "a.m", name=word).read_text()
+
+
+@pytest.mark.parametrize(
+    ("name", "expected"),
+    [("", "TIC_101_OP"), ("  ", "pid"), ("7", "pid_7"), ("\u6e29\u5ea6", "pid"), ("_x__y", "x_y")],
+)
+def test_a_name_of_other_signs_becomes_an_identifier(name, expected, tmp_path):
+    text = export.to_structured_text(PID, tmp_path / "a.st", name=name).read_text()
+    assert f"FUNCTION_BLOCK {expected}\n" in text
+
+
+def test_variables_of_a_script_differ_before_matlab_cuts_their_names(tmp_path):
+    text = export.to_matlab(ALGORITHMS["full"], tmp_path / "a.m", name="x" * 100).read_text()
+    names = re.findall(r"^(\w+) = ", text, re.M)
+    assert len(names) == 3
+    assert max(map(len, names)) <= 63
+    # a variable `ss` would hide the function when the script runs again
+    assert "\nss_1 = ss(" in export.to_matlab(SISO, tmp_path / "a.m", name="ss").read_text()
+
+
+BREAKS = "".join(map(chr, (*range(32), 127, 0x85, 0x2028)))
+
+
+@pytest.mark.parametrize("name", ["G\rclear all", "G\x0bquit", "G\x0cquit", f"G{BREAKS}quit"])
+def test_no_sign_of_a_name_or_label_ends_a_comment_or_a_text(name, tmp_path):
+    plant = cr.delayed_ss(CORE, dead_time=1.83, dt=0.25, name=name, inputs=[name], outputs=["a'b"])
+    text = export.to_matlab(plant, tmp_path / "a.m", name="G").read_text()
+    assert all(re.match(r"% |G(_[ABCD]|\.\w+)? = .*;$", line) for line in text.splitlines())
+    assert "G.OutputName = {'a''b'};" in text
+    for write, suffix in ((export.to_structured_text, "st"), (export.to_c, "c")):
+        text = write(plant, tmp_path / f"a.{suffix}", name="G").read_text()
+        assert not re.search(r"[^\n\x20-\x7e]", text)
+    text = export.to_python(plant, tmp_path / "a.py", name="G").read_text()
+    compile(text, "a.py", "exec")
+
+
+@pytest.mark.parametrize(
+    ("system", "rules"),
+    [
+        (PID, "integral by the tustin rule, derivative by the backward rule"),
+        (ALGORITHMS["forward"], "integral by the forward rule"),
+        (ALGORITHMS["P"], None),
+    ],
+)
+def test_the_head_states_the_rule_of_each_part(system, rules, tmp_path):
+    head = export.to_c(system, tmp_path / "a.c").read_text().splitlines()[1]
+    assert ("rule" in head) == (rules is not None)
+    assert rules is None or head.endswith(f", {rules} */")
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="pythonfmu brings libraries for this machine")
+@pytest.mark.parametrize("name", ["Boolean", "round", "class"])
+def test_an_fmu_runs_under_any_name(name, tmp_path):
+    pytest.importorskip("pythonfmu", reason="pythonfmu makes FMUs")
+    fmpy = pytest.importorskip("fmpy", reason="fmpy runs FMUs")
+    gain = cr.delayed_ss(ct.ss([], [], [], [[2.0]], 0.25), 1, inputs=["a\x0bb"], name="G\x0c")
+    path = export.to_fmu(gain, tmp_path / "a.fmu", name=name)
+    held = np.array([(0.0, 1.5)], dtype=[("time", float), ("u", float)])
+    options = {"stop_time": 1.0, "step_size": 0.25, "output_interval": 0.25, "output": ["y"]}
+    result = fmpy.simulate_fmu(str(path), input=held, **options)
+    assert result["y"][-1] == 3.0
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="pythonfmu brings libraries for this machine")
