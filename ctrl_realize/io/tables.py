@@ -168,7 +168,23 @@ class Table:
             if missing or not pattern.fullmatch(number):
                 self._refuse(index, row, text, missing=missing)
             values[row] = float(number.replace(",", "."))
+        self._check_percents(index, cells, values)
         return values
+
+    def _check_percents(self, index: int, cells: list[str], values: FloatArray) -> None:
+        """Refuse a column whose numbers have two units; a zero is the same in both."""
+        marked = np.array([cell.endswith("%") for cell in cells], dtype=bool)
+        plain = np.isfinite(values) & (values != 0) & ~marked
+        if marked.any() and plain.any():
+            shown = " and ".join(
+                f"{cells[row]!r} ({self.place(row)})"
+                for row in (int(np.argmax(marked)), int(np.argmax(plain)))
+            )
+            raise DataError(
+                f"{self.path}: {self.title(index)} has {np.sum(marked)} cells with a percent sign "
+                f"and {np.sum(plain)} without, such as {shown}; expected one unit in all of them (in a "
+                "spreadsheet: one number format for the column)"
+            )
 
     @staticmethod
     def _positions(cells: list[str], empty: frozenset[str]) -> Mapping[str, str]:

@@ -193,6 +193,32 @@ def test_percent_signs_and_switches_are_numbers(tmp_path):
         cr.read_record(written(tmp_path, "t,y,u", rows))
 
 
+def test_a_column_in_percent_has_a_percent_sign_in_every_cell(tmp_path):
+    """What Excel shows as 50 % is stored as 0.5: cells of two formats are no signal."""
+    rows = [f"{k},1,{'100%' if k in (3, 4) else '1.0'}" for k in range(6)]
+    for text in rows, [row.replace("1.0", "100 %") for row in rows[:5]] + ["5,1,1.5"]:
+        place = "line 5" if text is rows else "line 2"
+        with pytest.raises(DataError, match=rf"'y' has \d cells with .*{place}\) and '1.*one unit"):
+            cr.read_record(written(tmp_path, "t,u,y", text))
+    openpyxl = pytest.importorskip("openpyxl")
+    for mixed in (True, False):
+        book = openpyxl.Workbook()
+        sheet = book.active
+        sheet.append(["t", "u", "y"])
+        for k in range(6):
+            sheet.append([k, 1, 0.5 + k])
+            sheet.cell(k + 2, 3).number_format = "General" if mixed and k > 3 else "0%"
+        book.save(tmp_path / "a.xlsx")
+        if mixed:
+            with pytest.raises(DataError, match=r"4 .* 2 without, .*\(row 2\) and '4.5' \(row 6\)"):
+                cr.read_record(tmp_path / "a.xlsx")
+        else:
+            record = cr.read_record(tmp_path / "a.xlsx")
+            assert_array_equal(record.output, 50 + 100 * np.arange(6))
+    none = [f"{k},1,{'0' if k == 2 else f'{k + 1}%'}" for k in range(6)]
+    assert_array_equal(cr.read_record(written(tmp_path, "t,u,y", none)).output, [1, 2, 0, 4, 5, 6])
+
+
 OWN_MISTAKES = {  # what is wrong, and the option that the message offers
     "columns": ("t,a,b,c", "{k},{k},{k},{k}", "--input NAME-OR-NUMBER"),
     "a date": ("time,u,y", "0{k}/02/2026 10:00,{k},{k}", "--time-format '%d/%m/%Y %H:%M'"),
