@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
@@ -35,6 +36,10 @@ _LABELS = {
     "travel_high": "upper end of travel",
     "flow_at": "flow at",
 }
+
+_LETTERS = {"dead": "L", "lag": "T", "pair_time": "Tw", "lead": "Tz", "zero_time": "Tz"}
+"""Beginning of a time's name -> its letter beside a transfer function, as in MATLAB's process
+models."""
 
 
 @dataclass(frozen=True)
@@ -139,9 +144,11 @@ def slope_unit(gain_unit: str, time_unit: str) -> str:
     >>> from ctrl_realize._parameters import slope_unit
     >>> slope_unit("°C/%", "min"), slope_unit("bar", "s"), slope_unit("", "s")
     ('°C/(% min)', 'bar/s', '1/s')
+    >>> slope_unit("(mm/s)/V", "s"), slope_unit("bar/(l/min)", "s")
+    ('(mm/s)/(V s)', 'bar/((l/min) s)')
     """
-    above, slash, below = gain_unit.partition("/")
-    return f"{above}/({below} {time_unit})" if slash else f"{gain_unit or '1'}/{time_unit}"
+    parts = re.fullmatch(r"(\([^)]*\)|[^/(]*)/(.+)", gain_unit)
+    return f"{parts[1]}/({parts[2]} {time_unit})" if parts else f"{gain_unit or '1'}/{time_unit}"
 
 
 def gain_unit(output: str, input: str) -> str:
@@ -186,13 +193,16 @@ def with_error(value: float, error: float) -> str:
 def formula(parameters: Sequence[Parameter], integrators: int = 0, time_unit: str = "s") -> str:
     """Write a transfer function in one line, the gain with its standard error.
 
+    It is in seconds, because the s of Laplace beside another unit reads as seconds.
+
     Parameters
     ----------
     parameters : sequence of Parameter
-        In the time unit.
+        In seconds.
     integrators : int, optional
     time_unit : str, optional
-        Named at the end if it is not the second.
+        If it is not the second, the times follow in it: L is the dead time, T1, T2, ... are lags,
+        Tw is that of a pair, and Tz are those of zeros.
 
     Examples
     --------
@@ -202,6 +212,8 @@ def formula(parameters: Sequence[Parameter], integrators: int = 0, time_unit: st
     >>> times = [("dead_time", 44.7), ("lag_1", 179.0), ("lag_2", 41.0)]
     >>> print(formula([gain, *(Parameter(*pair) for pair in times)]))
     0.800 (+-0.001) degC/% e^(-44.7 s) / ((179 s + 1)(41 s + 1))
+    >>> print(formula([gain, Parameter("lag_1", 179.0, times=1)], time_unit="min"))
+    0.800 (+-0.001) degC/% / (179 s + 1), T1 = 2.983 min
     """
     values = {one.name: one for one in parameters}
     gain = values.get("gain")
@@ -220,7 +232,13 @@ def formula(parameters: Sequence[Parameter], integrators: int = 0, time_unit: st
         joined = "".join(below[1:] if below[0].startswith("s") else below)
         joined = f"{below[0]} {joined}".strip() if below[0].startswith("s") else joined
         text += f" / {joined}" if len(below) == 1 else f" / ({joined})"
-    return text if time_unit == "s" else f"{text}, time in {time_unit}"
+    if time_unit != "s":
+        for one in parameters:
+            letter = _LETTERS.get(one.name.rpartition("_")[0] or one.name)
+            if one.times == 1 and letter:
+                number = one.name.rpartition("_")[2] if letter.startswith("T") else ""
+                text += f", {letter}{number} = {_short(one.in_time_unit(time_unit))} {time_unit}"
+    return text
 
 
 def _factors(values: dict[str, Parameter], real: str, pair: str) -> list[str]:

@@ -15,8 +15,23 @@ UNITS = {"s": 1.0, "ms": 1e3, "µs": 1e6, "min": 1 / 60, "h": 1 / 3600, "day": 1
 
 _SHOWN: ContextVar[str] = ContextVar("unit of time in which texts are written", default="s")
 
+ASSUMED = "s (assumed)"
+"""Unit of time of a record from a file that does not name one."""
+
 _SLOW = ("min", "h", "day")
 _SLOW_HZ = 1e-3  # below which a frequency tells less than its period
+
+
+def shown_unit(unit: str) -> str:
+    """Unit in which times of a record are written: a slow one stays, others are s, by size.
+
+    Examples
+    --------
+    >>> from ctrl_realize._wording import shown_unit
+    >>> shown_unit("min"), shown_unit("ms"), shown_unit("s (assumed)")
+    ('min', 's', 's')
+    """
+    return unit if unit in _SLOW else "s"
 
 
 @contextmanager

@@ -11,10 +11,10 @@ from dataclasses import dataclass
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, Literal
 
-from ._parameters import SECONDS, checked_time_unit, formula, parameter_table
 from ._parameters import Parameter as Parameter
+from ._parameters import checked_time_unit, formula, parameter_table
 from ._shown import html_card, text_card
-from ._wording import times_in
+from ._wording import ASSUMED, shown_unit, times_in
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -30,6 +30,7 @@ INTERVAL_LABELS: dict[IntervalKind | None, str] = {
     "tracked": "95 % interval within the memory",
     None: "95 % interval",
 }
+_SAID = f"time in {ASSUMED}: the file names no unit; time_unit= says which it is"
 
 
 @dataclass(frozen=True)
@@ -178,10 +179,11 @@ class ModelFit(Result):
         Gain, dead time, lags, ... of the model as a process model, times in s; empty if the method
         does not estimate them. `parameter_table` has them as a table.
     formula : str
-        The transfer function in one line, in `time_unit`, the gain with its standard error; empty
-        without `parameters`.
+        The transfer function in one line, in seconds, the gain with its standard error; its times
+        follow in `time_unit`, if that is another one. Empty without `parameters`.
     time_unit : str
-        Unit of time of the records (``"s"``, ``"min"``, ...), in which results are written.
+        In which results are written: ``"min"``, ``"h"`` or ``"day"``, if the records have it, or
+        ``"s"``; seconds are written as s, ms or µs by size.
     input_unit, output_unit : str
         Of the signals; empty if they are not known.
     actuator : ActuatorFit or None
@@ -301,9 +303,13 @@ class ModelFit(Result):
 
     @property
     def time_unit(self) -> str:
-        """Unit of time in which results are written: that of the records."""
-        unit = self.records[0].units.get("time", "s") if self.records else "s"
-        return unit if unit in SECONDS else "s"
+        """Unit of time in which results are written: min, h or day of the records, otherwise s."""
+        return shown_unit(self._record_unit)
+
+    @property
+    def _record_unit(self) -> str:
+        """Unit of time of the records."""
+        return str(self.records[0].units.get("time", "s")) if self.records else "s"
 
     @property
     def input_unit(self) -> str:
@@ -314,6 +320,9 @@ class ModelFit(Result):
     def output_unit(self) -> str:
         """Unit of the output; empty if it is not known, or there are several outputs."""
         return _common(self.records[0].output_units) if self.records else ""
+
+    def _choices(self) -> list[str]:
+        return [*self.choices, *[_SAID] * (self._record_unit == ASSUMED)]
 
     def report(self, *, time_unit: str | None = None) -> str:
         """Return the result as plain text, choices and flags included.
@@ -338,11 +347,8 @@ class ModelFit(Result):
 
     @property
     def formula(self) -> str:
-        """The transfer function in one line, in `time_unit`; empty without `parameters`."""
-        if not self.parameters:
-            return ""
-        shown = [one.in_time_unit(self.time_unit) for one in self.parameters]
-        return formula(shown, self.integrators, self.time_unit)
+        """The transfer function in one line, in seconds; empty without `parameters`."""
+        return formula(self.parameters, self.integrators, self.time_unit)
 
     def parameter_table(self, *, time_unit: str | None = None) -> pd.DataFrame:
         """List the parameters with standard errors and 95 % intervals.

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .._checks import numbers, one_of, real, spelled_out
+from .._wording import ASSUMED
 from ..errors import DataError, OptionError, TimeAxisError
 from ..numerics.arrays import BoolArray, FloatArray, read_only
 from ..numerics.signals.time_axis import axis_fault, sample_time
@@ -42,7 +43,8 @@ class Record(RecordConversions):
         Names of the signals; default ``u`` and ``y`` (``u[0]``, ``u[1]``, ... for several).
     units : mapping of str to str, optional
         Unit of each signal by its label, such as ``{"u": "%", "y": "degC"}``; under ``"time"`` the
-        unit in which times are to be shown (`time` itself is in s).
+        unit in which times are to be shown (`time` itself is in s): min, h or day; others are
+        shown as s, ms or µs by size, ``"s (assumed)"`` with that word.
     missing : {"refuse", "keep"}, optional
         How NaN in `input` and `output` is treated. With ``"keep"`` they are missing samples:
         `identify`, `fit_output_error` and `impulse_from_io` use the outputs that there are; the
@@ -164,8 +166,9 @@ class Record(RecordConversions):
 
     def __repr__(self) -> str:
         name = f" {self.name!r}" if self.name else ""
+        unit = ASSUMED if self.units.get("time") == ASSUMED else "s"
         return (
-            f"<Record{name}: {self.n_samples} samples of {self.dt:g} s, "
+            f"<Record{name}: {self.n_samples} samples of {self.dt:g} {unit}, "
             f"{_count(self.ninputs, 'input')}, {_count(self.noutputs, 'output')}"
             + (f", {self.n_missing} missing values>" if self.n_missing else ">")
         )

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from typing import Any, ParamSpec, TypeVar
 
 from .._parameters import SECONDS
-from .._wording import times_in
+from .._wording import shown_unit, times_in
 from .record import Record
 
 P = ParamSpec("P")
@@ -26,8 +26,7 @@ def shown_time_unit(given: Any) -> str:
     ('min', 'min', 's')
     """
     if isinstance(given, Record):
-        unit = given.units.get("time", "s")
-        return unit if unit in SECONDS else "s"
+        return shown_unit(given.units.get("time", "s"))
     if isinstance(given, list | tuple):
         return shown_time_unit(given[0]) if given else "s"
     own = getattr(given, "time_unit", None)

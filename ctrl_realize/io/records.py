@@ -314,7 +314,7 @@ def _samples(table: Table, how: _Reading, taken: Sequence[int]) -> tuple[Samples
         span = span_of(how.start, how.stop, axis)
         samples = long_samples(table, long, parts, axis, span, how.rules)
         check_part(table.path, span, samples.time, axis)
-        return samples, labels_of(tags, parts, None)
+        return samples, labels_of(tags, parts, axis.unit)
     taken = [*taken, *how.rules.columns(table)]
     parts = choose_columns(table, how.time, how.input, how.output, how.dt, taken)
     axis, rows = wide_axis(table, parts, how.time_unit, how.time_format)
@@ -322,7 +322,7 @@ def _samples(table: Table, how: _Reading, taken: Sequence[int]) -> tuple[Samples
     inside = (axis.seconds >= span[0]) & (axis.seconds <= span[1])
     check_part(table.path, span, axis.seconds[inside], axis)
     samples = wide_samples(table, parts, axis.seconds[inside], rows[inside], how.rules)
-    return samples, labels_of(table, parts, parts.time)
+    return samples, labels_of(table, parts, axis.unit)
 
 
 def _explained(error: TimeAxisError, table: Table, samples: Samples) -> str:

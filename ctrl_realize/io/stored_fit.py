@@ -10,7 +10,7 @@ from typing import Any, TypeVar, cast, get_args
 
 import numpy as np
 
-from .._parameters import SECONDS, Parameter
+from .._parameters import Parameter
 from .._wording import times_in
 from ..actuators.plain import Plain, from_plain, to_plain
 from ..errors import FileFormatError
@@ -29,7 +29,7 @@ _METHODS = {
 _KEPT = (
     "delay", "order", "dead_time", "dead_time_interval", "interval", "delay_interval",
     "total_delay", "total_delay_interval", "gain", "gain_interval", "gain_std_given_structure",
-    "onset", "interval_kind", "residual_std", "sampling", "time_unit", "integrators",
+    "onset", "interval_kind", "residual_std", "sampling", "integrators",
     "input_unit", "output_unit",
 )  # fmt: skip
 """Attributes that are stored if the fit has them."""
@@ -187,10 +187,8 @@ class FitSummary(ModelFit):
         return None if stored is None else _actuator(stored)
 
     @property
-    def time_unit(self) -> str:
-        """Unit of time in which results are written."""
-        unit = _text(self._value("time_unit"))
-        return unit if unit is not None and unit in SECONDS else "s"
+    def _record_unit(self) -> str:
+        return _text(self._value("time_unit")) or "s"
 
     @property
     def input_unit(self) -> str:
@@ -246,6 +244,7 @@ def summary_of(fit: ModelFit | None) -> FitSummary | None:
     # all are attributes of a ModelFit; the list is also that of the keys in the file
     values = {key: _plain(getattr(fit, key)) for key in _KEPT}
     values["std_given_structure"] = _plain(fit._std())
+    values["time_unit"] = fit._record_unit
     values["fit_percent"] = _plain(getattr(fit, "fit_percent", None))
     if fit.parameters:
         values["formula"] = fit.formula

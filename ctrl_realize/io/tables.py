@@ -182,8 +182,8 @@ class Table:
             )
             raise DataError(
                 f"{self.path}: {self.title(index)} has {np.sum(marked)} cells with a percent sign "
-                f"and {np.sum(plain)} without, such as {shown}; expected one unit in all of them (in a "
-                "spreadsheet: one number format for the column)"
+                f"and {np.sum(plain)} without, such as {shown}; expected one unit in all of them "
+                "(in a spreadsheet: one number format for the column)"
             )
 
     @staticmethod

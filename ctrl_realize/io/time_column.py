@@ -7,12 +7,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from .._wording import ASSUMED
 from ..errors import DataError, OptionError
 from ..numerics.arrays import FloatArray
 from .columns import holds_numbers
 from .tables import Table
 from .text.dates import stamps_of
-from .units import checked_time_unit, plain_unit, to_seconds, unit_named
+from .units import checked_time_unit, plain_unit, sample_time_unit, to_seconds, unit_named
 
 # from here on neighbouring integers are the same double
 _EXACT_INTEGERS = 2**53
@@ -27,17 +28,19 @@ _CLOCK = r"(\d{1,3}):(\d{2}(?:\.\d*)?)(?::(\d{2}(?:\.\d*)?))?"
 _FACTORS = {"h": (3600, 60, 1), "min": (60, 1, 0)}
 _FIRST = {"hh:mm": "h", "h:mm": "h", "h:min": "h", "mm:ss": "min", "m:ss": "min", "min:s": "min"}
 _HALF_AN_HOUR = 1 / 48
+_AS_STATED = 0.01  # relative difference of the usual step from the sample time in the header
 
 
 class TimeAxis(NamedTuple):
     """Time in s, and the date of second 0 where the column has dates.
 
-    ``doubt`` tells if that may be another date.
+    ``doubt`` tells if that may be another date; ``unit`` is that of numbers in the file.
     """
 
     seconds: FloatArray
     start: np.datetime64 | None = None
     doubt: str = ""
+    unit: str = ""
 
 
 def time_axis(
@@ -51,7 +54,7 @@ def time_axis(
     index : int
         Position of the time column.
     unit : str
-        Unit of numbers, or ``"auto"``: that of the header, otherwise s.
+        Unit of numbers, or ``"auto"``: that of the header, otherwise s, which is `ASSUMED`.
     time_format : str or None
         Format of dates (as for `datetime.strptime`), if it cannot be inferred from the cells.
     date : int, optional
@@ -75,14 +78,35 @@ def time_axis(
     unknown = unit == "auto" and not named
     if unknown:
         _check_epoch(table, index, cells)
-    unit = checked_time_unit((named or "s") if unit == "auto" else unit)
+    if unit == "auto":
+        unit = named or _stated_unit(table, index)
+    used = checked_time_unit(unit or "s")
     if cells.dtype.kind in "iu" and cells.size and int(np.max(cells)) > _EXACT_INTEGERS:
         # nanoseconds since 1970 do not fit into a double, but their differences do
-        return TimeAxis(to_seconds((cells - cells[0]).astype(np.float64), unit), None)
-    values = table.numbers(index)
-    if unknown:
-        _check_day_count(table, index, values)
-    return TimeAxis(to_seconds(values, unit), None)
+        values = (cells - cells[0]).astype(np.float64)
+    else:
+        values = table.numbers(index)
+        if unknown:
+            _check_day_count(table, index, values)
+    return TimeAxis(to_seconds(values, used), unit=used if unit else ASSUMED)
+
+
+def _stated_unit(table: Table, index: int) -> str:
+    """Unit of a column whose steps are the sample time that the file states, empty without one."""
+    stated = {name: value for name, value in table.constants.items() if sample_time_unit(name)}
+    if not stated or table.columns[index].cells.size < 2:
+        return ""
+    (name, value), step = *list(stated.items())[:1], float(np.median(np.diff(table.numbers(index))))
+    unit = sample_time_unit(name)
+    # several columns of time, each with its own
+    if np.isnan(value) or np.isclose(step, value, rtol=_AS_STATED):
+        return unit
+    if np.isclose(step, to_seconds(np.asarray(value), unit), rtol=_AS_STATED):
+        return "s"
+    raise OptionError(
+        f"{table.path}: {table.title(index)} runs in steps of {step:g}, and the file states "
+        f"{name} {value:g}; give time_unit=, the unit of the column"
+    )
 
 
 def _check_epoch(table: Table, index: int, cells: np.ndarray[Any, Any]) -> None:

@@ -34,11 +34,16 @@ _SPELLINGS = {
 
 _KNOWN = {*TIME_UNITS, "hz", "khz", "mhz", "rad/s", "deg", "rad", "db"}
 
+SAMPLE_TIMES = frozenset({"dt", "ts", "sample time", "sampletime", "sampling time"})
+"""Names of a sample time, beside the columns or above them."""
+
 _BELOW_NAMES = {
     "%", "°c", "degc", "°f", "degf", "bar", "mbar", "kpa", "mpa", "rpm", "1/min", "l/min", "l/h",
     "m3/h", "m³/h", "kg/h", "kg/s", "t/h", "mm", "cm",
 }  # fmt: skip
 """Further units that stand alone below a header, and are hardly names of signals."""
+
+_NO_TIMES = (_KNOWN | _BELOW_NAMES | {"k", "c", "f", "°k", "degk"}) - TIME_UNITS.keys()
 
 _PER_SECOND = ("rad_s", "rad/s", "rad/sec")
 _SEPARATORS = " _/"
@@ -82,6 +87,17 @@ def unit_named(name: str) -> str:
     """Return the unit of time that is a column's whole name (``millis``), or ``""``."""
     plain = plain_unit(name)
     return plain if plain in TIME_UNITS else ""
+
+
+def is_no_time(unit: str) -> bool:
+    """Whether a unit is that of another quantity, as in ``T [°C]``."""
+    return plain_unit(unit) in _NO_TIMES
+
+
+def sample_time_unit(name: str) -> str:
+    """Return the unit in a name such as ``SampleTime[ms]``; empty for other names."""
+    base, unit = split_unit(name.rpartition(".")[2].replace("_", " "))
+    return unit if base.lower() in SAMPLE_TIMES and unit in TIME_UNITS else ""
 
 
 def bare_unit(text: str) -> str:

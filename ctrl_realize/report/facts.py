@@ -170,10 +170,7 @@ def formula_of(system: DelayedStateSpace) -> str:
     found = process_parameters(poles, numerator, wait, _EVER)
     unit = "s" if system.fit is None else system.fit.time_unit
     integrators = int(np.sum(np.abs(poles) * _EVER < INTEGRATOR))
-    shown = [
-        Parameter(one.name, one.value, times=_power(one.name, integrators)).in_time_unit(unit)
-        for one in found
-    ]
+    shown = [Parameter(one.name, one.value, times=_power(one.name, integrators)) for one in found]
     return formula(shown, integrators, unit)
 
 

@@ -43,7 +43,7 @@ def fit_tables(fit: ModelFit | None, title: str = "Details of the fit") -> list[
     """List how a model was found, and what was chosen and why."""
     if fit is None:
         return []
-    choices = [("choice", choice) for choice in fit.choices]
+    choices = [("choice", choice) for choice in fit._choices()]
     rows = fit._rows()
     if fit.parameters:
         # These stand in the verdict and among the parameters.

@@ -334,8 +334,8 @@ DATES = {"LIC-106_historian.csv"}
 
 
 def test_every_measured_record_in_text_is_read_to_the_last_bit(shared_data):
-    files = [f for f in shared_data.rglob("*.csv") if "frf" not in f.name]
-    files = [f for f in files if f.name not in IRREGULAR | DATES]
+    files = [f for f in shared_data.rglob("*.csv") if f.name not in IRREGULAR | DATES]
+    files = [f for f in files if "frequency" not in f.read_text().partition("\n")[0]]
     assert len(files) >= 25
     for file in files:
         names = file.read_text().partition("\n")[0].split(",")

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from ..._checks import one_of, positive, real
-from ..._parameters import SECONDS, gain_unit
-from ...data.shown_units import in_shown_units
+from ..._parameters import gain_unit
+from ...data.shown_units import in_shown_units, shown_time_unit
 from ...delayed import DelayedStateSpace, DelaySystem
 from ...errors import OptionError, UnsuitableSystemError
 from ...numerics.blas_threads import single_threaded
@@ -225,9 +225,7 @@ def _units(plant: DelayedStateSpace) -> tuple[str, str]:
     if not records:
         return "", "s"
     first = records[0]
-    unit = first.units.get("time", "s")
-    ratio = gain_unit(first.input_units[0], first.output_units[0])
-    return ratio, unit if unit in SECONDS else "s"
+    return gain_unit(first.input_units[0], first.output_units[0]), shown_time_unit(first)
 
 
 def _one_that_works(system: Any, rule: str, kind: str, options: TuningOptions) -> str:

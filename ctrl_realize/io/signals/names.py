@@ -7,6 +7,8 @@ import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
 from ...errors import DataError, OptionError
 from ..columns import (
     Selector,
@@ -19,13 +21,14 @@ from ..columns import (
     plain_name,
 )
 from ..tables import Table
+from ..units import SAMPLE_TIMES, is_no_time, sample_time_unit, to_seconds
 
 TIME_NAMES = frozenset(
     {"t", "time", "times", "timestamp", "timestamps", "time stamp", "datetime", "date time",
      "date/time", "elapsed", "elapsed time", "time elapsed", "seconds", "sec", "secs", "ms",
-     "millis", "milliseconds", "micros", "microseconds", "minutes", "hours", "x value", "zeit",
-     "zeitstempel", "datum/zeit", "datum zeit", "uhrzeit", "temps", "tiempo", "tempo", "tijd",
-     "tid", "czas"}
+     "t stamp", "millis", "milliseconds", "micros", "microseconds", "minutes", "hours", "x value",
+     "zeit", "zeitstempel", "datum/zeit", "datum zeit", "uhrzeit", "temps", "tiempo", "tempo",
+     "tijd", "tid", "czas"}
 )  # fmt: skip
 DATE_NAMES = frozenset({"date", "datum", "fecha", "data"})
 """Time if there is no other, or the date of a column with the time of day."""
@@ -52,7 +55,6 @@ _TAGS_OUTPUT = frozenset({"pv"})
 _TAGS_SETPOINT = frozenset({"sp", "sv"})
 """Last part of a tag, such as ``TIC101_PV`` or ``Gas valve MV``."""
 QUALITY_NAMES = frozenset({"quality", "qualität", "qualitaet", "status", "opc quality", "qual"})
-_DT_NAMES = frozenset({"dt", "ts", "sample time", "sampletime", "sampling time"})
 _RATE_NAMES = frozenset({"fs", "sample rate", "samplerate", "sampling rate"})
 
 
@@ -152,7 +154,8 @@ def _tagged(table: Table, tags: Iterable[str], taken: Iterable[int]) -> list[int
 
 
 def _clocks(table: Table, taken: Iterable[int]) -> list[int]:
-    return named(table, TIME_NAMES, taken)
+    found = named(table, TIME_NAMES, taken)
+    return [k for k in found if not is_no_time(table.columns[k].unit)]
 
 
 def _dates(table: Table, clock: int | None, taken: Iterable[int]) -> list[int]:
@@ -173,8 +176,10 @@ def _guessed_clock(table: Table, taken: Sequence[int]) -> tuple[int | None, floa
         )
     for key, value in table.constants.items():
         plain = key.rpartition(".")[2].replace("_", " ").lower()
-        if plain in _DT_NAMES | _RATE_NAMES:
-            step = value if plain in _DT_NAMES else 1 / value if value else math.inf
+        unit = sample_time_unit(key)
+        if unit or plain in SAMPLE_TIMES | _RATE_NAMES:
+            step = 1 / value if plain in _RATE_NAMES and value else value
+            step = float(to_seconds(np.asarray(step), unit or "s"))
             if not (math.isfinite(step) and step > 0):
                 raise DataError(f"{table.path}: {key}={value} is not a sample time; give dt=")
             return None, step

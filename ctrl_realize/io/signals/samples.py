@@ -17,7 +17,7 @@ from ...numerics.signals.time_axis import axis_fault
 from ..columns import check_lengths
 from ..tables import Table
 from ..time_column import TimeAxis, time_axis
-from ..units import TIME_UNITS, plain_unit, unit_named
+from ..units import plain_unit
 from .long_format import LongTable
 from .names import Parts
 from .quality import Rules
@@ -79,8 +79,8 @@ def wide_axis(
         rows, seconds = rows[::-1], seconds[::-1]
         if axis.start is not None:
             start = axis.start + np.timedelta64(round(1e9 * float(seconds[0])), "ns")
-            return TimeAxis(seconds - seconds[0], start, axis.doubt), rows
-    return TimeAxis(seconds, axis.start, axis.doubt), rows
+            return axis._replace(seconds=seconds - seconds[0], start=start), rows
+    return axis._replace(seconds=seconds), rows
 
 
 def wide_samples(
@@ -195,10 +195,10 @@ def _second(given: Any, name: str, axis: TimeAxis) -> float:
     return float((stamp - pd.Timestamp(axis.start)) / pd.Timedelta(1, "s"))
 
 
-def labels_of(table: Table, parts: Parts, time_column: int | None) -> dict[str, Any]:
-    """Names and units of the signals, and the unit of time, as the file has them."""
+def labels_of(table: Table, parts: Parts, time_unit: str) -> dict[str, Any]:
+    """Names and units of the signals, as the file has them, and the unit of time."""
     labels: dict[str, Any] = {}
-    units: dict[str, str] = {}
+    units: dict[str, str] = {"time": time_unit}
     for argument, letter, chosen in (
         ("input_labels", "u", parts.inputs),
         ("output_labels", "y", parts.outputs),
@@ -211,11 +211,6 @@ def labels_of(table: Table, parts: Parts, time_column: int | None) -> dict[str, 
             unit = table.columns[k].unit or ("%" if _is_percent(table.columns[k].first(1)) else "")
             if plain_unit(unit):
                 units[name] = unit
-    if time_column is not None:
-        column = table.columns[time_column]
-        unit = plain_unit(column.unit) or unit_named(column.name)
-        if unit in TIME_UNITS:
-            units["time"] = unit
     return labels | {"units": units}
 
 

@@ -48,7 +48,11 @@ def read_delimited(source: TextSource, options: TextOptions) -> Table:
         # every line ends in a delimiter
         columns.pop()
     return Table(
-        path, tuple(columns), decimal=layout.decimal, place=lambda row: _place(source, layout, row)
+        path,
+        tuple(columns),
+        layout.sample_times,
+        layout.decimal,
+        lambda row: _place(source, layout, row),
     )
 
 

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import math
 import re
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 
 from ...errors import FileFormatError
-from ..cells import DELIMITERS, FILLED, kind_of, split_line
+from ..cells import DELIMITERS, FILLED, NUMBER, kind_of, split_line
 from ..checks import MAX_NAME
-from ..units import bare_unit, is_units_line, unit_of
+from ..units import bare_unit, is_units_line, sample_time_unit, unit_of
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,10 +31,39 @@ class Head:
         """Return the kinds of the cells of a line."""
         return [kind_of(cell, self.decimal) for cell in self.cells[row]]
 
+    def sample_times(self) -> dict[str, float]:
+        """Sample times with a unit in the lines above the data, such as ``SampleTime[ms];1``.
+
+        NaN if there are different ones.
+        """
+        found: dict[str, float] = {}
+        for name, value in (pair for cells in self.cells for pair in pairwise(cells)):
+            if sample_time_unit(name) and NUMBER[self.decimal].fullmatch(value):
+                number = float(value.replace(",", "."))
+                found[name] = number if found.get(name, number) == number else math.nan
+        return found
+
+    def block(self) -> range:
+        """Lines of a key and a cell for each column, as above the data of TwinCAT Scope.
+
+        One of them is a sample time; the keys stand above the columns of time.
+        """
+        rows = range(len(self.cells))
+        keyed = [
+            len(self.cells[row]) == self.width > 1 and self.kinds(row)[0] == "text" for row in rows
+        ]
+        middle = next((k for k in rows if keyed[k] and sample_time_unit(self.cells[k][0])), None)
+        if middle is None:
+            return range(0)
+        start = next((k + 1 for k in range(middle, -1, -1) if not keyed[k]), 0)
+        return range(start, next((k for k in rows[middle:] if not keyed[k]), len(rows) - 1))
+
 
 def first_data_row(head: Head, header: bool | str) -> int:
     """Position in ``head.rows`` of the first line of data."""
     last = len(head.rows) - 1
+    if block := head.block():
+        return block.stop
     # for each line the kinds of its cells; none if it does not match the columns
     lines = [
         head.kinds(row) if len(cells) == head.width else [] for row, cells in enumerate(head.cells)
@@ -60,6 +91,15 @@ def first_data_row(head: Head, header: bool | str) -> int:
 
 def column_names(head: Head, first: int) -> tuple[list[str], list[str]]:
     """Names and units of the columns, from the lines above the first one of data."""
+    if block := head.block():
+        lines = {head.cells[row][0].lower(): head.cells[row] for row in reversed(block)}
+        times = next(cells for key, cells in lines.items() if sample_time_unit(key))
+        unit = sample_time_unit(times[0])
+        names = [
+            f"time [{unit}]" if key == times[0] else name
+            for name, key in zip(lines.get("name", times), times, strict=True)
+        ]
+        return names, [unit_of(name[:MAX_NAME]) for name in names]
     texts = [_header_cells(head, row, first) for row in range(first)]
     names = texts[-1] if texts else None
     if names is not None:

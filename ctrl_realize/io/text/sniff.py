@@ -17,6 +17,7 @@ from __future__ import annotations
 import codecs
 import re
 from collections import Counter
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -51,7 +52,7 @@ class TextLayout:
     ``names`` and ``units`` have ``n_columns`` entries; the names are empty without a header. The
     data begin with physical line ``first_line`` (0-based), after ``start`` characters, and
     ``first_row`` are the cells of its first line. ``n_rows`` lines of data were read, all of them
-    if ``whole`` is true.
+    if ``whole`` is true. ``sample_times`` stand above the data, with their unit.
     """
 
     encoding: str
@@ -66,6 +67,7 @@ class TextLayout:
     first_row: tuple[str, ...]
     n_rows: int
     whole: bool
+    sample_times: Mapping[str, float]
 
 
 def sniff(source: TextSource, options: TextOptions) -> TextLayout:
@@ -106,7 +108,7 @@ def sniff(source: TextSource, options: TextOptions) -> TextLayout:
     whole = len(head_bytes) < HEAD_BYTES and len(lines) < MAX_HEAD_LINES
     return TextLayout(
         encoding, delimiter, decimal, comment, begin.number, width, tuple(names), tuple(units),
-        begin.start, tuple(cells[first]), len(rows) - first, whole,
+        begin.start, tuple(cells[first]), len(rows) - first, whole, head.sample_times(),
     )  # fmt: skip
 
 
