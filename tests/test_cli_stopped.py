@@ -121,6 +121,33 @@ def test_a_disk_that_is_full_loses_no_result(files, tmp_path, capsys, monkeypatc
     assert {"model.json", "records.csv"} <= {path.name for path in (tmp_path / "out").iterdir()}
 
 
+def test_a_disk_that_is_full_at_the_end_keeps_the_rows_and_says_how_to_go_on(
+    files, tmp_path, capsys, monkeypatch
+):
+    out, real = tmp_path / "out", os.fsync
+    command = ["identify", *files, "-o", str(out), "--no-report", *QUICK]
+
+    def filling(descriptor):
+        if len(list(out.glob("rows/row-*.json"))) == COUNT:
+            full()
+        real(descriptor)
+
+    with monkeypatch.context() as patched:
+        patched.setattr(os, "fsync", filling)
+        assert main(command) == 2
+    kept, why = capsys.readouterr().err.splitlines()[-2:]
+    assert kept == (
+        f"ctrl-realize: {COUNT} finished records are kept in {out / 'rows'}; run the same command "
+        "again to continue"
+    )
+    assert why.startswith(f"ctrl-realize: {out}")  # the system names no file
+    assert why.endswith("model.json: No space left on device")
+    with monkeypatch.context() as patched:
+        assert stop_after(patched, (rows, "identify"), 0) == []
+        assert main(command) == 0
+    assert {"model.json", "records.csv"} <= {path.name for path in out.iterdir()}
+
+
 @pytest.mark.parametrize(("count", "separate"), [(0, False), (0, True), (2, True)])
 def test_an_interruption_leaves_finished_records_alone(
     files, tmp_path, capsys, monkeypatch, count, separate

@@ -19,9 +19,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     Returns
     -------
     int
-        0: success. 1: success, but some records or the report failed. 2: wrong usage or unusable
-        input; nothing was written. 3: a defect of this program, with its traceback. 130:
-        interrupted. 143: terminated by the system.
+        0: success. 1: success, but some records or the report failed. 2: wrong usage, unusable
+        input or a disk error; no results were written. 3: a defect of this program, with its
+        traceback. 130: interrupted. 143: terminated by the system.
     """
     words = list(sys.argv[1:] if arguments is None else arguments) or ["--help"]
     try:

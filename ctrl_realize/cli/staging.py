@@ -89,7 +89,10 @@ def kept_rows(output: Path) -> Iterator[CampaignStore]:
     store = CampaignStore(output / ROWS)
     try:
         yield store
-    except KeyboardInterrupt:
+    except CtrlRealizeError:
+        _remove_rows(store, made)
+        raise
+    except (KeyboardInterrupt, OSError):
         store.forget_attempts()
         if len(store):
             complain(
@@ -98,9 +101,6 @@ def kept_rows(output: Path) -> Iterator[CampaignStore]:
             )
         else:
             _remove_rows(store, made)
-        raise
-    except CtrlRealizeError:
-        _remove_rows(store, made)
         raise
     _remove_rows(store, made)
 

@@ -13,8 +13,9 @@ import typer
 from .options import as_options
 
 EXIT_CODES = (
-    "Exit codes: 0 done; 1 done, but some records or the report failed; 2 wrong usage or unusable "
-    "input, nothing written; 3 a defect of the program; 130 interrupted; 143 terminated."
+    "Exit codes: 0 done; 1 done, but some records or the report failed; 2 wrong usage, unusable "
+    "input or a disk error, no results written; 3 a defect of the program; 130 interrupted; "
+    "143 terminated."
 )
 
 

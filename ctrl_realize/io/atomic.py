@@ -62,9 +62,12 @@ def replaced_when_complete(path: str | os.PathLike[str]) -> Iterator[Path]:
         with suppress(FileNotFoundError):
             temporary.chmod(target.stat().st_mode & 0o777)
         os.replace(temporary, target)
-    except BaseException:
+    except BaseException as error:
         with suppress(OSError):
             temporary.unlink()
+        if isinstance(error, OSError) and error.errno and error.filename is None:
+            # a full disk; the system names no file
+            raise OSError(error.errno, error.strerror, str(target)) from error
         raise
 
 

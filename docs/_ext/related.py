@@ -15,7 +15,7 @@ from importlib import import_module
 
 PAGES: dict[str, tuple[str, ...]] = {
     "identify": ("tutorial", "howto/trust_delay", "howto/choose_order"),
-    "identify_campaign": ("howto/several_records",),
+    "identify_campaign": ("howto/several_records", "howto/cluster"),
     "Campaign": ("howto/several_records",),
     "identification.CampaignRow": ("howto/several_records",),
     "identification.RecordGains": ("howto/several_records",),
@@ -69,7 +69,7 @@ PAGES: dict[str, tuple[str, ...]] = {
     "DelaySystem": ("howto/dead_time",),
     "save_model": ("howto/export",),
     "load_model": ("howto/export",),
-    "io.CampaignStore": ("howto/several_records",),
+    "io.CampaignStore": ("howto/several_records", "howto/cluster"),
     "io.FitSummary": ("howto/export",),
     "design.*[pP][iI][dD]*": ("howto/tune_pid",),
     "design.ProcessModel": ("howto/tune_pid",),

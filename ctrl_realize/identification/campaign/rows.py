@@ -181,6 +181,22 @@ def identify_row(
         return replace(row, warnings=(*row.warnings, text))
 
 
+def failed_row(source: RecordSource, position: int, error: str) -> CampaignRow:
+    """Row of a record that could not be identified where it was sent."""
+    text = spelled_out(" ".join(error.split())[:_LONGEST_ERROR])
+    return CampaignRow(source_name(source, position), error=text)
+
+
+def killed_row(source: RecordSource, position: int, how: str = "") -> CampaignRow:
+    """Row of a record whose process was killed repeatedly."""
+    return failed_row(
+        source,
+        position,
+        f"the process that identified this record was killed by the system{how}, even when run "
+        "alone; the usual cause is lack of memory",
+    )
+
+
 def read_source(source: RecordSource) -> Record:
     """Return the record of a source; a function is called to read it."""
     record = source if isinstance(source, Record) else source()

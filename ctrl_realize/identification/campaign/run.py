@@ -6,13 +6,14 @@ import warnings
 from collections.abc import Iterable, Iterator
 from contextlib import closing
 from inspect import signature
-from typing import Unpack
+from typing import Any, Unpack
 
 from ..._checks import one_of
 from ...data import Record
 from ...errors import DataError, OptionError
 from ..methods import METHODS, IdentifyOptions, Method, identify
 from .campaign import Campaign
+from .cluster import identified_on_cluster
 from .rows import CampaignRow, RecordSource, RowStore
 from .workers import identified
 
@@ -24,6 +25,7 @@ def identify_campaign(
     method: Method = "output_error",
     progress: bool | None = None,
     store: RowStore | None = None,
+    client: Any = None,
     **options: Unpack[IdentifyOptions],
 ) -> Campaign:
     """Identify every record of a campaign; a bad record does not stop the others.
@@ -36,8 +38,8 @@ def identify_campaign(
         read gives a row with its error.
     n_jobs : int, optional
         Number of processes (joblib; -1 for all cores). The result does not depend on it. A record
-        whose process is killed by the system twice gives a row with that error. Inside joblib's
-        ``parallel_config(backend="dask")`` the work is sent to a Dask cluster.
+        whose process is killed by the system twice gives a row with that error. Not used with
+        `client`.
     method : {"output_error", "scan", "paper"}, optional
     progress : bool, optional
         Show a progress bar; default: if the output is a terminal or a notebook.
@@ -45,6 +47,11 @@ def identify_campaign(
         Folder in which the result of each record is stored as soon as it is finished, for thousands
         of records: an interrupted run is resumed when it is called again with the same store. Only
         a summary of each fit is stored, so that memory does not grow.
+    client : distributed.Client, optional
+        Client of a Dask cluster, whose workers identify the records (extra ``cluster``). A record
+        that the cluster gives up, since it kills its workers or no worker is left, gives a row with
+        that error. Default: the client of joblib's ``parallel_config(backend="dask")``, if the call
+        is inside one.
     **options
         Further arguments of `identify`, the same for all records.
 
@@ -57,7 +64,8 @@ def identify_campaign(
     DataError
         `records` is empty.
     OptionError
-        An argument that `identify` does not have.
+        An argument that `identify` does not have, or a `client` that is asynchronous or none of
+        Dask.
 
     Examples
     --------
@@ -85,11 +93,26 @@ def identify_campaign(
                 f"records[{position}] is a {type(source).__name__}; expected a Record, or a "
                 "function that returns one (functools.partial(read_record, path))"
             )
+    client = client or _joblib_client()
+    if client is None:
+        found = identified(sources, n_jobs, method, options, store)
+    else:
+        if not hasattr(client, "nthreads") or client.asynchronous:
+            raise OptionError(f"client={client!r}; expected a distributed.Client, not asynchronous")
+        found = identified_on_cluster(client, sources, method, options, store)
     # Closed before anything else happens: an interruption may come while a row is counted.
-    with closing(identified(sources, n_jobs, method, options, store)) as found:
+    with closing(found):
         rows = dict(_with_bar(found, len(sources), progress))
     in_order = tuple(rows[position] for position in range(len(sources)))
     return Campaign(in_order, tuple(sources), method, options)
+
+
+def _joblib_client() -> Any:
+    """Client of joblib's Dask backend; None if another backend is active."""
+    from joblib.parallel import get_active_backend
+
+    backend, _ = get_active_backend()
+    return getattr(backend, "client", None)
 
 
 def _check_options(options: IdentifyOptions) -> None:

@@ -16,7 +16,7 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 from ..methods import IdentifyOptions, Method
-from .rows import CampaignRow, RecordSource, RowStore, identify_row, source_name
+from .rows import CampaignRow, RecordSource, RowStore, identify_row, killed_row
 
 
 def identified(
@@ -45,21 +45,16 @@ def identified(
         while pending:
             try:
                 yield from spread(list(pending), n_jobs)
-            except Exception as error:
-                if not _is_death(error):
-                    raise
+            except BrokenProcessPool:
                 started = [
                     position for position in pending if _mark(Path(marks), position).exists()
                 ]
-                # marks on other machines' disks are not visible
                 for position in started or list(pending):
                     try:
                         # two processes: one would be this one
                         yield from spread([position], 2)
-                    except Exception as again:
-                        if not _is_death(again):
-                            raise
-                        yield position, _dead(pending.pop(position), position, again)
+                    except BrokenProcessPool as again:
+                        yield position, _killed(pending.pop(position), position, again)
 
 
 def _marked(
@@ -83,18 +78,6 @@ def _mark(marks: Path, position: int) -> Path:
     return marks / str(position)
 
 
-def _is_death(error: Exception) -> bool:
-    """Whether a process was killed; Dask reports it after several attempts."""
-    return isinstance(error, BrokenProcessPool) or type(error).__name__ == "KilledWorker"
-
-
-def _dead(source: RecordSource, position: int, error: Exception) -> CampaignRow:
+def _killed(source: RecordSource, position: int, error: Exception) -> CampaignRow:
     codes = re.search(r"exit codes? of the workers? (?:are|is) \{(.*?)\}", str(error))
-    how = f" ({codes[1]})" if codes else ""
-    return CampaignRow(
-        source_name(source, position),
-        error=(
-            f"the process that identified this record was killed by the system{how}, even "
-            "when run alone; the usual cause is lack of memory"
-        ),
-    )
+    return killed_row(source, position, f" ({codes[1]})" if codes else "")

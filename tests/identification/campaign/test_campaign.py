@@ -1,13 +1,6 @@
 """Many records: table, statistics, final model, and one bad record among them."""
 
-import functools
-import os
-import signal
-import threading
-import time
-
 import control as ct
-import joblib
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
@@ -70,48 +63,3 @@ def test_the_final_model_is_the_best_record_at_the_common_delay(campaign):
     scan = campaign.best.system.fit
     again = cr.realize(scan.impulse, 3, delay=system.delay, samples=1000, feedthrough=True)
     assert_array_equal(system.A, again.A)
-
-
-def quick(seed: int, wait: float = 0.0) -> cr.Record:
-    time.sleep(wait)
-    made = step_record(noise=1e-3, seed=seed, before=400, after=1300)
-    return cr.Record(made.time, made.input, made.output, name=f"r{seed}")
-
-
-@pytest.fixture
-def client():
-    distributed = pytest.importorskip("distributed", reason="dask[distributed] is not installed")
-    with (
-        distributed.LocalCluster(
-            n_workers=2, threads_per_worker=1, dashboard_address=None, silence_logs=50
-        ) as cluster,
-        distributed.Client(cluster) as connected,
-    ):
-        yield connected
-
-
-@pytest.mark.slow
-# What a cluster says while it starts, stops and loses workers is not ours.
-@pytest.mark.filterwarnings("ignore")
-def test_a_cluster_gives_the_same_bits_even_when_a_worker_dies(client, tmp_path):
-    sources = [functools.partial(quick, seed, 0.2) for seed in range(8)]
-    store = cr.io.CampaignStore(tmp_path)
-    pids = list(client.run(os.getpid).values())
-
-    def kill_one() -> None:
-        while len(store) < 3:
-            time.sleep(0.05)
-        os.kill(pids[0], signal.SIGKILL)
-
-    killer = threading.Thread(target=kill_one)
-    killer.start()
-    with joblib.parallel_config(backend="dask"):
-        spread = cr.identify_campaign(sources, method="paper", n_jobs=-1, store=store)
-    killer.join()
-    serial = cr.identify_campaign([functools.partial(quick, s) for s in range(8)], method="paper")
-    assert spread.failed == ()
-    assert spread.table().equals(serial.table())
-    for a, b in zip(spread.good, serial.good, strict=True):
-        assert_array_equal(a.system.A, b.system.A)
-    # The killed worker is gone; the cluster's nanny starts another in its place.
-    assert pids[0] not in client.run(os.getpid).values()

@@ -1,0 +1,130 @@
+"""A campaign on a Dask cluster: the same bits, and a row for every record whatever befalls it."""
+
+import contextlib
+import functools
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+
+import joblib
+import pytest
+from numpy.testing import assert_array_equal
+
+import ctrl_realize as cr
+from tests.rigs import step_record
+
+dask = pytest.importorskip("dask", reason="dask[distributed] is not installed")
+distributed = pytest.importorskip("distributed", reason="dask[distributed] is not installed")
+
+pytestmark = [
+    pytest.mark.slow,
+    # what a cluster says while it starts, stops and loses workers is not ours
+    pytest.mark.filterwarnings("ignore"),
+]
+NO_WORKERS = "distributed.scheduler.no-workers-timeout"
+
+
+def quick(seed: int) -> cr.Record:
+    made = step_record(noise=1e-3, seed=seed, before=400, after=1300)
+    return cr.Record(made.time, made.input, made.output, name=f"r{seed}")
+
+
+def slowly(valve: cr.bench.Valve, seed: int) -> cr.Record:
+    time.sleep(0.2)
+    return valve.step_record(16.0, seed, name=f"r{seed}")
+
+
+def killing(seed: int) -> cr.Record:
+    os.kill(os.getpid(), signal.SIGKILL)
+    return quick(seed)
+
+
+@contextlib.contextmanager
+def connected(n_workers):
+    with (
+        distributed.LocalCluster(
+            n_workers=n_workers, threads_per_worker=1, dashboard_address=None, silence_logs=50
+        ) as cluster,
+        distributed.Client(cluster) as client,
+    ):
+        yield client
+
+
+def test_a_cluster_gives_the_same_bits_even_when_a_worker_dies(tmp_path):
+    # the arrays of the valve are sent, and must be as usable there as here
+    sources = [functools.partial(slowly, cr.bench.valve(), seed) for seed in range(8)]
+    store = cr.io.CampaignStore(tmp_path)
+    with connected(2) as client:
+        pids = list(client.run(os.getpid).values())
+
+        def kill_one() -> None:
+            while len(store) < 3:
+                time.sleep(0.05)
+            os.kill(pids[0], signal.SIGKILL)
+
+        killer = threading.Thread(target=kill_one)
+        killer.start()
+        spread = cr.identify_campaign(sources, method="paper", client=client, store=store)
+        killer.join()
+        # The killed worker is gone; the cluster's nanny starts another in its place.
+        assert pids[0] not in client.run(os.getpid).values()
+    serial = cr.identify_campaign(sources, method="paper")
+    assert spread.failed == ()
+    assert spread.table().equals(serial.table())
+    for a, b in zip(spread.good, serial.good, strict=True):
+        assert_array_equal(a.system.A, b.system.A)
+        assert a.system.A.flags.aligned
+
+
+def test_a_record_that_always_kills_its_worker_is_a_row_and_the_others_go_on():
+    sources = [functools.partial(killing if s == 1 else quick, s) for s in range(6)]
+    with (
+        dask.config.set({"distributed.scheduler.allowed-failures": 1}),
+        connected(2),
+        joblib.parallel_config(backend="dask"),  # means the same client
+    ):
+        campaign = cr.identify_campaign(sources, method="paper")
+    assert [row.error is None for row in campaign.rows] == [s != 1 for s in range(6)]
+    assert "was killed by the system, even when run alone" in campaign.rows[1].error
+    assert campaign.rows[1].name == "1"
+
+
+def test_without_any_worker_the_records_are_rows_with_that_error():
+    with connected(0) as client, dask.config.set({NO_WORKERS: "1s"}):
+        campaign = cr.identify_campaign([quick] * 3, client=client)
+    assert {row.error for row in campaign.rows} == {"no worker in the Dask cluster for 1 s"}
+
+
+def test_a_function_that_the_cluster_cannot_import_is_a_row_with_that_error(tmp_path, monkeypatch):
+    (tmp_path / "only_here.py").write_text("def read():\n    pass\n", encoding="utf-8")
+    monkeypatch.syspath_prepend(tmp_path)
+    import only_here
+
+    program = (
+        "import distributed\n"
+        "if __name__ == '__main__':\n"
+        "    with distributed.LocalCluster(n_workers=1, threads_per_worker=1,\n"
+        "            dashboard_address=None, silence_logs=50) as cluster:\n"
+        "        print(cluster.scheduler_address, flush=True)\n"
+        "        input()\n"
+    )
+    elsewhere = tmp_path / "elsewhere"
+    elsewhere.mkdir()
+    (elsewhere / "cluster.py").write_text(program, encoding="utf-8")
+    process = subprocess.Popen(
+        [sys.executable, str(elsewhere / "cluster.py")], text=True,
+        stdin=subprocess.PIPE, stdout=subprocess.PIPE,
+    )  # fmt: skip
+    with process, distributed.Client(process.stdout.readline().strip()) as client:
+        campaign = cr.identify_campaign([quick(0), only_here.read], method="paper", client=client)
+        process.stdin.close()
+    assert campaign.rows[0].error is None
+    assert "only_here" in campaign.rows[1].error
+
+
+def test_a_client_that_cannot_be_waited_for_is_refused():
+    with pytest.raises(cr.errors.OptionError, match=r"expected a distributed\.Client"):
+        cr.identify_campaign([quick(0)], client="tcp://10.0.0.7:8786")
