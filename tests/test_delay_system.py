@@ -272,3 +272,87 @@ def test_memory_grows_with_the_delay_and_not_with_its_square():
     _, peak = tracemalloc.get_traced_memory()
     tracemalloc.stop()
     assert peak < 3e7  # the matrix alone has 8e8
+
+
+@pytest.mark.parametrize("delay", [10, 100, 1000])
+@pytest.mark.parametrize("lag", [5.0, 50.0, 5000.0])
+def test_rise_and_settling_time_of_a_lag_are_those_of_the_closed_form(lag, delay):
+    found = cr.delayed_ss(ct.tf([2], [lag, 1]), delay, dt=1.0).step_info()
+    # 1 - exp(-t / T) reaches 10, 90 and 98 %; each time is rounded up to a sample
+    assert found["RiseTime"] == pytest.approx(lag * np.log(9), abs=1)
+    assert 0 <= found["SettlingTime"] - delay - lag * np.log(50) <= 1
+    assert found["SteadyStateValue"] == pytest.approx(2, rel=1e-9)
+
+
+@pytest.mark.parametrize("gain", [-0.5, 0.8])
+def test_a_loop_of_gain_and_delay_settles_by_its_powers(gain):
+    # y = g (1 - (-g)^k) / (1 + g) after k passes of d samples
+    loop = ct.feedback(cr.delayed_ss(ct.ss([], [], [], [[gain]], 1.0), 1000))
+    found = loop.step_info()
+    assert found["SteadyStateValue"] == pytest.approx(gain / (1 + gain), rel=1e-12)
+    passes = next(k for k in range(99) if abs(gain) ** k < 0.02)
+    assert found["SettlingTime"] == 1000 * passes
+    assert found["RiseTime"] == (0 if gain > 0 else 3000)
+
+
+def test_a_step_that_does_not_settle_is_refused_with_what_to_try():
+    slow = cr.delayed_ss(ct.tf([1], [50, 1]), 100, dt=1.0)
+    with pytest.raises(UnsuitableSystemError, match=r"not risen.*step_info\(end\)"):
+        slow.step_info(120)
+    for unstable in (ct.feedback(slow * 40.0), cr.delayed_ss(ct.ss(1, 1, 1, 0, 1.0), 3)):
+        with pytest.raises(UnsuitableSystemError, match=r"not stable.*step_response"):
+            unstable.step_info()
+    with pytest.raises(UnsuitableSystemError, match="more than 1000000 samples"):
+        cr.delayed_ss(ct.tf([1], [1e6, 1]), 100, dt=1.0).step_info()
+    both = ct.append(slow, 2 * slow).step_info()
+    assert both[1][1]["SteadyStateValue"] == pytest.approx(2)
+    assert both[0][0] == slow.step_info()
+
+
+def test_a_chosen_end_of_a_response_that_leaves_out_the_delay_is_warned_of():
+    plant = cr.delayed_ss(ct.tf([1], [5, 1]), 100, dt=1.0)
+    with pytest.warns(ModelWarning, match=r"sys\.step_info\(\)"), pytest.raises(IndexError):
+        ct.step_info(plant)
+    assert ct.step_info(plant, np.arange(200.0))["RiseTime"] == plant.step_info()["RiseTime"]
+
+
+def test_polynomials_of_a_thousand_registers_are_refused_with_the_right_call():
+    plant, gain = cr.delayed_ss(ct.tf([1], [0.5, 1]), 1000, dt=0.01), ct.tf([0.3], [1], 0.01)
+    for asked in (lambda: ct.margin(gain * plant), lambda: ct.tf(plant)):
+        with pytest.raises(UnsuitableSystemError, match=r"sys \* tf"):
+            asked()
+
+
+GAIN = cr.DelaySystem(ct.ss([], [], [], [[2.0]]))
+DEAD = ct.tf([1], [5, 1]) * cr.delay(3.0)
+
+
+@pytest.mark.parametrize("other", [DEAD, DEAD.to_discrete(0.5)])
+def test_a_gain_without_a_time_base_adopts_that_of_the_other_system(other):
+    z = np.exp(0.3j) if other.dt else 0.3j
+    G = other(z)
+    for made, expected in (
+        (GAIN * other, 2 * G),
+        (other * GAIN, 2 * G),
+        (GAIN + other, 2 + G),
+        (other - GAIN, G - 2),
+        (ct.feedback(GAIN, other), 2 / (1 + 2 * G)),
+        (ct.feedback(other, GAIN), G / (1 + 2 * G)),
+    ):
+        assert made.dt == other.dt
+        assert made(z) == pytest.approx(expected, rel=1e-12)
+    at = cr.design.margins(other, 0.1 * GAIN)
+    assert at.gain_margin == pytest.approx(cr.design.margins(other, 0.2).gain_margin, rel=1e-9)
+
+
+def test_a_gain_without_a_time_base_stays_one(tmp_path):
+    for made, value in ((GAIN * GAIN, 4), (-GAIN, -2), (GAIN**-1, 0.5), (GAIN.feedback(), 2 / 3)):
+        assert made.dt is None
+        assert made(0.3j) == pytest.approx(value)
+    assert "any time base" in repr(GAIN)
+    assert (GAIN.is_stable(), GAIN.poles().size, GAIN.dcgain()) == (True, 0, 2.0)
+    cr.save_model(tmp_path / "gain.json", GAIN)
+    back = cr.load_model(tmp_path / "gain.json")
+    assert (back.dt, back.D.tolist()) == (None, [[2.0]])
+    with pytest.raises(UnsuitableSystemError, match="expected a sample time"):
+        cr.DelaySystem(ct.ss([], [], [], np.ones((2, 2))), [1.0])

@@ -32,7 +32,7 @@ class DeferredMatrices(ct.StateSpace, ABC):  # type: ignore[misc]  # control is 
     _state_names: dict[str, int] | None
     _registers: int
 
-    def _begin(self, states: list[str] | int, nstates: int, dt: float, **names: Any) -> None:
+    def _begin(self, states: list[str] | int, nstates: int, dt: float | None, **names: Any) -> None:
         """Set up the system without matrices; `states` are those without the delay line."""
         self._locked = False
         # Not StateSpace.__init__, which needs the matrices.

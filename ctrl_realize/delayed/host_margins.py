@@ -57,7 +57,7 @@ class HostMargins(DeferredMatrices):
         features, dead_time = self.features()
         sizes = np.abs(features)
         sizes = sizes[sizes > 0]
-        dt = float(self.dt)
+        dt = float(self.dt or 0)
         fastest = float(sizes.max(initial=1 / dead_time if dead_time else 1.0))
         top = np.pi / dt if dt else self._gain_is_gone(fastest)
         low = 1e-3 * min(float(sizes.min(initial=top)), 1 / dead_time if dead_time else top)

@@ -26,6 +26,9 @@ PLAIN = frozenset({"squeeze", "transpose"})
 FEWEST, MOST = 20, 5000
 """Samples of a response whose length is not given, as in python-control."""
 
+LONGEST = 1_000_000
+"""Samples of a step response whose rise and settling times are computed, at most."""
+
 ON_CIRCLE = 1e-8
 """Distance of a pole to the unit circle below which it counts as on it, as in python-control."""
 
@@ -163,6 +166,63 @@ class HostResponses(HostMargins):
             return super().step_response(timepts, initial_state, **settings)
         return self._traces(timepts, "step", 1.0, initial_state, settings)
 
+    def step_info(self, timepts: ArrayLike | float | None = None, **settings: Any) -> Any:
+        """Compute rise time, settling time, overshoot and so on, see `control.step_info`.
+
+        Parameters
+        ----------
+        timepts : array_like or float, optional
+            Times of the step response, or its end. Default, in discrete time: until the slowest
+            pole has decayed to a thousandth, dead time included.
+        **settings
+            ``SettlingTimeThreshold`` and ``RiseTimeLimits`` of `control.step_info`.
+
+        Returns
+        -------
+        dict, or list of lists of dict for several channels
+
+        Raises
+        ------
+        UnsuitableSystemError
+            A system that is not stable; a response that ends before it has risen, or one that
+            takes more than a million samples to settle.
+
+        Examples
+        --------
+        >>> import control as ct
+        >>> import ctrl_realize as cr
+        >>> plant = cr.delayed_ss(ct.tf([1], [50, 1]), dead_time=1000, dt=1.0)
+        >>> found = plant.step_info()
+        >>> found["RiseTime"], found["SettlingTime"]
+        (110.0, 1196.0)
+        """
+        if not self.issiso():
+            rows, columns = range(self.noutputs), range(self.ninputs)
+            return [[self[i, j].step_info(timepts, **settings) for j in columns] for i in rows]
+        final = float(np.real(self.dcgain()))
+        if not (np.isfinite(final) and self.is_stable()):
+            raise UnsuitableSystemError(
+                f"{self.name!r} is not stable, so its step response has no final value; expected "
+                "a stable system. Look at sys.step_response(t)"
+            )
+        if timepts is None and self.dt:
+            count = self._settling_samples(LONGEST)
+            if count == LONGEST:
+                raise UnsuitableSystemError(
+                    f"{self.name!r} takes more than {LONGEST} samples to settle; give the end of "
+                    "the response in s, sys.step_info(end), or use a longer sample time"
+                )
+            timepts = self._times(None, count)
+        response = self.step_response(timepts)
+        try:
+            with np.errstate(divide="ignore", invalid="ignore"):  # a final value of 0
+                return ct.step_info(response.outputs, response.time, yfinal=final, **settings)
+        except IndexError:
+            raise UnsuitableSystemError(
+                f"the step response of {self.name!r} has not risen to its final value {final:.4g} "
+                f"by {response.time[-1]:.6g} s; give a later end, sys.step_info(end)"
+            ) from None
+
     def impulse_response(
         self, timepts: ArrayLike | float | None = None, **settings: Any
     ) -> ct.TimeResponseData:
@@ -231,7 +291,11 @@ class HostResponses(HostMargins):
             return self._times(timepts, 0)
         return self._times(None, count)
 
-    def _settling_samples(self) -> int:
+    @abstractmethod
+    def is_stable(self) -> bool:
+        """Whether all poles are inside the stability region."""
+
+    def _settling_samples(self, most: int = MOST) -> int:
         poles = self.dominant_poles(10)
         poles = poles[np.abs(poles) > ON_CIRCLE]
         rates = np.abs(np.log(np.abs(poles)))
@@ -240,7 +304,7 @@ class HostResponses(HostMargins):
         slow = float(np.max(np.log(1000) / rates[~lasting], initial=0.0))
         delay = self.features()[1] / float(self.dt)
         count = (slow + delay) * (5 if lasting.any() else 1)
-        return int(np.clip(np.ceil(count) + 1, FEWEST, MOST))
+        return int(np.clip(np.ceil(count) + 1, FEWEST, most))
 
     def _state(self, given: ArrayLike) -> FloatArray | None:
         """Check an initial state; None if it is zero."""

@@ -101,10 +101,9 @@ def _time_base(systems: Sequence[Any]) -> float:
     known = [system for system in systems if getattr(system, "dt", None) is not None]
     if not known:
         raise UnsuitableSystemError("none of the systems has a time base; give one a dt")
-    dt = float(known[0].dt)
     for system in known[1:]:
-        dt = common_dt(known[0], system)
-    return dt
+        common_dt(known[0], system)
+    return float(common_dt(known[0], known[-1]) or 0.0)
 
 
 def _stand_in(system: Any) -> ct.StateSpace:

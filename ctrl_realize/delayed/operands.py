@@ -18,7 +18,7 @@ from .parts import check_entries
 Numbers = (int, float, np.number)
 
 
-def plain(form: DelayForm, dt: float, states: Sequence[str] | None = None) -> ct.StateSpace:
+def plain(form: DelayForm, dt: float | None, states: Sequence[str] | None = None) -> ct.StateSpace:
     """Convert the core of a form to a system of python-control."""
     made = ct.StateSpace(form.A, form.B, form.C, form.D, dt, remove_useless_states=False)
     if states is not None and len(states) == made.nstates == len(set(states)):
@@ -78,7 +78,7 @@ def check_proper(system: ct.TransferFunction, purpose: str) -> None:
                 )
 
 
-def common_dt(first: Any, second: Any) -> float:
+def common_dt(first: Any, second: Any) -> float | None:
     """Common time base of two systems; numbers and systems without one adopt the other.
 
     Raises
@@ -89,7 +89,7 @@ def common_dt(first: Any, second: Any) -> float:
     bases: list[Any] = [getattr(system, "dt", None) for system in (first, second)]
     for base, other in (bases, bases[::-1]):
         if base is None or (base is True and other not in (None, 0, 0.0)):
-            return float(other)
+            return None if other is None else float(other)
     if bool(bases[0]) != bool(bases[1]) or not np.isclose(bases[0], bases[1], rtol=1e-6, atol=0.0):
         words = " and ".join(f"dt = {base:g} s" if base else "continuous" for base in bases)
         raise UnsuitableSystemError(

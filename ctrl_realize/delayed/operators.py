@@ -47,7 +47,7 @@ class DelayOperators(DeferredMatrices):
     def _joined(
         cls,
         form: DelayForm,
-        dt: float,
+        dt: float | None,
         inputs: Sequence[str] | None = None,
         outputs: Sequence[str] | None = None,
         states: Sequence[str] | None = None,

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import sys
 
-from ..errors import ModelWarning, warn_caller
+from ..errors import ModelWarning, UnsuitableSystemError, warn_caller
 
 HARMLESS = 20
 """Delay up to which the characteristic polynomial is accurate to 1e-6 of the response.
@@ -17,16 +17,21 @@ The error grows a hundredfold for ten more samples. On five plants, alone and wi
 the largest error was 1e-6 at 20, 2e-5 at 30, 7e-3 at 37 and 40 at 50.
 """
 
+MEANINGLESS = 200
+"""Delay from which on polynomials are refused: no digit is right from 50 on, and `control.margin`
+of ``tf * sys`` then takes minutes or ends in an error of the eigenvalues."""
+
 SLOW = 500
 """States up to which a simulation with dense matrices takes less than 0.1 ms a sample."""
 
 POLYNOMIALS = "_convert_to_transfer_function"
 JOINS = "feedback", "append", "lft"
 SIMULATES = "forced_response"
+ENDS = "_ideal_tfinal_and_dt"
 
 
 def warn_of_the_reader(registers: int, states: int) -> None:
-    """Warn if python-control does something slow or inexact with the matrices.
+    """Warn if python-control does something slow or inexact with the matrices, or refuse it.
 
     To be called by the property that it reads.
 
@@ -35,6 +40,11 @@ def warn_of_the_reader(registers: int, states: int) -> None:
     registers : int
         Number of states that are delay registers.
     states : int
+
+    Raises
+    ------
+    UnsuitableSystemError
+        Polynomials with so many registers that they are certainly meaningless.
     """
     if registers <= HARMLESS:
         return
@@ -44,13 +54,22 @@ def warn_of_the_reader(registers: int, states: int) -> None:
         return
     reader = frame.f_code.co_name
     if reader == POLYNOMIALS:
-        warn_caller(
+        words = (
             f"python-control forms polynomials with {registers} delay registers here; from about "
             "50 on these are numerically meaningless, and so are the results. Instead of a root "
             "locus use cr.design.root_locus(sys) or cr.design.margins(sys), instead of ct.tf(sys) "
             "use sys.to_tf() where the delay is not in a loop, and with a transfer function "
             "sys * tf, sys + tf, ct.ss(tf) * sys and "
-            "ct.feedback(cr.DelaySystem(ct.ss(tf)), sys)",
+            "ct.feedback(cr.DelaySystem(ct.ss(tf)), sys)"
+        )
+        if registers >= MEANINGLESS:
+            raise UnsuitableSystemError(words)
+        warn_caller(words, ModelWarning)
+    elif reader == ENDS:
+        warn_caller(
+            f"python-control chooses the end of the response without the dead time of {registers} "
+            "samples: it may end before it begins. Use sys.step_info() and sys.step_response(), "
+            "or give the times",
             ModelWarning,
         )
     elif reader in JOINS:
@@ -59,9 +78,8 @@ def warn_of_the_reader(registers: int, states: int) -> None:
         warn_caller(
             f"python-control multiplies matrices of {states} states at every sample here. "
             "sys.step_response, sys.impulse_response, sys.initial_response and "
-            "sys.forced_response give the same without matrices, a thousand times faster; "
-            "instead of ct.step_info(sys) use ct.step_info(r.outputs, r.time) of "
-            "r = sys.step_response()",
+            "sys.forced_response give the same without matrices, a thousand times faster; so does "
+            "sys.step_info()",
             ModelWarning,
         )
 

@@ -215,7 +215,7 @@ def _model_content(model: Model) -> dict[str, Any]:
         "outputs": list(model.output_labels),
         **({"states": states} if named else {}),
         "order": core.nstates,
-        "dt": float(core.dt),
+        "dt": None if core.dt is None else float(core.dt),
         **delays,
         **{letter: np.asarray(getattr(core, letter)).tolist() for letter in "ABCD"},
     }
@@ -230,8 +230,12 @@ def _model_from(content: Mapping[str, Any], max_states: int | None = None) -> Mo
     if any("." in one for one in (name, *inputs, *outputs)):
         raise FileFormatError("a name contains a dot, which is not allowed in names of models")
     names: dict[str, Any] = {"name": name, "inputs": inputs, "outputs": outputs}
+    inside = "internal_delays" in model
+    if inside and model.get("dt", 0.0) is None:  # a gain of any time base
+        core = _core(model, None, len(inputs), len(outputs))
+        return DelaySystem(core, finite_numbers(model, "internal_delays"), **names)
     dt = float(boolean_free(model, "dt", int | float))
-    if "internal_delays" in model:
+    if inside:
         if not 0 <= dt < float("inf"):
             raise FileFormatError(f"dt={dt} is neither a sample time nor 0 for continuous time")
         internal = finite_numbers(model, "internal_delays")
@@ -249,7 +253,7 @@ def _model_from(content: Mapping[str, Any], max_states: int | None = None) -> Mo
     return DelayedStateSpace(core, before, output_delay=behind, fit=fit, **names)
 
 
-def _core(model: Mapping[str, Any], dt: float, ninputs: int, noutputs: int) -> ct.StateSpace:
+def _core(model: Mapping[str, Any], dt: float | None, ninputs: int, noutputs: int) -> ct.StateSpace:
     order = boolean_free(model, "order", int)
     if order < 0:
         raise FileFormatError("the model has a negative order")

@@ -57,6 +57,17 @@ def test_a_system_is_tuned_half_a_sample_later_than_its_model():
     assert found.model.dead_time == pytest.approx(2.25, rel=1e-6)
 
 
+@pytest.mark.parametrize("plant", [FOPDT, SLOW, IPDT])
+@pytest.mark.parametrize("dt", [0.01, 0.1, None])
+def test_simc_has_no_derivative_for_a_lag_that_the_plant_has_not(plant, dt):
+    core = ct.tf(plant.transfer_function())
+    given = plant.system(dt) if dt else core * cr.delay(plant.dead_time)
+    pid, pi = (cr.design.pid(given, "simc", kind) for kind in ("PID", "PI"))
+    assert (pid.kind, pid.td, pid.name) == ("PI", 0.0, "PI_simc")
+    assert pid.kp == pytest.approx(pi.kp, rel=1e-3)
+    assert pid.ti == pytest.approx(pi.ti, rel=1e-3)
+
+
 @pytest.mark.parametrize("kind", ["P", "PI", "PD", "PID"])
 @pytest.mark.parametrize("limit", [1.3, 1.6, 2.0])
 def test_the_optimal_controller_reaches_its_limit_on_sensitivity(valve, kind, limit):

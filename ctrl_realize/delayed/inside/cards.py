@@ -9,6 +9,8 @@ from ..._wording import in_time
 from ..cards import matrix_lines
 from ..deferred import DeferredMatrices
 
+CONTINUOUS = {None: "of any time base", 0: "continuous"}
+
 
 class InsideCards(ShownSystem, DeferredMatrices):
     """Shows core and delays, not the augmented matrices."""
@@ -27,7 +29,7 @@ class InsideCards(ShownSystem, DeferredMatrices):
     def _line(self) -> str:
         name = "" if self._generic_name_check() else f" {self.name!r}"
         signals = f"{', '.join(self.input_labels)} -> {', '.join(self.output_labels)}"
-        base = f"dt = {self.dt:.6g} s" if self.dt else "continuous"
+        base = f"dt = {self.dt:.6g} s" if self.dt else CONTINUOUS[self.dt]
         return (
             f"<{type(self).__name__}{name}: {signals}, order {self._core.nstates}, "
             f"{self._delays()}, {base}>"
@@ -54,7 +56,7 @@ class InsideCards(ShownSystem, DeferredMatrices):
         rows = [
             ("signals", signals),
             ("delays inside", ", ".join(in_time(t, 5) for t in seconds) or "none"),
-            ("time", f"samples of {in_time(self.dt, 6)}" if self.dt else "continuous"),
+            ("time", f"samples of {in_time(self.dt, 6)}" if self.dt else CONTINUOUS[self.dt]),
             ("core", f"order {self._core.nstates}"),
         ]
         return Card(f"{type(self).__name__}{name}", rows)

@@ -24,7 +24,7 @@ ADVICE = {
     "impulse_response": f"Use {TIMES}",
     "initial_response": f"Use {TIMES}",
     "forced_response": f"Use {TIMES}",
-    "step_info": "Use ct.step_info(r.outputs, r.time) of r = sys.step_response(t)",
+    "step_info": "Use sys.step_info(t)",
     "root_locus_map": LOCUS,
     "root_locus_plot": LOCUS,
     "sisotool": LOCUS,
@@ -59,8 +59,10 @@ def not_rational(what: str) -> UnsuitableSystemError:
     )
 
 
-def check_core(core: Any) -> float:
+def check_core(core: Any, delays: tuple[float, ...] = ()) -> float | None:
     """Return the time base of a core, 0.0 for continuous time.
+
+    A gain without delays may have none, as in python-control, and then adopts that of others.
 
     Raises
     ------
@@ -75,6 +77,9 @@ def check_core(core: Any) -> float:
             f"core is a {type(core).__name__}, which already has delays; expected a plain "
             "control.StateSpace"
         )
+    if core.dt is None and core.nstates == 0 and not delays:
+        check_entries(core)
+        return None
     if core.dt is None or core.dt is True:
         raise UnsuitableSystemError(
             f"the core's dt is {core.dt!r}; expected a sample time in s, or 0 for continuous time"
@@ -83,7 +88,7 @@ def check_core(core: Any) -> float:
     return float(core.dt)
 
 
-def check_delays(delays: tuple[float, ...], core: ct.StateSpace, dt: float) -> None:
+def check_delays(delays: tuple[float, ...], core: ct.StateSpace, dt: float | None) -> None:
     """Check delays: not negative, whole samples, and no more than the core has signals.
 
     Raises

@@ -116,7 +116,7 @@ class InsidePoles(HostResponses, DelayOperators):
         return 0.0 if self.dt else spectrum.neutral_gain(self._form())
 
     def _unstable(self) -> tuple[int, bool]:
-        return dominant.unstable_count(self._form(), self._grid(), dt=float(self.dt))
+        return dominant.unstable_count(self._form(), self._grid(), dt=float(self.dt or 0))
 
     def _grid(self) -> FloatArray:
         """Frequencies in rad/s at which no turn of the response is missed."""
@@ -216,7 +216,7 @@ class InsidePoles(HostResponses, DelayOperators):
 
     def features(self) -> tuple[ComplexArray, float]:
         """Poles in the s-plane where the response changes quickly, and the largest delay in s."""
-        dt = float(self.dt)
+        dt = float(self.dt or 0)
         poles = np.concatenate([self._core.poles(), self.dominant_poles(6)])
         if not dt:
             return np.asarray(poles, dtype=np.complex128), float(sum(self.internal_delays))

@@ -40,7 +40,8 @@ class DelaySystem(InsideResponses, InsideConversions, InsideCards, DelayOperator
     Parameters
     ----------
     core : control.StateSpace
-        With p + q outputs and m + q inputs; continuous, or discrete with a known sample time.
+        With p + q outputs and m + q inputs; continuous, or discrete with a known sample time. A
+        gain without delays may have the ``dt`` None, and adopts that of the other system.
     internal_delays : sequence of float, optional
         The q delays: whole samples for a discrete core, s for a continuous one. Those of 0 are
         closed at once.
@@ -107,8 +108,8 @@ class DelaySystem(InsideResponses, InsideConversions, InsideCards, DelayOperator
         inputs: str | Sequence[str] | None = None,
         outputs: str | Sequence[str] | None = None,
     ) -> None:
-        dt = check_core(core)
         delays = tuple(real(d, "internal_delays", "delays >= 0") for d in internal_delays)
+        dt = check_core(core, delays)
         check_delays(delays, core, dt)
         if dt:
             delays = tuple(int(d) for d in delays)
@@ -116,7 +117,7 @@ class DelaySystem(InsideResponses, InsideConversions, InsideCards, DelayOperator
         input_names = signal_names(inputs, core.input_labels[: core.ninputs - q], "u")
         output_names = signal_names(outputs, core.output_labels[: core.noutputs - q], "y")
         if 0 in delays:
-            core, delays = without_zeros(core, delays, dt)
+            core, delays = without_zeros(core, delays, float(core.dt))
             q = len(delays)
         self._begin(
             core.nstates,

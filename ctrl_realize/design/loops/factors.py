@@ -43,13 +43,14 @@ def factor(system: Any, dt: float, rate: float = 0.0) -> Factor:
     """Make a `Factor` of one system, a number included; `rate` as in `reflected`."""
     if isinstance(system, DelayLineController):
         return _line_factor(system)
-    if isinstance(system, DelaySystem):
+    if isinstance(system, DelaySystem) and system.dt is not None:
         return _inside_factor(system)
     if isinstance(system, ct.TransferFunction):
         return _polynomial_factor(system, dt, rate)
     if isinstance(system, ct.StateSpace):
         delay = int(system.delay) if isinstance(system, DelayedStateSpace) else 0
         core = system.delay_free if isinstance(system, DelayedStateSpace) else system
+        core = core.core if isinstance(core, DelaySystem) else core  # a gain
         return _state_space_factor(core, dt, rate, delay)
     gain = complex(system)
     none = np.zeros(0, dtype=np.complex128)

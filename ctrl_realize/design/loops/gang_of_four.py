@@ -70,7 +70,7 @@ def gang_of_four(plant: Any, controller: Any) -> Any:
     return four
 
 
-def _with_delays(system: Any, dt: float) -> Any:
+def _with_delays(system: Any, dt: float | None) -> Any:
     if isinstance(system, (int, float, np.number)):
         system = ct.StateSpace([], [], [], [[float(system)]], dt)
     if not isinstance(system, DelayOperators):

@@ -15,6 +15,8 @@ from ...numerics.state_space.fractional_delay import pade_ladder, thiran_denomin
 from ...numerics.state_space.sampling import split_dead_time
 
 MAX_PADE_ORDER = 20
+DEFAULT_ORDER = 3
+"""Order of a Thiran filter, where the dead time is long enough."""
 
 
 def pade_ss(dead_time: float, order: int = 5, *, name: str | None = None) -> ct.StateSpace:
@@ -65,7 +67,7 @@ def pade_ss(dead_time: float, order: int = 5, *, name: str | None = None) -> ct.
     return ct.StateSpace(*ladder, 0, inputs=["u"], outputs=["y"], **named)
 
 
-def thiran(dead_time: float, dt: float, order: int = 3) -> DelayedStateSpace:
+def thiran(dead_time: float, dt: float, order: int | None = None) -> DelayedStateSpace:
     """Compute the Thiran all-pass for a dead time that is not a multiple of the sample time.
 
     Whole samples remain a delay; a Thiran filter of order N approximates the rest, N - 0.5...N +
@@ -77,7 +79,8 @@ def thiran(dead_time: float, dt: float, order: int = 3) -> DelayedStateSpace:
     dead_time, dt : float
         In s.
     order : int, optional
-        N, 1...20; smaller if the dead time is shorter than that.
+        N, 1...20. Default: 3, or less if the dead time is shorter than that. A whole number of
+        samples needs no filter.
 
     Returns
     -------
@@ -86,7 +89,8 @@ def thiran(dead_time: float, dt: float, order: int = 3) -> DelayedStateSpace:
     Raises
     ------
     DelayRangeError
-        More than zero but less than half a sample: no causal all-pass has that delay.
+        More than zero but less than half a sample, or not more than N - 1 samples with a given N:
+        no stable all-pass has that delay.
 
     Notes
     -----
@@ -107,7 +111,7 @@ def thiran(dead_time: float, dt: float, order: int = 3) -> DelayedStateSpace:
     """
     step = positive(dt, "dt", "sample time in s")
     dead_time = real(dead_time, "dead_time", "dead time in s, >= 0")
-    most = integer(order, "order", 1, MAX_PADE_ORDER)
+    given = None if order is None else integer(order, "order", 1, MAX_PADE_ORDER)
     if dead_time < 0:
         raise DelayRangeError(f"dead_time={dead_time:g} s; expected a value >= 0")
     samples, rest = split_dead_time(dead_time, step)
@@ -120,9 +124,15 @@ def thiran(dead_time: float, dt: float, order: int = 3) -> DelayedStateSpace:
         )
     total = samples + rest
     nearest = math.floor(total + 0.5)
-    used = min(most, nearest)
-    den = thiran_denominator(total - (nearest - used), used)
-    return DelayedStateSpace(_allpass(den, step), nearest - used)
+    used = min(DEFAULT_ORDER, nearest) if given is None else given
+    if total <= used - 1:
+        raise DelayRangeError(
+            f"order={used} with a dead time of {total:.4g} samples; a stable filter of that order "
+            f"needs more than {used - 1} samples. Use order={math.ceil(total)} or less"
+        )
+    whole = max(0, nearest - used)
+    den = thiran_denominator(total - whole, used)
+    return DelayedStateSpace(_allpass(den, step), whole)
 
 
 def _allpass(den: FloatArray, dt: float) -> ct.StateSpace:

@@ -26,6 +26,11 @@ MOST_SAMPLES = 2**18
 FIT_POINTS = 1500
 """Number of points of the step response in a fit; more do not change the parameters."""
 
+NO_LAG = 1e-3
+"""Share of the total time below which the last lag of a fit is its remainder, and counts as dead
+time. The step response then changes by 5e-6 to 5e-5 of the gain (root mean square, measured for
+dead times of 0.05 to 10 lags)."""
+
 
 @single_threaded
 def reduce_fopdt(
@@ -270,6 +275,10 @@ def _by_fit(
         if best is None or found.cost < best.cost:
             best = found
     lag, second, dead_time = unpack(best.x)
+    last = lag if integrating else second
+    if last < NO_LAG * total:
+        dead_time += last
+        lag, second = 0.0 if integrating else lag, 0.0
     return ProcessModel(gain, lag, dead_time, second, integrating, "optimal")
 
 

@@ -62,7 +62,7 @@ def pid(
         use a reduced model; ``"ziegler_nichols_ultimate"`` the exact ultimate gain; ``"optimal"``
         minimizes the integrated absolute error after a load step subject to `max_sensitivity`.
     kind : {"P", "PI", "PD", "PID"}, optional
-        Not every rule exists for every kind.
+        Not every rule exists for every kind. The PID of simc is a PI for a plant with one lag.
     closed_loop_time : float, optional
         In s, for simc, lambda and imc.
     max_sensitivity : float, optional

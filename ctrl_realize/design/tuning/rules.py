@@ -18,7 +18,10 @@ INF = float("inf")
 
 
 def simc(model: ProcessModel, kind: str, closed_loop_time: float | None) -> Parameters:
-    """Skogestad (2003), sections 3-4; the closed-loop time defaults to the dead time."""
+    """Skogestad (2003), sections 3-4; the closed-loop time defaults to the dead time.
+
+    The derivative cancels the second lag; without one the PID is the PI.
+    """
     theta = model.dead_time
     tau_c = theta if closed_loop_time is None else closed_loop_time
     if tau_c + theta == 0:
@@ -30,10 +33,12 @@ def simc(model: ProcessModel, kind: str, closed_loop_time: float | None) -> Para
         ti, second = min(model.lag, 4 * (tau_c + theta)), model.second_lag
     if "D" not in kind:
         return kp, ti if "I" in kind else INF, 0.0
+    if second == 0 and "I" in kind:
+        return kp, ti, 0.0
     if second == 0:
         raise OptionError(
-            "simc has a derivative only for models with a second lag; use kind='PI', or a "
-            "model from reduce_sopdt"
+            "simc has a derivative only for models with a second lag; use kind='P', or a model "
+            "from reduce_sopdt"
         )
     if "I" not in kind:
         return kp, INF, second

@@ -198,6 +198,9 @@ def compare_pid(
                 # A rule that does not apply to this plant becomes a row of the result.
                 refused.append((rule, kind, str(error)))
                 continue
+            if controller.kind != kind and controller.kind in kinds:
+                refused.append((rule, kind, f"for this plant it is the {controller.kind}"))
+                continue
             sampled = controller if controller.dt else controller.discretised(plant.dt)
             check = loop_check(exact, controller)
             reached = _performance(plant, sampled, total) if check.stable else UNSTABLE
