@@ -14,6 +14,11 @@ MAX_NAME = 200
 """Number of characters of a column's name that are kept."""
 MAX_BYTES = 2 * 2**30
 """Default limit of the size of a data file."""
+_FREE_BYTES = 64 * 2**20
+_MAX_RATIO = 1_000
+"""Largest ratio of unpacked to packed size. Runs of equal values take no space in a file, but a
+measurement has more: beside a two-level input of 8 bytes a sample there is a noisy output, of which
+a bit at least stays, so that three columns are packed to less than a two-hundredth."""
 
 
 def usable_file(path: str | os.PathLike[str], max_bytes: float) -> Path:
@@ -58,6 +63,11 @@ def check_size(path: Path, n_bytes: int, max_bytes: float, what: str = "") -> No
             f"{path}{what} is {n_bytes / 2**20:.4g} MiB, "
             f"max_bytes={max_bytes:.0f} allows {max_bytes / 2**20:.4g} MiB"
         )
+
+
+def unpacked_limit(path: Path, max_bytes: float) -> float:
+    """Largest size of the data of a packed file, and no more than `max_bytes`."""
+    return min(max_bytes, max(_FREE_BYTES, _MAX_RATIO * path.stat().st_size))
 
 
 def read_head(path: Path, n_bytes: int) -> bytes:

@@ -143,6 +143,62 @@ def test_a_mat_file_of_zeros_is_refused_with_little_memory(tmp_path, kind, packe
     tracemalloc.stop()
 
 
+def elsewhere(h5py, file, other):
+    layout = h5py.VirtualLayout(shape=(10,), dtype="f8")
+    layout[:] = h5py.VirtualSource(other, "y", shape=(10,))
+    file.create_virtual_dataset("y", layout)
+
+
+HDF5 = {  # a dataset y that is not in the file, or larger than it, and what is said
+    "an unwritten dataset": (
+        lambda h5py, file, other: file.create_dataset("y", (2 * 10**9,), "f8", chunks=(2**20,)),
+        r"unpacked, it has more than max_bytes=\d+, or a thousand times its size",
+    ),
+    "zeros below max_bytes": (
+        lambda h5py, file, other: file.create_dataset(
+            "y", (10**8,), "f8", chunks=(2**20,), compression="gzip"
+        ),
+        r"unpacked, it has more than max_bytes=67108864",
+    ),
+    "a link": (
+        lambda h5py, file, other: file.__setitem__("y", h5py.ExternalLink(other, "y")),
+        r"'y' is a link to another file; other files are not opened: copy",
+    ),
+    "raw storage": (
+        lambda h5py, file, other: file.create_dataset("y", (10,), "f8", external=[(other, 0, 80)]),
+        r"dataset '/y' is stored outside; other files",
+    ),
+    "a virtual dataset": (elsewhere, r"dataset '/y' is virtual; other files"),
+}
+
+
+@pytest.mark.parametrize("kind", HDF5)
+@pytest.mark.parametrize("ending", [".h5", ".mat"])
+def test_hdf5_neither_opens_other_files_nor_believes_their_sizes(tmp_path, kind, ending):
+    h5py = pytest.importorskip("h5py")
+    write, said = HDF5[kind]
+    other = tmp_path / "other.h5"
+    with h5py.File(other, "w") as file:
+        file["y"] = np.arange(10.0)
+    path = tmp_path / f"a{ending}"
+    with h5py.File(path, "w", userblock_size=512 * (ending == ".mat")) as file:
+        file["t"], file["u"] = np.arange(10.0), np.arange(10.0) > 3
+        write(h5py, file, str(other))
+    if ending == ".mat":
+        with path.open("r+b") as head:
+            head.write(b"MATLAB 7.3 MAT-file, Platform: GLNXA64".ljust(124) + b"\x00\x02IM")
+    with pytest.raises(FileFormatError, match=rf"a\{ending}: .*{said}"):
+        read_record(path)
+
+
+def test_links_inside_a_file_of_hdf5_are_followed(tmp_path):
+    h5py = pytest.importorskip("h5py")
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        file["t"], file["u"], file["raw"] = np.arange(10.0), np.zeros(10), np.arange(10.0)
+        file["y"] = h5py.SoftLink("/raw")
+    assert list(read_record(tmp_path / "a.h5", output="y").output) == list(range(10))
+
+
 def test_text_that_would_be_cut_wrongly_is_refused(tmp_path):
     file = tmp_path / "a.csv"
     file.write_text("t|u|y\n0|-526|410\n0.125|-822|610\n0.25|-339|361\n")

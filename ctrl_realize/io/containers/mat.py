@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 
 from ...errors import FileFormatError
-from ..checks import read_head
+from ..checks import read_head, unpacked_limit
 from ..tables import Table
 from .arrays import AnyArray, table_of_arrays
 
@@ -70,7 +70,9 @@ def _arrays(path: Path, max_bytes: float) -> dict[str, AnyArray]:
 
 
 def _by_worker(path: Path, max_bytes: float, kind: str) -> dict[str, AnyArray]:
-    """Read all arrays in a separate process."""
+    """Read all arrays in a separate process; HDF5 announces sizes that take no room in the file."""
+    if read_head(path, 10) == b"MATLAB 7.3" or kind == "an HDF5 file":
+        max_bytes = unpacked_limit(path, max_bytes)
     try:
         done = subprocess.run(
             [sys.executable, "-P", str(_WORKER), str(path), str(max_bytes)],
@@ -84,6 +86,8 @@ def _by_worker(path: Path, max_bytes: float, kind: str) -> dict[str, AnyArray]:
         raise FileFormatError(f"{path} could not be read within {_TIMEOUT:g} s") from error
     if done.returncode:
         words = done.stderr.decode("utf-8", "replace").strip().splitlines()
+        if words and (refused := words[-1].partition("RefusedError: ")[2]) and done.returncode > 0:
+            raise FileFormatError(f"{path}: {refused[:300]}")
         # a negative code is the signal that terminated the reader
         reason = words[-1][:300] if words and done.returncode > 0 else "its reader crashed"
         raise FileFormatError(

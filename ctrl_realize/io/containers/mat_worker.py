@@ -14,9 +14,49 @@ from typing import Any
 import numpy as np
 
 _MAX_DEPTH = 8
+_OWN_MEMORY = 2**30  # address space of the process itself; 0.2 GiB were measured
+_COPIES = 4  # of the data, with those of the libraries: what is read, written and copied
 
 
-def arrays_of(path: str) -> Iterator[tuple[str, Any]]:
+class RefusedError(ValueError):
+    """The file is not damaged, but asks for what is not done."""
+
+
+class _HDF5:
+    """Reads members of one HDF5 file, in this file alone and within a limit for all of them."""
+
+    def __init__(self, limit: float) -> None:
+        self.left = self.limit = limit
+
+    def member(self, group: Any, name: str) -> Any:
+        """Return a member of a group, which is no link to another file."""
+        import h5py
+
+        if isinstance(group.get(name, getlink=True), h5py.ExternalLink):
+            raise RefusedError(_elsewhere(f"{name!r} is a link to another file"))
+        return group[name]
+
+    def load(self, dataset: Any, field: str = "") -> Any:
+        """Read a dataset, or a field of it; a file may announce sizes that take no room in it."""
+        if dataset.is_virtual or dataset.external:
+            kind = "virtual" if dataset.is_virtual else "stored outside"
+            raise RefusedError(_elsewhere(f"the dataset {dataset.name!r} is {kind}"))
+        kind = dataset.dtype[field] if field else dataset.dtype
+        self.left -= (dataset.size or 0) * kind.itemsize
+        if self.left < 0:
+            raise RefusedError(_too_large(self.limit))
+        return dataset[field] if field else dataset[()]
+
+
+def _elsewhere(what: str) -> str:
+    return f"{what}; other files are not opened: copy the data into this one, by h5py for instance"
+
+
+def _too_large(limit: float) -> str:
+    return f"unpacked, it has more than max_bytes={limit:.0f}, or a thousand times its size"
+
+
+def arrays_of(path: str, limit: float) -> Iterator[tuple[str, Any]]:
     """Yield name and values of every numeric array, including those in structs and cells."""
     with open(path, "rb") as file:
         head = file.read(10)
@@ -24,15 +64,17 @@ def arrays_of(path: str) -> Iterator[tuple[str, Any]]:
         import h5py
 
         with h5py.File(path, "r") as hdf5:
+            reader = _HDF5(limit)
             for name in hdf5:
                 if not name.startswith("#"):
-                    yield from _inside_hdf5(hdf5, name, hdf5[name], _MAX_DEPTH)
+                    value = reader.member(hdf5, name)
+                    yield from _inside_hdf5(reader, hdf5, name, value, _MAX_DEPTH)
         return
     if head.startswith(b"\x89HDF"):
         import h5py
 
         with h5py.File(path, "r") as hdf5:
-            yield from _datasets("", hdf5, _MAX_DEPTH)
+            yield from _datasets(_HDF5(limit), "", hdf5, _MAX_DEPTH)
         return
     import scipy.io
 
@@ -62,7 +104,9 @@ def _inside(name: str, value: Any, depth: int) -> Iterator[tuple[str, Any]]:
         yield name, value.astype(np.float64) if small else value
 
 
-def _inside_hdf5(file: Any, name: str, value: Any, depth: int) -> Iterator[tuple[str, Any]]:
+def _inside_hdf5(
+    reader: _HDF5, file: Any, name: str, value: Any, depth: int
+) -> Iterator[tuple[str, Any]]:
     """Yield the arrays inside a variable of version 7.3, which stores rows as columns."""
     import h5py
 
@@ -72,51 +116,52 @@ def _inside_hdf5(file: Any, name: str, value: Any, depth: int) -> Iterator[tuple
     if isinstance(value, h5py.Group):
         fields = {} if "MATLAB_sparse" in value.attrs else value
         for field in fields:
-            inner = value[field]
+            inner = reader.member(value, field)
             if (
                 isinstance(inner, h5py.Dataset)
                 and inner.dtype == h5py.ref_dtype
                 and "MATLAB_class" not in inner.attrs
             ):
                 # a struct array contains, for each field, references to the values of its entries
-                for k, reference in enumerate(inner[()].ravel()):
+                for k, reference in enumerate(reader.load(inner).ravel()):
                     place = f"{name}[{k}].{field}"
-                    yield from _inside_hdf5(file, place, file[reference], depth - 1)
+                    yield from _inside_hdf5(reader, file, place, file[reference], depth - 1)
             else:
-                yield from _inside_hdf5(file, f"{name}.{field}", inner, depth - 1)
+                yield from _inside_hdf5(reader, file, f"{name}.{field}", inner, depth - 1)
     elif kind == b"cell" and value.dtype == h5py.ref_dtype:
-        for k, reference in enumerate(value[()].ravel()):
-            yield from _inside_hdf5(file, f"{name}[{k}]", file[reference], depth - 1)
+        for k, reference in enumerate(reader.load(value).ravel()):
+            yield from _inside_hdf5(reader, file, f"{name}[{k}]", file[reference], depth - 1)
     elif kind != b"char" and not value.attrs.get("MATLAB_empty", 0):
-        numbers = value[()]
+        numbers = reader.load(value)
         if numbers.dtype.names == ("real", "imag"):
             numbers = numbers["real"] + 1j * numbers["imag"]
         if numbers.dtype.kind in "biufc":
             yield name, numbers.T
 
 
-def _datasets(name: str, group: Any, depth: int) -> Iterator[tuple[str, Any]]:
+def _datasets(reader: _HDF5, name: str, group: Any, depth: int) -> Iterator[tuple[str, Any]]:
     """Yield the numbers and texts of a group of HDF5, with units from the attributes."""
     import h5py
 
     if depth == 0:
         raise ValueError(f"more than {_MAX_DEPTH} levels of groups")
-    for key, value in group.items():
+    for key in group:
+        value = reader.member(group, key)
         place = f"{name}.{key}" if name else str(key)
         if isinstance(value, h5py.Group):
-            yield from _datasets(place, value, depth - 1)
+            yield from _datasets(reader, place, value, depth - 1)
         elif isinstance(value, h5py.Dataset) and value.shape:
             unit = value.attrs.get("units", value.attrs.get("unit", b""))
             unit = unit.decode("utf-8", "replace") if isinstance(unit, bytes) else str(unit)
             for field in value.dtype.names or ("",):
-                cells = value[field] if field else value[()]
+                cells = reader.load(value, field)
                 if cells.dtype.kind in "OS" and h5py.check_string_dtype(cells.dtype):
                     cells = np.array([_text(one) for one in cells.ravel()], dtype=str)
                 if cells.dtype.kind in "biufcU":
                     called = ".".join(part for part in (place, field) if part)
                     yield called + (f" [{unit}]" if unit and not field else ""), cells
         elif isinstance(value, h5py.Dataset) and value.dtype.kind in "iuf":
-            yield place, value[()]
+            yield place, reader.load(value)
 
 
 def _text(value: Any) -> str:
@@ -125,11 +170,19 @@ def _text(value: Any) -> str:
 
 def main(path: str, max_bytes: float) -> None:
     """Write all arrays; any error of a damaged file ends the process with its last line."""
+    try:
+        import resource
+
+        # lengths of texts and of parts of a damaged file are not known before they are read
+        most = int(_COPIES * max_bytes + _OWN_MEMORY)
+        resource.setrlimit(resource.RLIMIT_AS, (most, most))
+    except (ImportError, ValueError, OverflowError, OSError):
+        pass  # a system without such limits
     names, values, size = [], [], 0.0
-    for name, value in arrays_of(path):
+    for name, value in arrays_of(path, max_bytes):
         size += value.nbytes
         if size > max_bytes:
-            raise ValueError(f"unpacked, it has more than max_bytes={max_bytes:.0f}")
+            raise RefusedError(_too_large(max_bytes))
         names.append(name)
         values.append(value)
     content = io.BytesIO()

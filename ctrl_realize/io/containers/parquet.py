@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ...errors import FileFormatError
-from ..checks import MAX_COLUMNS, MAX_NAME, check_size
+from ..checks import MAX_COLUMNS, MAX_NAME, check_size, unpacked_limit
 from ..tables import Column, Table
 from ..units import unit_of
 
@@ -20,11 +20,6 @@ if TYPE_CHECKING:
 
 AnyArray = np.ndarray[Any, np.dtype[Any]]
 
-_FREE_BYTES = 64 * 2**20
-_MAX_RATIO = 1_000
-"""Largest ratio of unpacked to packed size. Runs of equal values take no space in a file, but a
-measurement has more: beside a two-level input of 8 bytes a sample there is a noisy output, of which
-a bit at least stays, so that three columns are packed to less than a two-hundredth."""
 _OBJECT_BYTES = 64
 """Memory of a cell that becomes a Python object: a pointer and a small object."""
 
@@ -70,8 +65,7 @@ def read_parquet(path: Path, *, max_bytes: float) -> Table:
             raise FileFormatError(f"{path} has {len(fields)} columns, the limit is {MAX_COLUMNS}")
     if not fields:
         raise FileFormatError(f"{path} has no columns")
-    limit = min(max_bytes, max(_FREE_BYTES, _MAX_RATIO * path.stat().st_size))
-    reader = _Reader(path, limit)
+    reader = _Reader(path, unpacked_limit(path, max_bytes))
     return Table(
         path,
         tuple(
