@@ -113,10 +113,12 @@ def read_record(
     na_values : str, float or sequence of them, optional
         Further words and numbers that stand for a missing value, such as -9999.
     quality : str or int, optional
-        Column of the quality; ``"auto"``: ``Quality``, ``Status``, and ``TIC101.PV.Quality`` for
-        one signal. None: qualities are ignored.
+        Column of the quality; ``"auto"``: ``Quality``, ``Status``, ``Good``, ..., and
+        ``TIC101/PV.quality`` or a second ``Quality`` for the signal of that name or to its left.
+        None: qualities are ignored.
     good : str, float or sequence of them, optional
-        Good qualities. Default: all but ``Bad...`` and OPC codes below 64.
+        Good qualities. Default: all but ``Bad...`` and the bad codes of OPC DA (below 64), OPC UA
+        (bit 31), Ignition (500, ...) and AVEVA PI (states such as 246).
     resample : bool, optional
         Resample samples with time jitter onto a uniform time axis, see `Record.resampled`.
     rest : (float, float), optional
@@ -148,7 +150,8 @@ def read_record(
     Warns
     -----
     DataWarning
-        The last line is incomplete, as if writing was interrupted; it is left out.
+        Only a part could be used: samples of bad quality are left out, or the last line, which is
+        incomplete as if writing was interrupted; or codes of qualities are not known.
 
     See Also
     --------

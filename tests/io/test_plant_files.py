@@ -3,6 +3,7 @@
 import inspect
 import json
 import shlex
+from contextlib import nullcontext
 
 import numpy as np
 import pandas as pd
@@ -12,8 +13,8 @@ from numpy.testing import assert_array_equal
 import ctrl_realize as cr
 from ctrl_realize.cli import main
 from ctrl_realize.cli.options import ARGUMENTS, option_of
-from ctrl_realize.errors import DataError, OptionError, TimeAxisError
-from tests.io.plant_files import FILES, historian_signals
+from ctrl_realize.errors import DataError, DataWarning, OptionError, TimeAxisError
+from tests.io.plant_files import FILES, historian_signals, response, stamps, steps
 
 AMBIGUOUS = {"german.csv": "output", "four_tests.csv": "input"}
 """Files with several columns that could be a signal."""
@@ -35,9 +36,11 @@ def test_a_file_becomes_a_stable_loop_in_two_calls(folder, file):
         with pytest.raises(OptionError, match=rf"{signal}; give {signal}=.* it has columns 0 '"):
             cr.read_record(path, **options)
     # the two calls
-    record = cr.io.read_records(path, **file.reading) if file.many else cr.read_record(
-        path, **file.reading
-    )  # fmt: skip
+    bad = file.name.startswith("historian")
+    with pytest.warns(DataWarning, match="quality is bad") if bad else nullcontext():
+        record = cr.io.read_records(path, **file.reading) if file.many else cr.read_record(
+            path, **file.reading
+        )  # fmt: skip
     model = cr.identify(record, structures=[(1, 1), (2, 2)])
     assert model.fit.dead_time == pytest.approx(file.dead_time, abs=file.within)
     assert model.fit.gain == pytest.approx(file.gain, rel=0.02)
@@ -48,7 +51,8 @@ def test_a_held_input_is_held_and_missing_outputs_are_missing(folder):
     """In the wide file bad rows, a gap and a repeated stamp; in the long one tags of their own."""
     t, u, y, _ = historian_signals()
     for name, fewest in (("historian_wide.csv", 380), ("historian_long.csv", 395)):
-        record = cr.read_record(folder / name, missing="keep")
+        with pytest.warns(DataWarning, match=r"20 of \d+ samples are left out"):
+            record = cr.read_record(folder / name, missing="keep")
         assert set(record.input) == set(u)
         seen = np.flatnonzero(~np.isnan(record.output))
         assert fewest <= seen.size <= 400
@@ -69,11 +73,24 @@ STAMPS = [f"2025-01-01 00:{minute:02}:00" for minute in range(6)]
 QUALITIES = {  # header, cells behind time, u and y, what is asked, and which of them are bad
     "words": ("Quality", ["Good", "bad", "Good", "Bad Input", "Uncertain", "Good"], {}, [1, 3]),
     "OPC codes": ("Status", [192, 0, 216, 64, 24, 192], {}, [1, 4]),
+    "OPC codes of a vendor": ("Quality", [192, 448, 256, 192, 1216, 192], {}, [2]),
+    "OPC UA": ("StatusCode", [0, 0x80340000, 0, 0x40000000, 0, 0xC0000000], {}, [1, 5]),
+    "OPC UA in hexadecimal": ("y.Quality", ["0x0", "0x80340000", *["0x00"] * 4], {}, [1]),
+    "Ignition 7": ("quality", [192, 500, 404, 192, 192, 900], {}, [1, 2, 5]),
+    "Ignition 8": ("y.quality", [192, -2147483132, 192, 1073742081, 0, 200], {}, [1]),
+    "in words": ("y.quality", ["Good", "Bad_Stale", "Error_IO", *["Good"] * 3], {}, [1, 2]),
+    "PI": ("y Status", [0, 0, 246, 0, 254, 0], {}, [2, 4]),
+    "PI's Good": ("Good", ["True", "False", *["True"] * 4], {}, [1]),
+    "flags of good": ("y.IsGood", [1, 0, 1, 1, 1, 0], {}, [1, 5]),
+    "mixed": ("y quality", ["192", "Bad", "0", "192", "good", "192"], {}, [1, 2]),
     "other numbers": ("Status", [0, 1, 0, 1, 0, 1], {}, []),
+    "a switch": ("Status", ["true", "false"] * 3, {}, []),
+    "always the same": ("Quality", [0] * 6, {}, []),
     "good ones that are told": ("State", list("aabbaa"), {"quality": "State", "good": "a"}, [2, 3]),
     "good numbers": ("Flag", [1, 0, 1, 1, 1, 1], {"quality": "Flag", "good": [1]}, [1]),
     "ignored": ("Quality", ["Good", *["Bad"] * 5], {"quality": None}, []),
     "of the output": ("y.Quality", ["Good", "Bad", *["Good"] * 4], {}, [1]),
+    "of the output in brackets": ("y (quality)", ["Good", "Bad", *["Good"] * 4], {}, [1]),
     "of another signal": ("z.Quality", ["Good", *["Bad"] * 5], {}, []),
 }
 
@@ -83,11 +100,72 @@ def test_samples_of_bad_quality_are_missing(tmp_path, kind):
     header, cells, asked, bad = QUALITIES[kind]
     rows = [f"{at},1,{k},{cell}" for k, (at, cell) in enumerate(zip(STAMPS, cells, strict=True))]
     path = written(tmp_path, f"Timestamp,u,y,{header}", rows)
-    record = cr.read_record(path, missing="keep", **asked)
+    said = rf"{len(bad)} of 6 samples are left out, .* in line {bad[0] + 2}" if bad else ""
+    with pytest.warns(DataWarning, match=said) if bad else nullcontext():
+        record = cr.read_record(path, missing="keep", **asked)
     assert_array_equal(np.flatnonzero(np.isnan(record.output)), bad)
     if bad:
         with pytest.raises(DataError, match=f"line {bad[0] + 2}: its quality is bad"):
             cr.read_record(path, **asked)
+
+
+PAIRED = {  # columns, and in which of them the sample 2 is missing
+    "tags": ("TIC101/OP,TIC101/OP.quality,TIC101/PV,TIC101/PV.quality", (192, 500), "output"),
+    "values": ("A/OP.value,A/OP.quality,A/PV.value,A/PV.quality", (500, 192), "input"),
+    "units": ("OP [%],OP Quality,PV [°C],PV Quality", (192, 0), "output"),
+    "other marks": ("A_OP,A.OP.Quality,A_PV,A.PV.Quality", (192, 0), "output"),
+    "side by side": ("OP,Quality,PV,Quality", (192, 0), "output"),
+    "of the loop": ("A.OP,B.Quality,A.PV,A.Quality", (192, 0), "both"),
+}
+
+
+@pytest.mark.parametrize("kind", PAIRED)
+def test_each_signal_has_its_own_quality(tmp_path, kind):
+    header, codes, missing = PAIRED[kind]
+    rows = [[at, 1 + k, 192, k, 192] for k, at in enumerate(STAMPS)]
+    rows[2][2], rows[2][4] = codes
+    path = written(tmp_path, f"t_stamp,{header}", [",".join(map(str, row)) for row in rows])
+    with pytest.warns(DataWarning, match="1 of 5 samples are left out, .* in line 4"):
+        record = cr.read_record(path, missing="keep", start=STAMPS[1], input=1, output=3)
+    for signal, first in (("input", 2.0), ("output", 1.0)):
+        expected = first + np.arange(5.0)
+        expected[1] = np.nan if missing in (signal, "both") else expected[1]
+        assert_array_equal(getattr(record, signal), expected)
+
+
+def test_codes_are_told_by_the_whole_column_and_unknown_ones_are_said(tmp_path):
+    """A stretch that is bad throughout has no good code beside it."""
+    rows = [f"{at},1,{k},{192 if k < 3 else 0}" for k, at in enumerate(STAMPS)]
+    path = written(tmp_path, "Timestamp,u,y,Quality", rows)
+    with pytest.raises(DataError, match="line 5: its quality is bad"):
+        cr.read_record(path, start=STAMPS[3])
+    rows = [f"{at},1,{k},{k % 2}" for k, at in enumerate(STAMPS)]
+    path = written(tmp_path, "Timestamp,u,y,y.Quality", rows)
+    with pytest.warns(DataWarning, match=r"codes of column 'y.Quality' are not known.*good="):
+        assert cr.read_record(path).n_missing == 0
+    with pytest.warns(DataWarning, match="3 of 6 samples are left out"):
+        assert cr.read_record(path, good=1, missing="keep").n_missing == 3
+
+
+def test_bad_zeros_do_not_become_dead_time(tmp_path):
+    """With bad samples as zeros, the dead time of 90 s was found to be 145 s."""
+    rng = np.random.default_rng(11)
+    t = 10.0 * np.arange(300)
+    u = steps(t, [(0, 40), (600, 50)])
+    y = 20 + response(t, u, 2.2, 90, (240,)) + 0.05 * rng.standard_normal(t.size)
+    bad = rng.choice(t.size, 25, replace=False)
+    quality = np.full(t.size, 192)
+    y[bad], quality[bad] = 0.0, 500
+    rows = [f"{a},{b},192,{c:.3f},{d}" for a, b, c, d in zip(stamps(t), u, y, quality, strict=True)]
+    header = "t_stamp,TIC101/OP,TIC101/OP.quality,TIC101/PV,TIC101/PV.quality"
+    path = written(tmp_path, header, rows)
+    with pytest.raises(DataError, match=r"missing='keep' leaves such samples out \(25 here\)"):
+        cr.read_record(path)
+    with pytest.warns(DataWarning, match="25 of 300 samples are left out"):
+        record = cr.read_record(path, missing="hold")
+    model = cr.fit_output_error(record, structures="FOPDT")
+    assert model.fit.dead_time == pytest.approx(90, abs=2)
+    assert model.fit.gain == pytest.approx(2.2, rel=0.01)
 
 
 @pytest.mark.parametrize("cell", ["Bad", "I/O Timeout", "No Data", "#DIV/0!", "-9999", "dead"])

@@ -54,7 +54,11 @@ _TAGS_INPUT = frozenset({"op", "mv", "co", "lmn"})
 _TAGS_OUTPUT = frozenset({"pv"})
 _TAGS_SETPOINT = frozenset({"sp", "sv"})
 """Last part of a tag, such as ``TIC101_PV`` or ``Gas valve MV``."""
-QUALITY_NAMES = frozenset({"quality", "qualität", "qualitaet", "status", "opc quality", "qual"})
+QUALITY_NAMES = frozenset(
+    {"quality", "qualität", "qualitaet", "qual", "status", "opc quality", "opcquality",
+     "quality code", "qualitycode", "quality detail", "qualitydetail", "status code",
+     "statuscode", "good", "is good", "isgood"}
+)  # fmt: skip
 _RATE_NAMES = frozenset({"fs", "sample rate", "samplerate", "sampling rate"})
 
 

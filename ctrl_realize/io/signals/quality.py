@@ -1,7 +1,27 @@
-"""Samples that are marked bad by a column of their quality, and cells without a value."""
+"""Samples that are marked bad by a column of their quality, and cells without a value.
+
+Words: ``Bad...``, and the states that historians write in place of a value. Numbers are told by the
+codes that a column has (`_bad_codes`):
+
+* OPC UA, Part 4, section 7.39 [1]_: 32 bits, of which the highest is set for bad ones; so are the
+  codes of Ignition 8, with or without sign.
+* OPC DA 3.0, section 6.8 [2]_: the lower byte is below 64 for bad ones and 192 or above for good
+  ones; the higher byte is the vendor's. Ignition 7 has codes of its own from 256 on, all of them
+  bad [3]_ (500: stale); so with a higher byte only the plain codes 192 and 216 count as good.
+* AVEVA PI: the number of a system digital state that stands in place of a value, 0 for none [4]_.
+
+References
+----------
+.. [1] OPC Foundation, OPC 10000-4: OPC Unified Architecture, Part 4: Services, 1.05, 2022.
+.. [2] OPC Foundation, Data Access Custom Interface Standard, version 3.00, 2003; the same in OPC
+   10000-8, annex A.3.2.3.
+.. [3] Inductive Automation, Ignition User Manual 7.9 and 8.1, Quality Codes and Overlays.
+.. [4] AVEVA, AF SDK Reference, AFSystemStateCode.
+"""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable
 from dataclasses import dataclass
 from numbers import Real
@@ -9,16 +29,18 @@ from typing import Any
 
 import numpy as np
 
-from ...errors import DataError, OptionError
+from ...errors import DataError, DataWarning, OptionError, warn_caller
 from ...numerics.arrays import BoolArray, FloatArray
 from ..cells import BAD_VALUES, NUMBER
 from ..columns import find_column
 from ..tables import Table
+from ..units import split_unit
 from .names import QUALITY_NAMES
 
-_GOOD_FROM, _BAD_BELOW = 192, 64
-"""Qualities of OPC DA 3.0, section 6.8: 192 and above are good, those below 64 bad."""
-_MARKS = " _./:-"
+_GOOD, _FORCED, _UNCERTAIN = 192, 216, 64
+_SYSTEM_STATES = 220  # of PI, those that are no good code of OPC DA
+Rows = np.ndarray[Any, np.dtype[np.intp]]
+_FLAGS = {"true": False, "false": True}
 
 
 @dataclass(frozen=True)
@@ -40,53 +62,87 @@ class Rules:
             return []
         if self.quality != "auto":
             return [find_column(table, self.quality, "quality")]
-        return [k for k in range(len(table.columns)) if _quality_of(table, k) is not None]
+        return list(_qualities(table))
 
-    def values(self, table: Table, index: int) -> FloatArray:
-        """Return a column as numbers, with NaN where a value is missing or bad.
+    def values(self, table: Table, index: int, rows: Rows) -> FloatArray:
+        """Return some rows of a column as numbers, with NaN where a value is missing or bad.
 
         Raises
         ------
         DataError
             A cell is no number, or a value is missing and is not to be kept.
+
+        Warns
+        -----
+        DataWarning
+            Numbers are left out for their quality, or codes are not known.
         """
-        marked = self._marked(table, index)
+        # the codes are told by those of the whole column
+        marked = self._marked(table, index)[rows]
+        table = table.rows(rows, [index])
+        title = f"{table.path}: {table.title(index)}"
         if marked.any() and not self.keep:
             row = int(np.argmax(marked))
             raise DataError(
-                f"{table.path}: {table.title(index)}, {table.place(row)}: its quality is bad; "
-                "missing='keep' leaves such samples out, quality=None ignores the quality"
+                f"{title}, {table.place(row)}: its quality is bad; missing='keep' leaves such "
+                f"samples out ({np.sum(marked)} here), quality=None ignores the quality"
             )
         values = table.numbers(
             index, keep_missing=self.keep, words=frozenset(self.missing), ignored=marked
         )
-        return np.where(marked, np.nan, values) if marked.any() else values
+        if not marked.any():
+            return values
+        warn_caller(
+            f"{title}: {np.sum(marked)} of {marked.size} samples are left out, since their quality "
+            f"is bad, the first in {table.place(int(np.argmax(marked)))}; quality=None keeps them",
+            DataWarning,
+        )
+        return np.where(marked, np.nan, values)
 
     def _marked(self, table: Table, index: int) -> BoolArray:
         """Rows in which the quality of a column is bad."""
         out = np.zeros(table.columns[index].cells.size, dtype=bool)
+        own, tags = _tags(table.columns[index].name), _qualities(table)
+        everyone = {tag for one in table.columns for tag in _tags(one.name)}
         for column in self.columns(table):
-            if self.quality == "auto" and _quality_of(table, column) not in (
-                "", plain_tag(table.columns[index].name),
-            ):  # fmt: skip
+            tag = "" if self.quality != "auto" else tags[column]
+            # TIC101.quality is that of TIC101.PV where there is no TIC101 itself
+            if tag and tag not in own and (tag in everyone or not own[0].startswith(f"{tag} ")):
                 continue
             cells = table.columns[column].cells
-            out |= self._bad(cells) if cells.size == out.size else False
+            if cells.size == out.size:
+                name = table.columns[column].name.lower()
+                bad = self._bad(cells, name)
+                if bad is not None:
+                    out |= bad
+                elif len(set(cells.tolist())) > 1 and "status" not in name:
+                    warn_caller(
+                        f"{table.path}: the codes of {table.title(column)} are not known, such as "
+                        f"{cells[0]}; good= tells the good ones, quality=None ignores them",
+                        DataWarning,
+                    )
         return out
 
-    def _bad(self, cells: np.ndarray[Any, np.dtype[Any]]) -> BoolArray:
+    def _bad(self, cells: np.ndarray[Any, np.dtype[Any]], name: str) -> BoolArray | None:
+        """Which cells are bad; None if they say nothing."""
+        import pandas as pd
+
+        place, kinds = pd.factorize(cells, use_na_sentinel=False)
+        bad = self._bad_kinds([str(kind).strip().casefold() for kind in kinds], name)
+        return None if bad is None else bad[place]
+
+    def _bad_kinds(self, words: list[str], name: str) -> BoolArray | None:
+        codes = np.array([_code(word) for word in words])
         if self.good:
-            numbers = {float(word) for word in self.good if NUMBER["."].fullmatch(word)}
-            if cells.dtype.kind in "biuf":
-                return ~np.isin(cells, list(numbers))
-            words = {word.casefold() for word in self.good}
-            return np.array([str(cell).strip().casefold() not in words for cell in cells], bool)
-        if cells.dtype.kind in "iuf":
-            codes = np.nan_to_num(cells.astype(np.float64))
-            # other numbers, such as a count or a flag of 0 and 1, say nothing by themselves
-            are_codes = bool(np.max(codes, initial=0) >= _GOOD_FROM)
-            return np.asarray(codes < _BAD_BELOW) & are_codes
-        return np.array([_is_bad(str(cell)) for cell in cells], dtype=bool)
+            good = [word.casefold() for word in self.good]
+            numbers = [_code(word) for word in good]
+            return ~(np.isin(codes, numbers) | np.array([word in good for word in words], bool))
+        flags = {} if "status" in name else _FLAGS
+        bad = np.array([flags.get(word, _is_bad(word)) for word in words], dtype=bool)
+        if np.isnan(codes).all():
+            return bad
+        by_code = codes == 0 if "good" in name else _bad_codes(codes)
+        return by_code if by_code is None else by_code | bad
 
 
 def rules_of(keep: bool, na_values: object, quality: str | int | None, good: object) -> Rules:
@@ -103,25 +159,54 @@ def rules_of(keep: bool, na_values: object, quality: str | int | None, good: obj
     return Rules(keep, _words(na_values, "na_values"), quality, _words(good, "good"))
 
 
-def plain_tag(name: str) -> str:
-    """Reduce a tag for comparison: all of its parts, without a unit and capital letters."""
-    return " ".join(name.partition("[")[0].lower().split())
+def _plain(name: str) -> str:
+    """Reduce a tag for comparison: all of its parts, without marks between them."""
+    return " ".join(re.sub(r"[^\w%°]|_", " ", name.lower()).split())
 
 
-def _quality_of(table: Table, index: int) -> str | None:
-    """Signal whose quality a column holds: "" for all of them, None if it holds none."""
-    name = plain_tag(table.columns[index].name)
-    for word in sorted(QUALITY_NAMES, key=len, reverse=True):
-        if name == word:
-            return ""
-        if name.endswith(word) and name[-len(word) - 1] in _MARKS:
-            return name[: -len(word)].rstrip(_MARKS)
-    return None
+def _tags(name: str) -> list[str]:
+    """Names of a signal, with and without its unit and the word value at its end."""
+    return [re.sub(r" val(ue)?$", "", _plain(one)) for one in (split_unit(name)[0], name)]
 
 
-def _is_bad(cell: str) -> bool:
-    word = cell.strip().lower()
-    return word in BAD_VALUES or word.startswith("bad")
+def _qualities(table: Table) -> dict[int, str]:
+    """Columns of qualities and the signal of each: "" for all of them."""
+    found: dict[int, str] = {}
+    for k, column in enumerate(table.columns):
+        name = _plain(column.name)
+        for word in sorted(QUALITY_NAMES, key=len):
+            if name == word or name.endswith(f" {word}"):
+                found[k] = name.removesuffix(word).strip()
+    bare = [k for k, tag in found.items() if not tag]
+    if len(bare) > 1:
+        # each stands at the right of its signal
+        found |= {k: _tags(table.columns[max(k - 1, 0)].name)[0] for k in bare}
+    return found
+
+
+def _code(word: str) -> float:
+    """Number of a code, decimal or hexadecimal; NaN if it is none."""
+    if re.fullmatch(r"0x[0-9a-f]{1,8}", word):
+        return float(int(word, 16))
+    return float(word) if NUMBER["."].fullmatch(word) else np.nan
+
+
+def _bad_codes(codes: FloatArray) -> BoolArray | None:
+    """Which codes are bad, by the system that has such codes; None if there is none."""
+    if not np.all(np.isnan(codes) | (np.trunc(codes) == codes) & (np.abs(codes) < 2**32)):
+        return None
+    whole = np.nan_to_num(codes).astype(np.int64)
+    if np.any(np.abs(whole) >= 2**16):
+        return np.asarray(whole >> 31 & 1 == 1)
+    low = whole & 0xFF
+    if np.any((low >= _GOOD) & (low < _SYSTEM_STATES)):
+        vendors = (whole > 0xFF) & (low != _GOOD) & (low != _FORCED)
+        return ~np.isnan(codes) & ((whole < _UNCERTAIN) | vendors)
+    return np.asarray(whole != 0) if np.any(whole >= _SYSTEM_STATES) else None
+
+
+def _is_bad(word: str) -> bool:
+    return word in BAD_VALUES or word.startswith(("bad", "error"))
 
 
 def _words(given: object, name: str) -> tuple[str, ...]:

@@ -20,9 +20,7 @@ from ..time_column import TimeAxis, time_axis
 from ..units import plain_unit
 from .long_format import LongTable
 from .names import Parts
-from .quality import Rules
-
-Rows = np.ndarray[Any, np.dtype[np.intp]]
+from .quality import Rows, Rules
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,13 +85,11 @@ def wide_samples(
     table: Table, parts: Parts, seconds: FloatArray, rows: Rows, rules: Rules
 ) -> Samples:
     """Samples in some rows of a table with a column for each signal."""
-    used = [*parts.inputs, *parts.outputs, *rules.columns(table)]
-    part = table.rows(rows, used)
     input, output = (
-        _stacked([rules.values(part, k) for k in chosen])
+        _stacked([rules.values(table, k, rows) for k in chosen])
         for chosen in (parts.inputs, parts.outputs)
     )
-    return Samples(seconds, input, output, None, part.place)
+    return Samples(seconds, input, output, None, table.rows(rows, []).place)
 
 
 def long_samples(
@@ -147,8 +143,7 @@ def _series(
         before = np.flatnonzero(seconds[rows] < first)
         inside[before[-1:]] = True
     rows = rows[inside]
-    part = table.rows(rows, [long.value, *rules.columns(table)])
-    values = rules.values(part, long.value)
+    values = rules.values(table, long.value, rows)
     known = ~np.isnan(values)  # a sample without a value is no sample
     return np.maximum(seconds[rows][known], first), values[known]
 
