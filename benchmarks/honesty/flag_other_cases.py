@@ -95,6 +95,25 @@ def frf_of(
     return cr.MeasuredFRF(clean + std * error, f, std=std)
 
 
+def with_small_modes(seed: int, size: float = 0.02) -> cr.MeasuredFRF:
+    """Two resonances, a lag and 2 ms, with three modes of a few per cent that may be no plant's."""
+    rng = np.random.default_rng([seed, 5])
+    f = np.linspace(10, 250, 50)
+    s = 2j * np.pi * f
+
+    def pair(hz: float, damping: float) -> np.ndarray:
+        w = 2 * np.pi * hz
+        return w**2 / (s * s + 2 * damping * w * s + w * w)
+
+    small = sum(
+        size * s * 0.08 / (2 * np.pi * hz) * pair(hz, 0.04)
+        for hz in np.array([40, 130, 220]) * rng.uniform(0.9, 1.1, 3)
+    )
+    noise = 0.001 * (rng.standard_normal(50) + 1j * rng.standard_normal(50))
+    plant = np.exp(-0.002 * s) / (s / (10 * np.pi) + 1) * pair(85, 0.3) * pair(180, 0.1)
+    return cr.MeasuredFRF(plant * (1 + small + noise), f)
+
+
 def frf_fit(frf: cr.MeasuredFRF, order: object = None, **options: object) -> Codes:
     return codes(cr.fit_frf(frf, order, **options).fit)
 
@@ -311,6 +330,8 @@ CASES: list[FlagCase] = [
              lambda s: frf_fit(_r2(s, _noise(s)), max_dead_time=0.02)),
     _fit_frf("phase_leads", "0.2 s of lead",
              lambda s: frf_fit(_r2(s, _noise(s), delay=-0.2))),
+    _fit_frf("systematic_error", "order 5 or 10, three modes of 2 %",
+             lambda s: frf_fit(with_small_modes(s), (5, 10))),
     _fit_frf("structures_disagree", "R4 to 5 Hz, noise 1 and 2 %",
              lambda s: frf_fit(frf_of(rigs.R4, s, _noise(s, HIGH), band=(0.1, 5.0))),
              "R1 to 40 Hz, noise 0.1 %", lambda s: frf_fit(frf_of(rigs.R1, s, 0.001))),

@@ -14,6 +14,7 @@ from ..delayed import DelayedStateSpace
 from ..errors import DataError, OptionError, OrderError
 from ..numerics.arrays import FloatArray
 from ..numerics.blas_threads import single_threaded
+from ..numerics.rational.error_floor import fit_with_floor
 from ..numerics.rational.fit import FRFData
 from ..numerics.rational.search import DEFAULT_ORDERS, dead_time_bound, fit_structures
 from ..numerics.rational.spectra import hold_response
@@ -49,8 +50,9 @@ def fit_frf(
     frf : MeasuredFRF
         One input, one output. Any `control.FrequencyResponseData`.
     order : int or sequence of int, optional
-        Number of poles, or candidates; default 1 to 4, and more (up to 10) as long as the largest
-        is the best.
+        Number of poles, or candidates; default 1 to 4, or as many as the points determine, and more
+        (up to 10) as long as the largest is the best or dynamics are missing: where more than a
+        tenth of the response is left and the residual is correlated along frequency.
     relative_degree : int or sequence of int, optional
         Poles minus zeros, or candidates; default 1 to the order. With 0 the dead time is rounded to
         whole samples of the model.
@@ -63,7 +65,9 @@ def fit_frf(
     weighting : {"auto", "std", "relative", "uniform"}
         "std": the FRF's standard deviation. "relative": an error proportional to the response,
         weighted by the coherence if there is one. "uniform": the same error everywhere. "auto":
-        "std" if there is one, otherwise "relative".
+        "std" if there is one, otherwise "relative"; if that explains less than nine tenths of the
+        response, as where noise hides an anti-resonance, with a floor that is estimated from the
+        residuals of "uniform".
     hold : {"auto", "zoh", None}
         "zoh": the FRF was estimated from samples of a held input. The hold is divided out (`dt`
         must be its sample time if the FRF has none), and points near the Nyquist frequency, where
@@ -97,7 +101,9 @@ def fit_frf(
     If the noise is not known, the standard deviations of the poles are computed from the residuals
     of the individual points [3]_: poles that depend on a noisy part of the band are more uncertain.
 
-    The flag ``"phase_leads"`` reports an FRF whose time axis starts late.
+    The flag ``"phase_leads"`` reports an FRF whose time axis starts late, ``"systematic_error"``
+    that poles beyond the fourth describe what may be an error of all points of unknown noise; the
+    interval then covers lower orders within 3 % too.
 
     The interval is that of the profile likelihood, widened if residuals are larger than the noise
     or correlated along frequency, joined with that of the mixture of all structures with weights
@@ -141,7 +147,7 @@ def fit_frf(
             sigma = np.hypot(sigma, np.abs(response) * (frequency / (1 / held - frequency)) ** 2)
     orders = _candidates(order, "order", 1)
     degrees = _candidates(relative_degree, "relative_degree", 0)
-    _check_structures(orders, degrees, frequency.size)
+    orders = _within_points(orders, degrees, frequency.size)
     shortest = 1 / (_SAMPLES_PER_SHORTEST_PERIOD * float(frequency[-1]))
     sample_time = step or sampled_every(frf) or shortest
     omega = 2 * np.pi * frequency
@@ -159,7 +165,11 @@ def fit_frf(
         weight=size / sigma,
         max_dead_time=longest * unit,
     )
-    fits = fit_structures(data, orders, degrees)
+    if points.assumed:
+        data, fits = fit_with_floor(data, orders, degrees)
+        sigma = size / data.weight
+    else:
+        fits = fit_structures(data, orders, degrees)
     used = replace(points, response=response, sigma=sigma)
     return chosen_model(frf, data, fits, used, unit, size, sample_time, held, name)
 
@@ -196,20 +206,28 @@ def _candidates(given: int | Sequence[int] | None, name: str, low: int) -> tuple
         raise OrderError(str(error)) from error
 
 
-def _check_structures(
+def _within_points(
     orders: tuple[int, ...] | None, degrees: tuple[int, ...] | None, n_points: int
-) -> None:
-    """Refuse relative degrees above all orders, and more parameters than points."""
-    tried = orders or DEFAULT_ORDERS
-    pairs = [(n, r) for n in tried for r in (degrees or range(1, n + 1)) if r <= n]
-    if not pairs:
+) -> tuple[int, ...] | None:
+    """Orders to try: those given, of the default ones those that so many points determine.
+
+    A model has ``2 n + 2 - r`` parameters, half of the numbers in as many complex points.
+    """
+    tried = orders or tuple(DEFAULT_ORDERS)
+    needed = {
+        n: max(2 * n + 2 - r for r in degrees or range(1, n + 1) if r <= n)
+        for n in tried
+        if degrees is None or min(degrees) <= n
+    }
+    if not needed:
         raise OrderError(
-            f"relative_degree={degrees} is above order={orders or tuple(tried)}; expected at "
-            "most the order"
+            f"relative_degree={degrees} is above order={tried}; expected at most the order"
         )
-    needed = max(2 * n + 2 - r for n, r in pairs)
-    if n_points < needed:
+    possible = tuple(n for n in needed if needed[n] <= n_points)
+    if (orders is not None and len(possible) < len(needed)) or not possible:
+        lowest = f"; {n_points} points suffice for order {max(possible)}" if possible else ""
         raise DataError(
-            f"{n_points} points are too few for order {max(tried)}; expected at least "
-            f"{needed}, or a lower order"
+            f"{n_points} points are too few for order {max(needed)}; expected at least "
+            f"{max(needed.values()) if orders else min(needed.values())}{lowest}"
         )
+    return orders if len(possible) == len(needed) else possible

@@ -65,7 +65,8 @@ class FRFFit(FractionalDelayFit):
     measured : ndarray of complex, shape (K,)
         Points that were fitted; the hold of a sampled FRF was divided out.
     sigma : ndarray, shape (K,)
-        Standard deviation used as weight of each point; a relative one if the FRF had none.
+        Standard deviation used as weight of each point; if the FRF had none a relative one, with a
+        floor where that explains little.
     noise_known : bool
         Whether `sigma` is the measured standard deviation.
     weighted_rms : float

@@ -29,13 +29,15 @@ _WIDEST = 1e15
 class FRFPoints:
     """Increasing frequencies, responses, and standard deviations up to a factor.
 
-    `noise_known` says that `sigma` is the measured standard deviation itself.
+    `noise_known` says that `sigma` is the measured standard deviation itself, `assumed` that it is
+    proportional to the response because nothing is known about it.
     """
 
     frequency_hz: FloatArray
     response: ComplexArray
     sigma: FloatArray
     noise_known: bool
+    assumed: bool = False
 
 
 def frf_points(
@@ -76,7 +78,8 @@ def frf_points(
     sigma, known = _sigma(points.response, points.std, points.coherence, weighting)
     if known:
         _check_signal(points.response, sigma)
-    return FRFPoints(points.frequency_hz, points.response, sigma, known)
+    assumed = weighting == "auto" and not known and points.coherence is None
+    return FRFPoints(points.frequency_hz, points.response, sigma, known, assumed)
 
 
 def _check_signal(response: ComplexArray, sigma: FloatArray) -> None:

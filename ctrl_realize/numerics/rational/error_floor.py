@@ -1,0 +1,114 @@
+"""Errors of frequency points of which nothing is known: a part of the response and a floor.
+
+An error in proportion to the response would be none at an anti-resonance, whose few points then
+outweigh all others; a floor is an error that is the same everywhere, as of a noisy sensor. Both are
+variances of the complex error, estimated from residuals by maximum likelihood [1]_ (a regression of
+variances, [2]_).
+
+References
+----------
+.. [1] R. Pintelon and J. Schoukens, System Identification: A Frequency Domain Approach, 2nd ed.,
+   Wiley 2012, chapter 9, doi:10.1002/9781118287422.
+.. [2] M. Davidian and R. J. Carroll, Variance function estimation, J. Amer. Statist. Assoc. 82
+   (1987) 1079-1091, doi:10.1080/01621459.1987.10478543.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from ..arrays import FloatArray
+from .fit import FRFData, RationalFit
+from .model import project
+from .search import (
+    MISSING,
+    correlation_cost,
+    fit_structures,
+    information_criteria,
+    unexplained,
+)
+
+_EVIDENCE = 5.0
+"""Logarithm of the likelihood ratio from which on there is a floor: "very strong" (Kass and Raftery
+1995)."""
+_TRIED = 100  # floors over the range of the response: 10 % apart over four decades
+
+
+def fit_with_floor(
+    data: FRFData, orders: Sequence[int] | None, degrees: Sequence[int] | None
+) -> tuple[FRFData, dict[tuple[int, int], RationalFit]]:
+    """Fit all structures to points with relative weights; with a floor if that explains nothing.
+
+    What the errors are is then seen in a fit with uniform weights.
+
+    Returns
+    -------
+    data : FRFData
+        With the weights that were used.
+    fits : dict
+    """
+    fits = fit_structures(data, orders, degrees)
+    if unexplained(data, _best(data, fits)) <= MISSING:
+        return data, fits
+    uniform = replace(data, weight=np.ones(data.s.size))
+    best = _best(uniform, fit_structures(uniform, orders, degrees))
+    floor = error_floor(*_errors(uniform, best))
+    if floor == 0:
+        return data, fits
+    other = replace(data, weight=1 / np.hypot(np.abs(data.response), floor))
+    again = fit_structures(other, orders, degrees)
+    # A part of the response that the model does not follow is no noise.
+    return (other, again) if correlation_cost(other, _best(other, again)) == 1.0 else (data, fits)
+
+
+def _best(data: FRFData, fits: dict[tuple[int, int], RationalFit]) -> RationalFit:
+    criteria = information_criteria(data, fits)
+    return fits[min(criteria, key=lambda key: criteria[key])]
+
+
+def _errors(data: FRFData, fit: RationalFit) -> tuple[FloatArray, FloatArray]:
+    """Magnitudes of a model and of its residual, shapes (K,)."""
+    found = project(
+        data.s, data.response, data.weight, fit.theta, fit.order, fit.numerator.size
+    ).residual
+    residual = (found[: data.s.size] + 1j * found[data.s.size :]) / data.weight
+    return np.abs(data.response - residual), np.abs(residual)
+
+
+def error_floor(size: FloatArray, residual: FloatArray) -> float:
+    """Estimate the floor of the error, over the part of the response that it is elsewhere.
+
+    Parameters
+    ----------
+    size : ndarray, shape (K,)
+        Magnitude of the response.
+    residual : ndarray, shape (K,)
+        Magnitude of the error.
+
+    Returns
+    -------
+    float
+        Size of the response at which both are equal; 0 if the data show no floor.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> size = np.geomspace(1e-3, 1, 200)
+    >>> error = np.abs(np.random.default_rng(0).standard_normal((200, 2)) @ [1, 1j])
+    >>> print(f"{error_floor(size, error * np.hypot(size, 0.1)):.2f}")
+    0.11
+    >>> error_floor(size, error * size)
+    0.0
+    """
+    power, square = size**2, residual**2
+    least = max(float(power.min()), 1e-12 * float(power.max()))
+    tried = np.concatenate([[0.0], np.geomspace(least, max(float(power.max()), least), _TRIED)])
+    variance = np.maximum(power + tried[:, None], np.finfo(float).tiny)
+    # Squares of complex Gaussian errors are exponential; the common factor is eliminated.
+    cost = np.log(np.maximum(np.mean(square / variance, axis=1), np.finfo(float).tiny))
+    cost = size.size * cost + np.log(variance).sum(axis=1)
+    best = int(np.argmin(cost))
+    return float(np.sqrt(tried[best])) if cost[0] - cost[best] > _EVIDENCE else 0.0
