@@ -169,6 +169,12 @@ TimeUnit = Annotated[str | None, _OPTION(help="s, ms, us, ns, min, h or day.")]
 TimeFormat = Annotated[
     str | None, _OPTION(help="Format of dates, such as '%d.%m.%Y %H:%M:%S'. Default: detected.")
 ]
+TimeZone = Annotated[
+    str | None, _OPTION(help="Zone of a clock that has summer time, such as Europe/Berlin.")
+]
+Wrap = Annotated[
+    float | None, _OPTION(help="Number of values of a counter that starts again: its turns join.")
+]
 From = Annotated[str | None, _OPTION("--from", help="First time to use, in s or as a date.")]
 To = Annotated[str | None, _OPTION("--to", help="Last time to use, in s or as a date.")]
 MissingOption = Annotated[
@@ -243,9 +249,9 @@ _ANY_FILE: dict[str, Any] = {
 }  # fmt: skip
 _RECORD: dict[str, Any] = {
     "time": Time, "input": Input, "output": OutputColumn, "dt": Dt, "time_unit": TimeUnit,
-    "time_format": TimeFormat, "start": From, "stop": To, "missing": MissingOption,
-    "na_values": NaValues, "quality": Quality, "good": Good, "resample": Resample, "rest": Rest,
-    **_ANY_FILE,
+    "time_format": TimeFormat, "time_zone": TimeZone, "start": From, "stop": To,
+    "missing": MissingOption, "na_values": NaValues, "quality": Quality, "good": Good,
+    "wrap": Wrap, "resample": Resample, "rest": Rest, **_ANY_FILE,
 }  # fmt: skip
 GROUPS: dict[str, dict[str, Any]] = {
     "chosen": {

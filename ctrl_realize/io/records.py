@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import inspect
 import os
-import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -19,6 +18,7 @@ from ..errors import DataError, OptionError, TimeAxisError
 from .checks import MAX_BYTES
 from .columns import Selector, find_columns
 from .read import read_table
+from .signals.advice import explained, tell_counters
 from .signals.long_format import long_table, tags_as_columns
 from .signals.names import choose_columns
 from .signals.quality import Rules, rules_of
@@ -33,7 +33,7 @@ from .signals.samples import (
 )
 from .tables import Table
 from .text_options import TextOptions
-from .time_column import time_axis
+from .time_column import Clock, time_axis
 
 _JUMP = 10.0
 """Length of a jump of time that separates two tests, in usual steps; missing samples of one test
@@ -49,6 +49,7 @@ def read_record(
     dt: float | None = None,
     time_unit: str = "auto",
     time_format: str | None = None,
+    time_zone: str | None = None,
     delimiter: str = "auto",
     decimal: str = "auto",
     encoding: str = "auto",
@@ -62,6 +63,7 @@ def read_record(
     na_values: Any = None,
     quality: str | int | None = "auto",
     good: Any = None,
+    wrap: float | None = None,
     resample: bool = False,
     rest: Sequence[Any] | None = None,
     name: str | None = None,
@@ -93,6 +95,9 @@ def read_record(
     time_format : str, optional
         Format of dates, as for `datetime.strptime`. Default: ISO 8601 or, where the cells tell, the
         order of day and month.
+    time_zone : str, optional
+        Zone of a clock that has summer time, such as ``"Europe/Berlin"``: the hour that comes twice
+        and the one that is left out are put right. Dates in `start` and `stop` are of that zone.
     delimiter, decimal, encoding, comment : str, optional
         Format of text; ``"auto"``: determined from the first lines.
     header : bool or "auto", optional
@@ -119,6 +124,9 @@ def read_record(
     good : str, float or sequence of them, optional
         Good qualities. Default: all but ``Bad...`` and the bad codes of OPC DA (below 64), OPC UA
         (bit 31), Ignition (500, ...) and AVEVA PI (states such as 246).
+    wrap : float, optional
+        Number of values of a counter that starts again, such as 4096 for 12 bits or 360 for an
+        angle: the turns of the output are joined, as by `numpy.unwrap`.
     resample : bool, optional
         Resample samples with time jitter onto a uniform time axis, see `Record.resampled`.
     rest : (float, float), optional
@@ -151,7 +159,8 @@ def read_record(
     -----
     DataWarning
         Only a part could be used: samples of bad quality are left out, or the last line, which is
-        incomplete as if writing was interrupted; or codes of qualities are not known.
+        incomplete as if writing was interrupted; or codes of qualities are not known, or the output
+        jumps like a counter that starts again.
 
     See Also
     --------
@@ -171,10 +180,11 @@ def read_record(
     """
     how = _Reading(
         time=time, input=input, output=output, dt=dt, time_unit=time_unit,
-        time_format=time_format, delimiter=delimiter, decimal=decimal, encoding=encoding,
-        comment=comment, header=header, skip_rows=skip_rows, variable=variable, start=start,
-        stop=stop, missing=missing, na_values=na_values, quality=quality, good=good,
-        resample=resample, rest=rest, name=name, max_bytes=max_bytes,
+        time_format=time_format, time_zone=time_zone, delimiter=delimiter, decimal=decimal,
+        encoding=encoding, comment=comment, header=header, skip_rows=skip_rows,
+        variable=variable, start=start, stop=stop, missing=missing, na_values=na_values,
+        quality=quality, good=good, wrap=wrap, resample=resample, rest=rest, name=name,
+        max_bytes=max_bytes,
     )  # fmt: skip
     table = read_table(path, how.text, variable=variable, max_bytes=max_bytes)
     return _record(table, how, Path(path).stem if name is None else name)
@@ -243,6 +253,7 @@ class _Reading:
     dt: float | None
     time_unit: str
     time_format: str | None
+    time_zone: str | None
     delimiter: str
     decimal: str
     encoding: str
@@ -256,6 +267,7 @@ class _Reading:
     na_values: Any
     quality: str | int | None
     good: Any
+    wrap: float | None
     resample: bool
     rest: Sequence[Any] | None
     name: str | None
@@ -264,6 +276,8 @@ class _Reading:
     def __post_init__(self) -> None:
         if self.dt is not None:
             positive(self.dt, "dt", "sample time in s")
+        if self.wrap is not None:
+            positive(self.wrap, "wrap", "number of values of a counter")
         if self.treatment != "refuse" and self.resample:
             raise OptionError(
                 f"missing={self.missing!r} and resample=True exclude each other: expected one of "
@@ -280,6 +294,11 @@ class _Reading:
         """How missing samples are treated."""
         return one_of(self.missing, "missing", ("refuse", "keep", "hold"))
 
+    @property
+    def clock(self) -> Clock:
+        """How to read time."""
+        return Clock(self.time_unit, self.time_format, self.time_zone)
+
     @cached_property
     def text(self) -> TextOptions:
         """How to read text."""
@@ -295,52 +314,44 @@ class _Reading:
 
 def _record(table: Table, how: _Reading, name: str, taken: Sequence[int] = ()) -> Record:
     """Make a record of a table; columns that are `taken` are no signals."""
-    samples, labels = _samples(table, how, taken)
+    samples, labels, dated = _samples(table, how, taken)
     labels["name"] = name
+    if how.wrap is not None:
+        samples = samples.joined(how.wrap)
+    else:
+        tell_counters(table.path, samples)
     try:
         record = samples.record(
             labels, keep=how.rules.keep, holds=how.treatment == "hold", resample=how.resample
         )
     except TimeAxisError as error:
-        raise TimeAxisError(_explained(error, table, samples)) from error
+        raise TimeAxisError(explained(error, table, samples, dated)) from error
     except DataError as error:
         raise DataError(f"{table.path}: {error}") from error
     return record if how.rest is None else record.with_baseline(*how.rest)
 
 
-def _samples(table: Table, how: _Reading, taken: Sequence[int]) -> tuple[Samples, dict[str, Any]]:
+def _samples(
+    table: Table, how: _Reading, taken: Sequence[int]
+) -> tuple[Samples, dict[str, Any], bool]:
+    """Samples, their labels, and whether the clock shows dates of no known zone."""
     long = long_table(table, how.time, (how.input, how.output))
     if long is not None:
-        axis = time_axis(table, long.time, how.time_unit, how.time_format)
+        axis = time_axis(table, long.time, how.clock)
         tags = tags_as_columns(table, long)
         parts = choose_columns(tags, None, how.input, how.output, 1.0)
         span = span_of(how.start, how.stop, axis)
         samples = long_samples(table, long, parts, axis, span, how.rules)
         check_part(table.path, span, samples.time, axis)
-        return samples, labels_of(tags, parts, axis.unit)
+        return samples, labels_of(tags, parts, axis.unit), axis.may_be_set
     taken = [*taken, *how.rules.columns(table)]
     parts = choose_columns(table, how.time, how.input, how.output, how.dt, taken)
-    axis, rows = wide_axis(table, parts, how.time_unit, how.time_format)
+    axis, rows = wide_axis(table, parts, how.clock)
     span = span_of(how.start, how.stop, axis)
     inside = (axis.seconds >= span[0]) & (axis.seconds <= span[1])
     check_part(table.path, span, axis.seconds[inside], axis)
     samples = wide_samples(table, parts, axis.seconds[inside], rows[inside], how.rules)
-    return samples, labels_of(table, parts, axis.unit)
-
-
-def _explained(error: TimeAxisError, table: Table, samples: Samples) -> str:
-    """Message of a fault of the time axis, with its place in the file and what helps."""
-    row = re.search(r"row (\d+)", str(error))
-    place = f" ({samples.place(int(row[1]))})" if row else ""
-    # many repeated time stamps: the samples are faster than the resolution of the clock
-    steps = np.diff(samples.time)
-    if np.mean(steps == 0) > 0.2:
-        advice = "; the clock is coarser than the sample time, give dt= instead"
-    elif np.any(steps < 0):
-        advice = "; if the file has several tests, read them with read_records(path, by=)"
-    else:
-        advice = "; missing='keep' takes the samples as they are"
-    return f"{table.path}{place}: {error}{advice}"
+    return samples, labels_of(table, parts, axis.unit), axis.may_be_set
 
 
 def _tests(
@@ -361,8 +372,10 @@ def _tests(
             f"{table.path} has no time whose jumps would separate tests; give by=, the column "
             "that tells them apart"
         )
-    seconds = time_axis(table, parts.time, how.time_unit, how.time_format, parts.date).seconds
+    seconds = time_axis(table, parts.time, how.clock, parts.date).seconds
     steps = np.diff(seconds)
+    if np.sum(steps < 0) > steps.size / 2:  # the newest sample comes first
+        steps = -steps
     usual = float(np.median(np.abs(steps))) if steps.size else 0.0
     cuts = np.flatnonzero((steps < 0) | (steps > _JUMP * usual)) + 1
     groups = np.split(np.arange(seconds.size), cuts)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, NoReturn
 
 import numpy as np
 
@@ -12,7 +12,7 @@ from ..errors import DataError, OptionError
 from ..numerics.arrays import FloatArray
 from .columns import holds_numbers
 from .tables import Table
-from .text.dates import stamps_of
+from .text.dates import have_offset, in_utc, stamps_of
 from .units import checked_time_unit, plain_unit, sample_time_unit, to_seconds, unit_named
 
 # from here on neighbouring integers are the same double
@@ -34,18 +34,31 @@ _AS_STATED = 0.01  # relative difference of the usual step from the sample time 
 class TimeAxis(NamedTuple):
     """Time in s, and the date of second 0 where the column has dates.
 
-    ``doubt`` tells if that may be another date; ``unit`` is that of numbers in the file.
+    ``doubt`` tells if that may be another date; ``unit`` is that of numbers in the file. With a
+    ``zone``, the date is in UTC.
     """
 
     seconds: FloatArray
     start: np.datetime64 | None = None
     doubt: str = ""
     unit: str = ""
+    zone: str | None = None
+
+    @property
+    def may_be_set(self) -> bool:
+        """Whether the column has dates and times of a clock that may be put forward and back."""
+        return self.start is not None and self.zone is None
 
 
-def time_axis(
-    table: Table, index: int, unit: str, time_format: str | None, date: int | None = None
-) -> TimeAxis:
+class Clock(NamedTuple):
+    """How a column of time is written: unit of numbers, format of dates, and zone of the clock."""
+
+    unit: str
+    form: str | None
+    zone: str | None
+
+
+def time_axis(table: Table, index: int, clock: Clock, date: int | None = None) -> TimeAxis:
     """Return the time column in s; dates and times of day are relative to the first row.
 
     Parameters
@@ -53,10 +66,10 @@ def time_axis(
     table : Table
     index : int
         Position of the time column.
-    unit : str
-        Unit of numbers, or ``"auto"``: that of the header, otherwise s, which is `ASSUMED`.
-    time_format : str or None
-        Format of dates (as for `datetime.strptime`), if it cannot be inferred from the cells.
+    clock : Clock
+        Unit of numbers, or ``"auto"``: that of the header, otherwise s, which is `ASSUMED`; format
+        of dates (as for `datetime.strptime`), if it cannot be inferred from the cells; zone of a
+        clock that has summer time.
     date : int, optional
         Position of a column with the dates of times of day.
 
@@ -68,13 +81,17 @@ def time_axis(
         Not a unit of time, or dates whose day and month cannot be distinguished.
     """
     cells = table.columns[index].cells
+    unit, time_format, zone = clock
     if cells.dtype.kind in "mM":
-        return _since_first(table, index, cells)
+        return _since_first(table, index, cells, zone)
     named = table.columns[index].unit or unit_named(table.columns[index].name)
     if time_format is not None or not holds_numbers(table, index):
         unit_used = named if unit == "auto" else unit
         stamps, doubt = _parsed_dates(table, index, time_format, unit_used, date)
-        return _since_first(table, index, stamps)._replace(doubt=doubt)
+        shown = None if have_offset(str(cells[0]).strip()) else zone
+        return _since_first(table, index, stamps, shown)._replace(doubt=doubt, zone=zone)
+    if zone is not None:
+        _refuse_zone(table, index, zone)
     unknown = unit == "auto" and not named
     if unknown:
         _check_epoch(table, index, cells)
@@ -141,7 +158,16 @@ def _check_day_count(table: Table, index: int, values: FloatArray) -> None:
     )
 
 
-def _since_first(table: Table, index: int, stamps: np.ndarray[Any, Any]) -> TimeAxis:
+def _refuse_zone(table: Table, index: int, zone: str) -> NoReturn:
+    raise OptionError(
+        f"time_zone={zone!r}: {table.title(index)} of {table.path} has no dates; expected dates "
+        "with the time of day"
+    )
+
+
+def _since_first(
+    table: Table, index: int, stamps: np.ndarray[Any, Any], zone: str | None
+) -> TimeAxis:
     missing = np.isnat(stamps)
     if missing.any():
         row = int(np.argmax(missing))
@@ -150,8 +176,15 @@ def _since_first(table: Table, index: int, stamps: np.ndarray[Any, Any]) -> Time
         )
     if not stamps.size:
         return TimeAxis(np.empty(0), None)
+    if zone is not None:
+        if stamps.dtype.kind != "M":
+            _refuse_zone(table, index, zone)
+        try:
+            stamps = in_utc(stamps, zone)
+        except (DataError, OptionError) as error:
+            raise type(error)(f"{table.path}: {table.title(index)}: {error}") from error
     seconds = np.asarray((stamps - stamps[0]) / np.timedelta64(1, "ns") / 1e9, dtype=np.float64)
-    return TimeAxis(seconds, stamps[0] if stamps.dtype.kind == "M" else None)
+    return TimeAxis(seconds, stamps[0] if stamps.dtype.kind == "M" else None, zone=zone)
 
 
 def _parsed_dates(

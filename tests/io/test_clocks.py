@@ -1,14 +1,16 @@
-"""What the numbers of a time column mean: their unit, where it stands, and how times are said."""
+"""What a time column means: its unit, its zone, how times are said; and counters that turn."""
 
 import re
 
 import numpy as np
+import pandas as pd
 import pytest
 from numpy.testing import assert_allclose
 
 import ctrl_realize as cr
 from ctrl_realize import report
-from ctrl_realize.errors import OptionError
+from ctrl_realize.cli import main
+from ctrl_realize.errors import DataError, DataWarning, OptionError, TimeAxisError
 from tests.io.plant_files import response, steps
 
 GAIN, DEAD_TIME, LAG = 12.0, 0.0225, 0.06
@@ -131,3 +133,112 @@ def test_cards_and_controllers_of_a_file_in_ms_have_a_unit_that_reads(tmp_path):
     assert table.loc["lag_1", "value"] == pytest.approx(6.0, rel=0.02)
     asked = model.fit.parameter_table(time_unit="ms").loc["lag_1"]
     assert asked["value"] == pytest.approx(6000.0, rel=0.02)
+
+
+ZONES = {  # where and when a clock is set, and its shown form
+    "Berlin in autumn": ("Europe/Berlin", "2025-10-25 20:00", "back", "%d.%m.%Y %H:%M:%S"),
+    "Berlin in spring": ("Europe/Berlin", "2025-03-29 20:00", "forward", "%Y-%m-%d %H:%M:%S"),
+    "New York in autumn": ("America/New_York", "2025-11-01 23:00", "back", "%Y-%m-%dT%H:%M:%S"),
+}
+
+
+def logged(path, zone, first, form, dt, order=1):
+    """Twelve hours of a clock on the wall; returns the seconds that have passed."""
+    t = np.arange(0, 12 * 3600, dt, dtype=float)
+    start = pd.Timestamp(first, tz=zone).tz_convert("UTC")
+    wall = pd.DatetimeIndex(start + pd.to_timedelta(t, unit="s")).tz_convert(zone).strftime(form)
+    rows = [f"{at};{k % 7};{k}" for k, at in enumerate(wall)][::order]
+    path.write_text("\n".join(["Timestamp;u;y", *rows]) + "\n")
+    return t
+
+
+@pytest.mark.parametrize("kind", ZONES)
+@pytest.mark.parametrize("dt", [60.0, 1800.0, 3600.0])
+@pytest.mark.parametrize("order", [1, -1])
+def test_a_clock_that_is_set_is_named_and_put_right(tmp_path, kind, dt, order):
+    """The truth is a clock that is never set: UTC, from pandas."""
+    zone, first, set_to, form = ZONES[kind]
+    path = tmp_path / "a.csv"
+    t = logged(path, zone, first, form, dt, order)
+    with pytest.raises(TimeAxisError, match=rf"{set_to} by an hour \(summer time\).* time_zone="):
+        cr.read_record(path)
+    record = cr.read_record(path, time_zone=zone)
+    np.testing.assert_array_equal(record.time, t)
+    np.testing.assert_array_equal(record.output, np.arange(t.size))
+    last = pd.Timestamp(first, tz=zone) + pd.Timedelta(10, "h")
+    part = cr.read_record(path, time_zone=zone, stop=str(last.tz_localize(None)))
+    assert part.time[-1] == 36000.0
+    (whole,) = cr.io.read_records(path, time_zone=zone)
+    assert whole.n_samples == t.size
+
+
+def test_tags_in_a_long_table_share_the_hour_that_comes_twice(tmp_path):
+    path = tmp_path / "a.csv"
+    t = logged(path, *ZONES["Berlin in autumn"][:2], "%Y-%m-%d %H:%M:%S", 600.0)
+    rows = [row.split(";") for row in path.read_text().splitlines()[1:]]
+    lines = [f"{tag};{at};{value}" for at, u, y in rows for tag, value in (("OP", u), ("PV", y))]
+    path.write_text("\n".join(["Tag;Timestamp;Value", *lines]) + "\n")
+    record = cr.read_record(path, time_zone="Europe/Berlin")
+    np.testing.assert_array_equal(record.time, t)
+
+
+def test_a_zone_that_does_not_fit_is_refused(tmp_path, capsys):
+    path = tmp_path / "a.csv"
+    t = logged(path, *ZONES["Berlin in autumn"][:2], "%Y-%m-%d %H:%M:%S", 60.0)
+    with pytest.raises(
+        OptionError, match=r"time_zone='Mars/Olympus' is not known; expected a name"
+    ):
+        cr.read_record(path, time_zone="Mars/Olympus")
+    once = [row for row in path.read_text().splitlines() if " 02:" not in row]
+    path.write_text("\n".join([*once[:361], "2025-10-26 02:30:00;0;0", *once[361:]]) + "\n")
+    with pytest.raises(DataError, match=r"'Europe/Berlin' does not fit .*expected an hour that"):
+        cr.read_record(path, time_zone="Europe/Berlin", missing="keep")
+    seconds = columns(tmp_path / "b.csv", "t [s],u,y")
+    with pytest.raises(OptionError, match="has no dates; expected dates with the time of day"):
+        cr.read_record(seconds, time_zone="Europe/Berlin")
+    # stamps that are written with their distance from UTC are clear by themselves
+    start = pd.Timestamp("2025-10-25 20:00", tz="Europe/Berlin")
+    wall = (start + pd.to_timedelta(t, unit="s")).map(pd.Timestamp.isoformat)
+    path.write_text(
+        "\n".join(["Timestamp,u,y", *[f"{at},{k % 7},{k}" for k, at in enumerate(wall)]])
+    )
+    for zone in (None, "Europe/Berlin"):
+        np.testing.assert_array_equal(cr.read_record(path, time_zone=zone).time, t)
+    logged(path, *ZONES["Berlin in autumn"][:2], "%Y-%m-%d %H:%M:%S", 60.0)
+    assert main(["identify", str(path), "-o", str(tmp_path / "out")]) == 2
+    assert "--time-zone puts its hours in order" in capsys.readouterr().err
+
+
+def motor(bits=12):
+    """A motor, 900 counts/s behind 6 ms and a lag of 80 ms, with a counter, in binary noise."""
+    rng = np.random.default_rng(7)
+    t = 2e-3 * np.arange(4000)
+    u = np.repeat(rng.choice([-1.0, 1.0], 80), 50) + 1.5
+    late = np.r_[np.full(3, u[0]), u[:-3]]
+    pole = np.exp(-2e-3 / 0.08)
+    speed = np.zeros(t.size)
+    for k in range(1, t.size):
+        speed[k] = pole * speed[k - 1] + (1 - pole) * late[k - 1]
+    counts = np.floor(np.cumsum(900.0 * 2e-3 * speed) * 4)
+    return t, u, counts, counts % 2**bits
+
+
+def test_a_counter_that_starts_again_is_named_and_joined(tmp_path):
+    t, u, counts, turned = motor()
+    path = tmp_path / "a.csv"
+    rows = [f"{a:.3f},{b},{c:.0f}" for a, b, c in zip(t, u, turned, strict=True)]
+    path.write_text("\n".join(["time_s,u,encoder", *rows]) + "\n")
+    with pytest.warns(DataWarning, match="a counter that starts again after 4096: wrap=4096"):
+        wrapped = cr.read_record(path)
+    with pytest.raises(DataError, match=r"does not respond .* counter .* after 4096: wrap=4096"):
+        cr.fit_output_error(wrapped, structures="IPDT")
+    np.testing.assert_array_equal(cr.read_record(path, wrap=4096).output, counts)
+    rows[700] = rows[700].rpartition(",")[0] + ","
+    path.write_text("\n".join(["time_s,u,encoder", *rows]) + "\n")
+    gap = cr.read_record(path, wrap=4096, missing="keep").output
+    expected = np.where(np.arange(t.size) == 700, np.nan, counts)
+    np.testing.assert_array_equal(gap, expected)
+    with pytest.raises(OptionError, match=r"wrap=1024: the output runs from \d+ to 4\d+; expected"):
+        cr.read_record(path, wrap=1024, missing="keep")
+    with pytest.raises(OptionError, match="wrap"):
+        cr.read_record(path, wrap=0)

@@ -17,6 +17,7 @@ from ...numerics.output_error.any_input.data import SampledData
 from ...numerics.output_error.any_input.fit import SampledFit, fit_sampled
 from ...numerics.output_error.result import OutputErrorEstimate
 from ...numerics.output_error.step_data import bare_data
+from ...numerics.signals.counters import counter_period
 from ...numerics.signals.noise import mad_sigma
 from ...numerics.validation.own_response import OwnResponse
 from ...results import Flag
@@ -104,10 +105,20 @@ def _fit(
         raise UnrelatedError(
             f"{_named(records)}: the output does not respond to the input (the best model "
             f"lowers the sum of squares by {found.explained:.3g} noise variances, expected at "
-            f"least {FOLLOWS:g}); "
-            + (codes[0] if codes else "check the columns, and whether the input excites the plant")
+            f"least {FOLLOWS:g}); " + (codes[0] if codes else _turns(found.data.measured))
         )
     return found
+
+
+def _turns(outputs: Sequence[FloatArray]) -> str:
+    """Advice where the output does not follow the input: a counter that starts again is named."""
+    for output in outputs:
+        if (period := counter_period(output)) is not None:
+            return (
+                f"it jumps like a counter that starts again after {period:.6g}: wrap={period:.6g} "
+                "when it is read joins its turns, as numpy.unwrap does"
+            )
+    return "check the columns, and whether the input excites the plant"
 
 
 def _check_moves(record: Record) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +16,8 @@ from ...numerics.arrays import FloatArray
 from ...numerics.signals.time_axis import axis_fault
 from ..columns import check_lengths
 from ..tables import Table
-from ..time_column import TimeAxis, time_axis
+from ..text.dates import in_utc
+from ..time_column import Clock, TimeAxis, time_axis
 from ..units import plain_unit
 from .long_format import LongTable
 from .names import Parts
@@ -51,6 +52,27 @@ class Samples:
                 return Record(time, input, output, missing="keep", **labels)
         return Record.from_samples(time, input, output, input_time=self.input_time, **labels)
 
+    def joined(self, period: float) -> Samples:
+        """Return the samples with the turns of counters among the outputs joined.
+
+        Raises
+        ------
+        OptionError
+            The range of the outputs is longer than a turn.
+        """
+        output = np.array(self.output)
+        rows = [row[~np.isnan(row)] for row in np.atleast_2d(output)]
+        fitting = [row.size > 0 and np.ptp(row) <= period for row in rows]
+        if not any(fitting):
+            raise OptionError(
+                f"wrap={period:g}: the output runs from {np.nanmin(output):g} to "
+                f"{np.nanmax(output):g}; expected the number of values of its counter, such as 4096"
+            )
+        for row, joins in zip(np.atleast_2d(output), fitting, strict=True):
+            if joins:
+                row[~np.isnan(row)] = np.unwrap(row[~np.isnan(row)], period=period)
+        return replace(self, output=output)
+
     def at_outputs(self) -> FloatArray:
         """Input at the stamps of the output; it holds its value between its own."""
         if self.input_time is None:
@@ -61,16 +83,14 @@ class Samples:
         return held
 
 
-def wide_axis(
-    table: Table, parts: Parts, time_unit: str, time_format: str | None
-) -> tuple[TimeAxis, Rows]:
+def wide_axis(table: Table, parts: Parts, clock: Clock) -> tuple[TimeAxis, Rows]:
     """Time axis of a table with a column for each signal, and its rows in the order of time."""
     used = [*parts.inputs, *parts.outputs] + ([] if parts.time is None else [parts.time])
     check_lengths(table, used)
     count = table.columns[parts.outputs[0]].cells.size
     if parts.time is None:
         return TimeAxis(parts.dt * np.arange(count, dtype=np.float64), None), np.arange(count)
-    axis = time_axis(table, parts.time, time_unit, time_format, parts.date)
+    axis = time_axis(table, parts.time, clock, parts.date)
     seconds, rows = axis.seconds, np.arange(count)
     if count > 1 and np.all(np.diff(seconds) <= 0) and seconds[-1] < seconds[0]:
         # historians list the newest sample first
@@ -164,6 +184,7 @@ def check_part(path: Path, span: tuple[float, float], inside: FloatArray, axis: 
             f"{path}: there are {inside.size} samples between {span[0]:g} s and {span[1]:g} s; "
             f"the file covers {np.min(axis.seconds):g} s to {np.max(axis.seconds):g} s"
             + ("" if axis.start is None else f" from {str(axis.start)[:19].replace('T', ' ')} on")
+            + (" in UTC" if axis.zone else "")
         )
 
 
@@ -185,7 +206,9 @@ def _second(given: Any, name: str, axis: TimeAxis) -> float:
             f"{name}={given!r}; expected a time in s, or a date and time such as "
             f"{str(axis.start)[:19].replace('T', ' ')!r}"
         ) from error
-    if stamp.tzinfo is not None:
+    if axis.zone is not None and stamp.tzinfo is None:
+        stamp = pd.Timestamp(in_utc(np.array([stamp], "datetime64[ns]"), axis.zone)[0])
+    elif stamp.tzinfo is not None:
         stamp = stamp.tz_convert("UTC").tz_localize(None)
     return float((stamp - pd.Timestamp(axis.start)) / pd.Timedelta(1, "s"))
 

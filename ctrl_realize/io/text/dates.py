@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...errors import OptionError
+from ...errors import DataError, OptionError
 
 Stamps = np.ndarray[Any, np.dtype[np.datetime64]]
 
@@ -74,6 +74,49 @@ def stamps_of(cells: list[str], time_format: str | None) -> Dates:
         raise OptionError(doubt)
     chosen = regular.index(True)
     return Dates(read[chosen], formats[chosen])
+
+
+def in_utc(stamps: Stamps, zone: str) -> Stamps:
+    """Return stamps of a clock with summer time in UTC; stamps are in order, or newest first.
+
+    The order tells the hours apart that the clock shows twice.
+
+    Raises
+    ------
+    OptionError
+        There is no such zone.
+    DataError
+        The order does not tell, or a stamp is in the hour that is left out in spring.
+    """
+    import pandas as pd
+
+    try:
+        pd.Timestamp(0, tz=zone)
+    except (KeyError, ValueError, TypeError) as error:
+        raise OptionError(
+            f"time_zone={zone!r} is not known; expected a name such as 'Europe/Berlin'"
+        ) from error
+    turned = -1 if stamps.size and stamps[0] > stamps[-1] else 1
+    ordered = stamps[::turned]
+    # equal stamps: an hour apart in a table of hours, or those of several signals at one time
+    once = np.r_[True, ordered[1:] != ordered[:-1]][: stamps.size]
+    for new in (np.ones_like(once), once):
+        try:
+            local = pd.DatetimeIndex(ordered[new]).tz_localize(zone, ambiguous="infer")
+        except Exception as error:  # pandas 2 raises errors of pytz
+            reason = error
+            continue
+        utc = np.asarray(local.tz_convert("UTC").tz_localize(None), dtype="datetime64[ns]")
+        return utc[np.cumsum(new) - 1][::turned]
+    raise DataError(
+        f"time_zone={zone!r} does not fit the stamps: {reason}; expected an hour that comes twice, "
+        "in order of time, where summer time ends"
+    ) from reason
+
+
+def have_offset(cell: str) -> bool:
+    """Whether a date is written with its distance from UTC."""
+    return bool(re.search(r":\d.*(Z|UTC|[+-]\d{2}:?\d{2})$", cell))
 
 
 def _plain(cell: str) -> str:

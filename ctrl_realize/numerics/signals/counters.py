@@ -1,0 +1,66 @@
+"""Counters and angles that start again at the end of their range.
+
+Our own rule: all jumps are longer than half of the range, all other steps are short, and beside
+each jump the signal moves the other way, as a counter does that falls from its end to its start.
+`numpy.unwrap` joins the turns.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..arrays import FloatArray
+
+_JUMP, _STEP = 0.5, 0.2
+"""Parts of the range: a jump is at least so long, another step at most. A first-order lag whose
+sample time is a third of it moves by 0.28 of its response in a sample."""
+_FEWEST = 30  # samples of which a tenth at most are jumps
+_SEVERAL = 4  # jumps of a counter of another range; one jump of a noisy step may look alike
+_ANGLES = (2 * np.pi, 360.0)
+_BITS = tuple(2.0**bits for bits in range(8, 33))
+
+
+def counter_period(values: FloatArray) -> float | None:
+    """Find the range of a counter that starts again; None if the signal looks like no counter.
+
+    Parameters
+    ----------
+    values : ndarray, shape (N,)
+        Signal; NaN is missing.
+
+    Returns
+    -------
+    float or None
+        A power of two, 360 or 2 pi, if the jumps fit; otherwise, for whole numbers, about the
+        length of a jump and a step.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from ctrl_realize.numerics.signals.counters import counter_period
+    >>> turned = np.floor(30.3 * np.arange(1000.0))
+    >>> counter_period(turned % 4096), counter_period(turned % 5000), counter_period(turned)
+    (4096.0, 5000.0, None)
+    >>> counter_period((0.1 * np.arange(200.0)) % (2 * np.pi))
+    6.283185307179586
+    """
+    known = values[~np.isnan(values)]
+    steps = np.diff(known)
+    reach = float(np.ptp(known)) if known.size else 0.0
+    jumps = np.flatnonzero(np.abs(steps) > _JUMP * reach)
+    if known.size < _FEWEST or not 0 < jumps.size <= known.size // 10:
+        return None
+    others = np.delete(steps, jumps)
+    quick = float(np.abs(others).max())
+    inner = jumps[(jumps > 0) & (jumps < steps.size - 1)]
+    beside = np.stack([steps[inner - 1], steps[inner + 1]])
+    if not inner.size or quick > _STEP * reach or np.any(beside * steps[inner] >= 0):
+        return None
+    period = float(np.median(np.abs(steps[inner]) + np.abs(beside).mean(axis=0)))
+    counts = bool(np.all(known == np.round(known)))
+    usual = min(_ANGLES + counts * _BITS, key=lambda one: abs(one - period))
+    # the step that a jump hides lies between those beside it, or near them
+    slack = float(np.abs(np.diff(beside, axis=0)).max()) / np.sqrt(inner.size) + counts
+    if abs(usual - period) <= slack and usual > reach:
+        return float(usual)
+    return float(np.round(period)) if counts and inner.size >= _SEVERAL else None
