@@ -166,7 +166,7 @@ ERRORS = {
         ),
         (lambda: cr.design.smith_predictor(ct.feedback(LATE), INTEGRAL), "internal delays"),
         (lambda: cr.design.smith_predictor(LATE, PI), "continuous controller"),
-        (lambda: cr.design.smith_predictor(LATE, -10 * INTEGRAL), "is unstable"),
+        (lambda: cr.design.smith_predictor(LATE, -10 * INTEGRAL), "does not stabilize"),
         (lambda: cr.design.lqg(LATE, 1.0, 1.0, 1.0, 1.0), r"sys\.to_discrete"),
         (
             lambda: cr.design.pid(ct.feedback(LATE)),

@@ -26,6 +26,8 @@ def codes_in_source() -> set[str]:
 def test_every_flag_of_the_package_has_a_world_in_which_it_is_due():
     elsewhere = {
         "actuator_not_resolved",  # tests/identification/output_error/test_actuated.py
+        "sensitive",  # tests/design/test_loop_check.py
+        "sensitive_within_interval",  # tests/design/test_loop_check.py
         "unstable_within_interval",  # tests/design/test_loop_check.py
         "frf_contradicts_records",  # tests/identification/joint/test_joint_fit.py
         # tests/valves/test_valve_tests.py

@@ -69,6 +69,7 @@ def test_margins_of_a_loop_with_dead_time_and_a_fast_pole_count_right(fast):
     ("rule", "kind"),
     [("simc", "PID"), ("amigo", "PI"), ("ziegler_nichols_ultimate", "PID"), ("optimal", "PI")],
 )
+@pytest.mark.filterwarnings("ignore:Ms is:ctrl_realize.errors.ModelWarning")  # on purpose
 def test_a_continuous_plant_is_tuned_as_the_limit_of_short_samples(rule, kind):
     plant = ct.tf([1], [0.08, 1]) * ct.tf([1], [0.02, 1]) * cr.delay(0.03)
     ours = design.pid(plant, rule, kind)
@@ -83,6 +84,7 @@ def test_a_continuous_plant_is_tuned_as_the_limit_of_short_samples(rule, kind):
         assert exact.ms == pytest.approx(1.4, rel=2e-3)  # read on a grid of 0.05 rad
 
 
+@pytest.mark.filterwarnings("ignore:Ms is:ctrl_realize.errors.ModelWarning")  # on purpose
 def test_the_ultimate_gain_of_a_continuous_plant_is_exact():
     # tan(w) = -w at the ultimate frequency of exp(-s) / (s + 1), K = sqrt(1 + w^2)
     omega = 2.028757838110434

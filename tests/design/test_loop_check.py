@@ -14,8 +14,16 @@ from ctrl_realize.errors import ModelWarning, OptionError, UnsuitableSystemError
 from ctrl_realize.io import FitSummary
 
 
-def fit_with_interval(interval):
-    return FitSummary("Fit", "Fit", (), values=(("dead_time_interval", interval),))
+def fit_with_interval(interval, **values):
+    values["dead_time_interval"] = interval
+    return FitSummary("Fit", "Fit", (), values=tuple(values.items()))
+
+
+def typed(message, sys):
+    """Make the controller that a message says to type, without any further warning."""
+    return eval(
+        re.search(r"(?:Try |is )(design\.pid\(.*?\))(?:: |,)", message)[1], vars(cr) | {"sys": sys}
+    )
 
 
 def furnace():
@@ -58,12 +66,9 @@ def test_a_controller_that_is_unstable_on_its_own_model_is_refused_for_one_that_
 ):
     with pytest.raises(UnsuitableSystemError, match="does not stabilize the model") as refused:
         cr.design.pid(furnace(), rule, kind)
-    named = re.search(
-        r"Use rule='(\w+)', kind='(\w+)', reduction='(\w+)'.* Ms = ([\d.]+)", str(refused.value)
-    )
-    rule, kind, reduction, ms = named.groups()
-    made = cr.design.pid(furnace(), rule, kind, reduction=reduction)
+    made = typed(str(refused.value), furnace())
     assert outside(furnace(), made) == 0
+    ms = re.search(r"\): Ms ([\d.]+)", str(refused.value))[1]
     assert made.check.margins.ms == pytest.approx(float(ms), rel=5e-3)
 
 
@@ -72,7 +77,10 @@ def test_a_dead_time_within_the_interval_that_makes_the_loop_unstable_is_said(ga
     plant = quick() * gain
     limit = 0.029 + cr.design.pid(plant).check.margins.delay_margin
     sure = plant.replace(fit=fit_with_interval((0.02, limit - 0.002)))
-    made = cr.design.pid(sure)
+    with pytest.warns(
+        ModelWarning, match=r"Ms is [\d.]+, more than 2, at a dead time of .* Try design\.pid"
+    ):
+        made = cr.design.pid(sure)
     assert made.check.stable_within_interval
     assert "stable, dead time" in made.report()
     unsure = plant.replace(fit=fit_with_interval((0.02, limit + 0.002)))
@@ -90,11 +98,63 @@ def test_the_best_of_a_comparison_is_stable_over_the_interval():
     limit = 0.029 + cr.design.pid(quick()).check.margins.delay_margin
     unsure = quick().replace(fit=fit_with_interval((0.02, limit + 0.002)))
     found = cr.design.compare_pid(unsure, ["simc", "amigo"], ["PI"])
-    assert found.best(max_sensitivity=5).rule == "amigo"
+    with pytest.warns(ModelWarning, match=r"Ms is .* best of the table"):
+        assert found.best(max_sensitivity=5).rule == "amigo"
     assert "PI simc: the loop is unstable for some dead time" in found.report()
     none = cr.design.compare_pid(unsure, ["simc"], ["PI"])
     with pytest.raises(OptionError, match="1 are unstable within the interval"):
         none.best(max_sensitivity=5)
+
+
+def test_the_best_of_a_comparison_is_robust_over_the_interval_if_any_is():
+    plant = quick().replace(fit=fit_with_interval((0.029, 0.045)))
+    found = cr.design.compare_pid(plant, ["simc", "amigo"], ["PI"])
+    load = dict(zip(found.table()["rule"], found.table()["iae_load"], strict=True))
+    assert load["simc"] < load["amigo"]
+    assert found.best().rule == "amigo"
+
+
+def brute_ms(plant, controller):
+    """Largest 1 / |1 + L| on a fine grid."""
+    z = np.exp(1j * np.linspace(1e-4, np.pi, 40001))
+    return np.max(1 / np.abs(1 + plant(z) * controller(z)))
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+@pytest.mark.parametrize(
+    ("dead_times", "gains"),
+    [(None, (0.7, 1.6)), ((0.02, 0.05), None), ((0.02, 0.04), (0.8, 1.5)), ((0.03, 0.05), (1, 1))],
+)
+def test_ms_at_the_corners_of_the_intervals_is_that_of_such_a_plant(sign, dead_times, gains):
+    gains = None if gains is None else tuple(sorted(sign * end for end in gains))
+    fit = fit_with_interval(dead_times, gain=float(sign), gain_interval=gains)
+    plant = (sign * quick()).replace(fit=fit)
+    with pytest.warns(ModelWarning) as warned:
+        made = cr.design.pid(plant)
+    times, factors = dead_times or (0.029,), [abs(end) for end in gains or (1.0,)]
+    plants = [plant.replace(delay=round(t / 0.001)) * k for t in times for k in factors]
+    # grid of 8e-5 rad, by which a maximum is missed by less than 1e-6 of it
+    worst = max(brute_ms(each, made) for each in plants)
+    assert made.check.worst.ms == pytest.approx(worst, rel=1e-5)
+    assert made.check.margins.ms < 2 < worst
+    assert [flag.code for flag in made.check.flags] == ["sensitive_within_interval"]
+    message = str(warned[0].message)
+    assert (
+        f"Ms is {worst:.3g}, more than 2, at a dead time of {1000 * max(times):.4g} ms" in message
+    )
+    assert (f"a gain of {sign * max(factors):.4g}" in message) or gains is None
+    assert f"Ms {worst:.3g}" in made.report()
+    robust = typed(message, plant)
+    assert max(brute_ms(each, robust) for each in plants) < 2
+
+
+def test_a_gain_that_makes_the_loop_unstable_is_said_with_the_corner():
+    fit = fit_with_interval((0.0289, 0.0291), gain=1.0, gain_interval=(0.5, 4.0))
+    with pytest.warns(ModelWarning, match=r"unstable at a dead time of .* and a gain of 4, ends"):
+        made = cr.design.pid(quick().replace(fit=fit))
+    assert made.check.stable
+    assert outside(4 * quick(), made) > 0
+    assert [flag.code for flag in made.check.flags] == ["unstable_within_interval"]
 
 
 def output_weight(plant):
@@ -108,6 +168,45 @@ DESIGNS = {
     "predictor_lqr": lambda plant: cr.design.predictor_lqr(plant, output_weight(plant), 0.001),
     "lqg": lambda plant: cr.design.lqg(plant, output_weight(plant), 0.001, 1.0, 0.01),
 }
+
+
+GROWING = cr.delayed_ss(ct.ss([[1.02]], [[1.0]], [[0.1]], [[0.0]], 0.001), 20)
+QUICK = quick()
+AGGRESSIVE = {
+    "pid": (QUICK, lambda: cr.design.pid(QUICK, "ziegler_nichols")),
+    "optimal pid": (QUICK, lambda: cr.design.pid(QUICK, "optimal", max_sensitivity=2.5)),
+    "table": (QUICK, lambda: cr.design.compare_pid(QUICK, ["cohen_coon"], ["PI"]).best(9)),
+    "smith_predictor": (
+        QUICK,
+        lambda: cr.design.smith_predictor(QUICK, cr.design.PIDController(3.0, 0.005, dt=0.001)),
+    ),
+    "predictor_lqr": (GROWING, lambda: cr.design.predictor_lqr(GROWING, 1.0, 1.0)),
+    "lqg": (GROWING, lambda: cr.design.lqg(GROWING, 1.0, 1.0, 1.0, 1.0)),
+}
+
+
+@pytest.mark.parametrize("design", AGGRESSIVE)
+def test_every_design_function_warns_of_an_ms_above_two_with_what_to_try(design):
+    plant, make = AGGRESSIVE[design]
+    with pytest.warns(
+        ModelWarning, match=r"Ms is [\d.]+, more than 2, on the model itself.*(Try |design\.pid)"
+    ) as warned:
+        made = make()
+    assert warned[0].filename == __file__
+    assert [flag.code for flag in made.check.flags] == ["sensitive"]
+    assert f"Ms is {made.check.margins.ms:.3g}, more than 2, on" in str(warned[0].message)
+    assert made.check.margins.ms > 2
+    if design != "predictor_lqr":  # whose loop is that of the states
+        assert made.check.margins.ms == pytest.approx(brute_ms(plant, made), rel=1e-5)
+
+
+def test_a_continuous_smith_predictor_warns_of_an_ms_above_two():
+    plant = ct.tf([1], [0.08, 1]) * cr.delay(0.029)
+    with pytest.warns(
+        ModelWarning, match=r"Ms is [\d.]+, more than 2, on the model itself.*filter_time=0\.029"
+    ):
+        cr.design.smith_predictor(plant, cr.design.PIDController(3.0, 0.005))
+    cr.design.smith_predictor(plant, cr.design.PIDController(1.0, 0.08))
 
 
 @pytest.mark.parametrize("design", DESIGNS)

@@ -39,6 +39,7 @@ IPDT = cr.design.ProcessModel(gain=0.5, lag=0.0, dead_time=2.0, integrating=True
         (FOPDT, "cohen_coon", "PID", (2.5 * (4 / 3 + 0.05), 2 * 33.2 / 14.6, 8 / 11.4)),
     ],
 )
+@pytest.mark.filterwarnings("ignore:Ms is:ctrl_realize.errors.ModelWarning")  # on purpose
 def test_rules_give_their_published_parameters(model, rule, kind, expected):
     found = cr.design.pid(model, rule, kind)
     if rule == "amigo" and kind == "PID" and not model.integrating:
@@ -49,6 +50,7 @@ def test_rules_give_their_published_parameters(model, rule, kind, expected):
     assert found.name == f"{kind}_{rule}"
 
 
+@pytest.mark.filterwarnings("ignore:Ms is:ctrl_realize.errors.ModelWarning")  # on purpose
 def test_a_system_is_tuned_half_a_sample_later_than_its_model():
     plant = FOPDT.system(0.5)
     found = cr.design.pid(plant, "ziegler_nichols", "P")

@@ -60,6 +60,7 @@ def several_inputs(delays, seed=0, **settings):
     output_delay=st.integers(0, 3),
     seed=st.integers(0, 10**6),
 )
+@pytest.mark.filterwarnings("ignore:Ms is:ctrl_realize.errors.ModelWarning")  # on purpose
 def test_any_delays_give_the_gain_of_the_augmented_system(delays, output_delay, seed):
     plant = several_inputs(delays, seed, output_delay=output_delay)
     Q, R = np.eye(3), np.eye(len(delays))

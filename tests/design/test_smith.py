@@ -20,6 +20,7 @@ def loaded(plant, controller):
 
 @pytest.mark.parametrize("delay", [1, 2, 37, 100])
 @pytest.mark.parametrize("kind", ["valve", "stable", "direct"])
+@pytest.mark.filterwarnings("ignore:Ms is:ctrl_realize.errors.ModelWarning")  # on purpose
 def test_the_set_point_response_is_that_of_the_core_alone_d_samples_later(
     valve, cores, pi_controller, kind, delay
 ):
@@ -32,6 +33,7 @@ def test_the_set_point_response_is_that_of_the_core_alone_d_samples_later(
     np.testing.assert_allclose(found[delay:], alone, atol=1e-11)  # 600 steps of rounding
 
 
+@pytest.mark.filterwarnings("ignore:Ms is:ctrl_realize.errors.ModelWarning")  # on purpose
 def test_margins_see_the_same_closed_loop_as_its_eigenvalues(valve, pi_controller):
     counts = []
     for gain, delay in ((0.5, 30), (1.5, 60), (4.0, 40), (4.0, 120)):
@@ -54,6 +56,7 @@ def test_a_filtered_predictor_leaves_no_error_after_a_load(valve, pi_controller,
     assert abs(step_response(loaded(plant, predictor), 6000)[-1]) < 1e-6
 
 
+@pytest.mark.filterwarnings("ignore:Ms is:ctrl_realize.errors.ModelWarning")  # on purpose
 def test_the_range_of_stable_dead_times_ends_where_it_says(valve, pi_controller):
     plant = valve(37)
     predictor = cr.design.smith_predictor(plant, pi_controller(3.0, 0.08))

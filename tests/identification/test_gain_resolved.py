@@ -121,7 +121,7 @@ def test_structures_that_differ_in_gain_are_warned_of_and_refuse_no_design():
     assert len(told) == 1
     assert system.fit.gain_interval[0] > 0
     assert report.verdict_of(system).level == "caution"
-    assert "does not determine the gain:" in warned(cr.design.pid, system)
+    assert "does not determine the gain:" in warned(cr.design.pid, system, "amigo")
 
 
 def test_a_predictor_warns_of_a_dead_time_that_may_be_none():

@@ -1,12 +1,12 @@
 """Check of the closed loop before a design function returns a controller.
 
-The loop is closed with the model itself, not with a reduced one, and over the interval of dead
-times from the identification.
+The loop is closed with the model itself, not with a reduced one, and over the intervals of dead
+time and gain from the identification.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -19,7 +19,7 @@ from ...results import Flag, Result
 from ..siso import interval_of_dead_time
 from .delay_robustness import over_interval
 from .delay_robustness_result import DelayRobustness
-from .loop import open_loop
+from .loop import Loop, open_loop
 from .margin_result import Margins
 from .margins import loop_margins
 
@@ -27,13 +27,33 @@ TRIED = 2
 """Delays of the interval whose margins are computed: its ends. Stability between them follows from
 the crossovers, see `DelayRobustness`."""
 
+MOST_SENSITIVE = 2.0
+"""Largest Ms without a warning: gain and phase margin are then at least 2 and 29 deg (Astrom and
+Hagglund, Advanced PID Control, 2006, chapter 4)."""
+ROUNDED = 1e-3
+"""Share by which Ms may exceed a limit that a controller was optimized for."""
+
+
+@dataclass(frozen=True)
+class Corner:
+    """Dead time in s and gain at the ends of their intervals, and Ms there; inf if unstable."""
+
+    dead_time: float
+    gain: float | None
+    ms: float
+
+    def __str__(self) -> str:
+        gain = "" if self.gain is None else f" and a gain of {self.gain:.4g}"
+        return f"a dead time of {in_time(self.dead_time, 4)}{gain}"
+
 
 @dataclass(frozen=True, eq=False, repr=False)
 class LoopCheck(Result):
     """Check of the closed loop with the design model.
 
     ``stable`` is ``margins.stable``; `robustness`, if there is an interval of dead times, has the
-    nominal delay and the ends of the interval among its `delays`.
+    nominal delay and the ends of the interval among its `delays`. `corners` are the pairs of the
+    ends of both intervals, ``worst`` is that of the largest Ms.
 
     Attributes
     ----------
@@ -41,9 +61,12 @@ class LoopCheck(Result):
         Of the controller with the design model, with exact dead time.
     robustness : DelayRobustness or None
         Over ``system.fit.dead_time_interval``; None if the system has no interval.
+    corners : tuple of Corner
+        Ms at the ends of ``system.fit.dead_time_interval`` and ``system.fit.gain_interval``.
     flags : tuple of Flag
-        ``"unstable_within_interval"`` if some dead time within the interval makes the loop
-        unstable.
+        ``"sensitive"`` if Ms is larger than 2 on the model; ``"unstable_within_interval"`` if some
+        dead time within the interval, or a corner, makes the loop unstable;
+        ``"sensitive_within_interval"`` if Ms is larger than 2 at a corner.
 
     Examples
     --------
@@ -56,7 +79,13 @@ class LoopCheck(Result):
 
     margins: Margins
     robustness: DelayRobustness | None = None
+    corners: tuple[Corner, ...] = ()
     flags: tuple[Flag, ...] = ()
+
+    @property
+    def worst(self) -> Corner | None:
+        """Corner of the intervals with the largest Ms; None if there is no interval."""
+        return max(self.corners, key=lambda corner: corner.ms, default=None)
 
     @property
     def stable(self) -> bool:
@@ -84,6 +113,8 @@ class LoopCheck(Result):
             word = "stable" if self.robustness.stable else "UNSTABLE somewhere"
             interval = interval_in_time(*self.robustness.dead_time_interval)
             rows.append(("over the interval", f"{word}, dead time {interval}"))
+        if self.worst is not None:
+            rows.append(("at worst", f"Ms {self.worst.ms:.3g}, at {self.worst}"))
         return rows
 
     def _title(self) -> str:
@@ -115,12 +146,85 @@ def loop_check(plant: Any, controller: Any, dead_time: float = 0.0) -> LoopCheck
     """
     loop = open_loop(plant, controller, dead_time)
     found = loop_margins(loop)
-    interval = interval_of_dead_time(plant, None) if isinstance(plant, DelayedStateSpace) else None
-    if interval is None or not found.stable:
-        return LoopCheck(found)
-    robust = over_interval(plant, loop, found, interval, TRIED)
-    flags = () if robust.stable else (_unstable_inside(robust),)
-    return LoopCheck(found, robust, flags=flags)
+    flags = _sensitive(found)
+    if not isinstance(plant, DelayedStateSpace) or not found.stable:
+        return LoopCheck(found, flags=flags)
+    interval = interval_of_dead_time(plant, None)
+    robust = None if interval is None else over_interval(plant, loop, found, interval, TRIED)
+    corners = _corners(plant, loop, found, robust)
+    made = LoopCheck(found, robust, corners)
+    return replace(made, flags=(*flags, *_over_intervals(made)))
+
+
+def _sensitive(found: Margins) -> tuple[Flag, ...]:
+    if not found.stable or found.ms <= MOST_SENSITIVE * (1 + ROUNDED):
+        return ()
+    return (
+        Flag(
+            "sensitive",
+            f"Ms is {found.ms:.3g}, more than {MOST_SENSITIVE:g}, on the model itself",
+        ),
+    )
+
+
+def _corners(
+    plant: DelayedStateSpace, loop: Loop, found: Margins, robust: DelayRobustness | None
+) -> tuple[Corner, ...]:
+    """Ms at the ends of the intervals of dead time and gain; the gain scales the whole loop."""
+    gains = _gains(plant)
+    if robust is None and not gains:
+        return ()
+    nominal = plant.fit.gain if plant.fit is not None else None
+    if robust is None:
+        ends = [(int(plant.delay), float(plant.dead_time), found.modulus_margin)]
+    else:
+        tried = [*zip(robust.delays, robust.dead_times, robust.modulus_margin, strict=True)]
+        ends = [
+            (int(d), float(t), float(m)) for d, t, m in tried if d != plant.delay or len(tried) < 3
+        ]
+    corners = [Corner(time, nominal, _ms(size)) for _, time, size in ends]
+    for gain, factor in gains:
+        for delay, time, _ in ends:
+            at = loop_margins(_moved(loop, delay, factor))
+            corners.append(Corner(time, gain, _ms(at.modulus_margin if at.stable else 0.0)))
+    return tuple(corners)
+
+
+def _ms(modulus_margin: float) -> float:
+    return 1 / modulus_margin if modulus_margin else float("inf")
+
+
+def _gains(plant: DelayedStateSpace) -> list[tuple[float, float]]:
+    """Ends of the interval of the gain, each with its ratio to that of the model."""
+    fit = plant.fit
+    if fit is None or not fit.gain or fit.gain_interval is None:
+        return []
+    ends = [(float(end), float(end) / fit.gain) for end in fit.gain_interval]
+    return ends if all(np.isfinite(ratio) and ratio for _, ratio in ends) else []
+
+
+def _moved(loop: Loop, delay: int, factor: float) -> Loop:
+    """Change delay and gain of the first factor of a loop, the plant."""
+    plant = loop.factors[0]
+    scaled = replace(plant, delay=delay, response=lambda w: factor * plant.response(w))
+    return replace(loop, factors=(scaled, *loop.factors[1:]))
+
+
+def _over_intervals(made: LoopCheck) -> tuple[Flag, ...]:
+    """What the intervals from the identification do to the loop."""
+    if made.robustness is not None and not made.robustness.stable:
+        return (_unstable_inside(made.robustness),)
+    worst = made.worst
+    if worst is None or worst.ms <= MOST_SENSITIVE * (1 + ROUNDED):
+        return ()
+    if worst.ms == float("inf"):
+        text = f"the loop is unstable at {worst}, ends of the intervals from the identification"
+        return (Flag("unstable_within_interval", text),)
+    text = (
+        f"Ms is {worst.ms:.3g}, more than {MOST_SENSITIVE:g}, at {worst}, ends of the intervals "
+        "from the identification"
+    )
+    return (Flag("sensitive_within_interval", text),)
 
 
 def _unstable_inside(found: DelayRobustness) -> Flag:
@@ -134,9 +238,9 @@ def _unstable_inside(found: DelayRobustness) -> Flag:
 
 
 def warn_of(check: LoopCheck, advice: str) -> None:
-    """Warn if the loop is unstable within the interval; `advice` says what to try."""
-    for flag in check.flags:
-        warn_caller(f"{flag}; {advice}", ModelWarning)
+    """Warn of a loop that is not robust on its model or its intervals, with what to try."""
+    if check.flags:
+        warn_caller(f"{'; '.join(map(str, check.flags))}. {advice}", ModelWarning)
 
 
 def refuse_unstable(check: LoopCheck, what: str, advice: str) -> None:
@@ -157,8 +261,7 @@ def refuse_poles(poles: ComplexArray, what: str, advice: str) -> None:
 
 
 def _refuse(count: int, what: str, advice: str) -> None:
-    state = f"has {count} unstable pole(s)" if count else "is on the stability boundary"
+    state = f"{count} unstable pole{'s' * (count > 1)}" if count else "on the stability boundary"
     raise UnsuitableSystemError(
-        f"{what} does not stabilize the model that it was designed for: the closed loop "
-        f"{state}. {advice}"
+        f"{what} does not stabilize the model that it was designed for ({state}). {advice}"
     )

@@ -10,10 +10,20 @@ import numpy as np
 from ..._checks import positive
 from ...delayed import DelaySystem
 from ...errors import OptionError, UnsuitableSystemError
-from ..loops.margins import margins
+from ..loops.loop_check import loop_check, refuse_unstable, warn_of
 from ..siso import core_and_dead_time, proper_ss
 
 ON_AXIS = 1e-9
+STABILIZE = (
+    "Its closed loop is that of the core and the controller: choose a controller that stabilizes "
+    "the core without dead time (design.margins(core, controller))"
+)
+
+
+def more_robust(filter_time: float | None, dead_time: float) -> str:
+    """What to try if the loop with a Smith predictor is not robust."""
+    time = dead_time if filter_time is None else 2 * filter_time
+    return f"Try filter_time={time:.3g}, or a slower controller"
 
 
 def continuous_smith_predictor(
@@ -46,12 +56,9 @@ def continuous_smith_predictor(
     late = filtered * _delay(dead_time)
     # the inner loop sees G (1 - F exp(-tau s)), with one G
     made = (DelaySystem(ct.ss(primary))).feedback((1 - late) * core) * filtered
-    found = margins(plant, made)
-    if not found.stable:
-        raise UnsuitableSystemError(
-            "the closed loop with the Smith predictor is unstable. It is that of the core and the "
-            "controller: choose a controller that stabilizes the core without dead time"
-        )
+    check = loop_check(plant, made)
+    refuse_unstable(check, "the Smith predictor", STABILIZE)
+    warn_of(check, more_robust(filter_time, dead_time))
     names = {"inputs": ["e"], "outputs": plant.input_labels, "name": name}
     return DelaySystem(made.core, made.internal_delays, **names)
 

@@ -109,7 +109,8 @@ def lqg(
     Warns
     -----
     ModelWarning
-        The loop is unstable for some dead time within the system's interval.
+        Ms is larger than 2 on the model itself, or at an end of the intervals of dead time and gain
+        of the system; or the loop is unstable somewhere within them.
 
     Notes
     -----
@@ -186,7 +187,7 @@ def lqg(
 
     check = loop_check(plant, made())
     refuse_unstable(check, "the controller", TOO_LONG)
-    warn_of(check, "larger R and RN make it slower and more robust")
+    warn_of(check, "Try 10 * R and 10 * RN: slower and more robust")
     return made(check)
 
 

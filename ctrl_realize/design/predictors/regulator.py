@@ -142,7 +142,8 @@ def predictor_lqr(system: DelayedStateSpace, Q: ArrayLike, R: ArrayLike) -> Pred
     Warns
     -----
     ModelWarning
-        The loop is unstable for some dead time within the system's interval.
+        Ms is larger than 2 on the model itself, or at an end of the intervals of dead time and gain
+        of the system; or the loop is unstable somewhere within them.
 
     Notes
     -----
@@ -180,7 +181,7 @@ def predictor_lqr(system: DelayedStateSpace, Q: ArrayLike, R: ArrayLike) -> Pred
         return found
     check = loop_check(*_state_loop(plant, found))
     refuse_unstable(check, "the regulator", TOO_LONG)
-    warn_of(check, "a larger R makes it slower and more robust")
+    warn_of(check, "Try 10 * R: slower and more robust")
     return replace(found, check=check)
 
 

@@ -17,7 +17,7 @@ from ..loops.loop_check import LoopCheck, loop_check, refuse_unstable, warn_of
 from ..resolved import check_sign, warn_unresolved
 from ..siso import delayed_system, same_rate
 from .checked import CheckedController
-from .continuous_smith import continuous_smith_predictor
+from .continuous_smith import STABILIZE, continuous_smith_predictor, more_robust
 from .predictor_filter import predictor_filter, removed_part
 
 ON_CIRCLE = 1e-9
@@ -144,7 +144,8 @@ def smith_predictor(
     Warns
     -----
     ModelWarning
-        The closed loop is unstable for some dead time within the interval from the identification.
+        Ms is larger than 2 on the model itself, or at an end of the intervals of dead time and gain
+        from the identification; or the loop is unstable somewhere within them.
 
     Notes
     -----
@@ -235,13 +236,8 @@ def smith_predictor(
         )
 
     check = loop_check(plant, made())
-    refuse_unstable(
-        check,
-        "the Smith predictor",
-        "Its closed loop is that of the core and the controller: choose a controller that "
-        "stabilizes system.delay_free (design.margins(system.delay_free, controller))",
-    )
-    warn_of(check, "give a longer filter_time or a slower controller")
+    refuse_unstable(check, "the Smith predictor", STABILIZE)
+    warn_of(check, more_robust(filter_time, float(plant.dead_time)))
     return made(check)
 
 

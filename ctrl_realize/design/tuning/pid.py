@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -13,7 +14,7 @@ from ...data.shown_units import in_shown_units, shown_time_unit
 from ...delayed import DelayedStateSpace, DelaySystem
 from ...errors import OptionError, UnsuitableSystemError
 from ...numerics.blas_threads import single_threaded
-from ..loops.loop_check import loop_check, refuse_unstable, warn_of
+from ..loops.loop_check import MOST_SENSITIVE, loop_check, refuse_unstable, warn_of
 from ..loops.margins import margins
 from ..models.process_model import ProcessModel
 from ..models.reduction import METHODS as REDUCTIONS
@@ -26,9 +27,8 @@ RULES = (*MODEL_RULES, *SYSTEM_RULES)
 KINDS = ("P", "PI", "PD", "PID")
 SAFE = ("amigo", "simc", "lambda")
 """Rules that are suggested if the loop of another is unstable; then the optimal PI."""
-MOST_SENSITIVE = 2.0
-"""Largest Ms of a suggested loop: gain and phase margin are then at least 2 and 29 deg (Astrom and
-Hagglund, Advanced PID Control, 2006, chapter 4)."""
+SLOWER = (2.0, 4.0, 8.0)
+"""Closed-loop times of simc, in dead times of its model, that are suggested after those."""
 SETTLED = 10_000
 """Samples after the delay at which a step response has the sign of the gain."""
 
@@ -82,7 +82,7 @@ def pid(
     PIDController
         A `control.StateSpace` from error to plant input, with the parameters as attributes. Its
         `check`, a `LoopCheck`, is for the closed loop with `system` itself, not with a reduced
-        model, and over the interval of dead times of an identified system.
+        model, and over the intervals of dead time and gain of an identified system.
 
     Raises
     ------
@@ -95,7 +95,8 @@ def pid(
     Warns
     -----
     ModelWarning
-        The loop is unstable for some dead time within that interval.
+        Ms is larger than 2 on the model itself, or at an end of those intervals; or the loop is
+        unstable somewhere within them. The warning names a rule that is robust, if there is one.
 
     Notes
     -----
@@ -144,10 +145,12 @@ def pid(
     )
     made, plant = tuned(system, rule, kind, options)
     check = loop_check(plant, made)
-    if not check.stable:
-        works = _one_that_works(system, rule, kind, options)
-        refuse_unstable(check, f"the {kind} controller of rule={rule!r}", works)
-    warn_of(check, "a slower rule ('amigo', 'lambda') may be stable over all of it")
+    if not check.stable or check.flags:
+        with warnings.catch_warnings():  # what the record leaves open has been said
+            warnings.simplefilter("ignore")
+            advice = _one_that_works(system, rule, kind, options)
+        refuse_unstable(check, f"the {kind} controller of rule={rule!r}", advice)
+        warn_of(check, advice)
     return made.checked(check)
 
 
@@ -229,28 +232,61 @@ def _units(plant: DelayedStateSpace) -> tuple[str, str]:
 
 
 def _one_that_works(system: Any, rule: str, kind: str, options: TuningOptions) -> str:
-    """Suggest a rule whose loop is stable with a sufficient margin."""
+    """Suggest a call whose loop is robust, on the model and over its intervals."""
+    usual = replace(options, closed_loop_time=None, max_sensitivity=1.4)
     tries = [
-        (name, form, reduction)
+        (name, form, replace(usual, reduction=reduction))
         for form in dict.fromkeys((kind, "PI"))
         for name in dict.fromkeys((rule, *SAFE))
         for reduction in REDUCTIONS
         if name in MODEL_RULES
     ]
-    tried = (rule, kind, options.reduction)
-    for name, form, reduction in [*tries, ("optimal", "PI", options.reduction)]:
-        if form not in kinds_of(name) or (name, form, reduction) == tried:
+    tries.append(("optimal", "PI", usual))
+    best: tuple[float, str] = (np.inf, "")
+    for name, form, changed in [*tries, *_slower(system, usual)]:
+        if form not in kinds_of(name) or (name, form, changed) == (rule, kind, options):
             continue
-        changed = replace(options, closed_loop_time=None, reduction=reduction)
         try:
             made, plant = tuned(system, name, form, changed)
         except ValueError:
             continue
-        found = loop_check(plant, made).margins
-        if found.stable and found.ms <= MOST_SENSITIVE:
-            how = f"rule={name!r}, kind={form!r}, reduction={reduction!r}"
-            return f"Use {how}, which is stable on it with Ms = {found.ms:.3g}"
+        check = loop_check(plant, made)
+        if not check.stable or check.margins.ms > MOST_SENSITIVE:
+            continue
+        worst = check.margins.ms if check.worst is None else check.worst.ms
+        call = f"{_call(name, form, changed)}: Ms {check.margins.ms:.3g}"
+        if not check.flags:
+            reached = "" if check.worst is None else f", at most {worst:.3g} over the intervals"
+            return f"Try {call}{reached}"
+        best = min(best, (worst, call))
+    if best[1]:
+        return (
+            f"No rule is robust over the intervals; the best is {best[1]}, at worst {best[0]:.3g}"
+        )
     return "No other rule does better; see design.compare_pid, or use design.lqg"
+
+
+def _slower(system: Any, options: TuningOptions) -> list[tuple[str, str, TuningOptions]]:
+    """Closed-loop times of simc, rounded as they are printed."""
+    try:
+        made, _ = tuned(system, "simc", "PI", options)
+    except ValueError:
+        return []
+    assert made.model is not None
+    times = [float(f"{share * made.model.dead_time:.3g}") for share in SLOWER]
+    return [("simc", "PI", replace(options, closed_loop_time=time)) for time in times if time]
+
+
+def _call(rule: str, kind: str, options: TuningOptions) -> str:
+    """What to type for a rule, without the defaults."""
+    usual = TuningOptions()
+    words: dict[str, Any] = {"closed_loop_time": options.closed_loop_time, "dt": options.dt}
+    if rule in MODEL_RULES:
+        words["reduction"] = options.reduction
+    if rule == "optimal":
+        words["max_sensitivity"] = options.max_sensitivity
+    given = [f"{key}={value!r}" for key, value in words.items() if value != getattr(usual, key)]
+    return f"design.pid({', '.join(['sys', repr(rule), *[repr(kind)] * (kind != 'PI'), *given])})"
 
 
 def _ultimate(

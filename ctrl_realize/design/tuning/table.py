@@ -10,8 +10,8 @@ from ..._checks import one_of
 from ...delayed import DelayedStateSpace
 from ...errors import OptionError
 from ...numerics.blas_threads import single_threaded
-from ...results import Result
-from ..loops.loop_check import loop_check
+from ...results import Flag, Result
+from ..loops.loop_check import loop_check, warn_of
 from ..loops.margin_result import Margins
 from ..loops.performance import Performance, measured, plant_time, settled_responses
 from ..models.process_model import ProcessModel
@@ -87,10 +87,16 @@ class PIDComparison(Result):
     def best(self, max_sensitivity: float = 2.0) -> PIDController:
         """Controller with the smallest load error among the stable ones with Ms within the limit.
 
-        If the system has an interval of dead times, the loop must be stable over all of it.
+        If the system has intervals of dead time and gain, the loop must be stable over all of them,
+        and those whose Ms is at most 2 there come first.
+
+        Warns
+        -----
+        ModelWarning
+            None of them is robust over the intervals, see `pid`.
         """
         fit = [
-            (p.load_error, i)
+            (len(self._flags(i)), p.load_error, i)
             for i, (m, p) in enumerate(zip(self.margins, self.performance, strict=True))
             if m.stable and m.ms <= max_sensitivity and not self._unsafe(i)
         ]
@@ -101,12 +107,18 @@ class PIDComparison(Result):
                 f"{min((m.ms for m in self.margins if m.stable), default=float('inf')):.3g}"
                 + (f"; {unsafe} are unstable within the interval of the dead time" * bool(unsafe))
             )
-        return self.controllers[min(fit)[1]]
+        best = self.controllers[min(fit)[2]]
+        if best.check is not None:
+            warn_of(best.check, "It is the best of the table; design.pid(sys) names a slower one")
+        return best
+
+    def _flags(self, i: int) -> tuple[Flag, ...]:
+        check = self.controllers[i].check
+        return () if check is None else check.flags
 
     def _unsafe(self, i: int) -> bool:
-        """Whether a controller is unstable for some dead time of the interval."""
-        check = self.controllers[i].check
-        return check is not None and check.stable_within_interval is False
+        """Whether a controller is unstable somewhere within the intervals."""
+        return any(flag.code == "unstable_within_interval" for flag in self._flags(i))
 
     def _title(self) -> str:
         return "PID rules"
@@ -126,9 +138,10 @@ class PIDComparison(Result):
     def _notes(self) -> list[str]:
         refused = [f"{kind} {rule}: {reason}" for rule, kind, reason in self.refused]
         unsafe = [
-            f"{c.kind} {c.rule}: {c.check.flags[0]}"
+            f"{c.kind} {c.rule}: {flag}"
             for i, c in enumerate(self.controllers)
-            if c.check is not None and self._unsafe(i)
+            for flag in self._flags(i)
+            if flag.code != "sensitive"  # Ms is in the row
         ]
         return unsafe + refused
 
