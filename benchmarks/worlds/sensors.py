@@ -90,6 +90,12 @@ def clipped(rng: Rng) -> Case:
     return plant.case(record(u, np.minimum(noisy(rng, y), rng.uniform(0.7, 0.9) * y.max())))
 
 
+def clipped_before_its_noise(rng: Rng) -> Case:
+    """The output ends at 70 to 90 % of the way, and the noise is added behind that."""
+    plant, u, y = plain(rng)
+    return plant.case(record(u, noisy(rng, np.minimum(y, rng.uniform(0.7, 0.9) * y.max()))))
+
+
 def moving_average(rng: Rng) -> Case:
     """The transmitter sends means over 10 to 30 samples."""
     plant, u = drawn(rng), step()
@@ -179,6 +185,7 @@ WORLDS = (
     slow_sine,
     aliased_hum,
     clipped,
+    clipped_before_its_noise,
     moving_average,
     bent_sensor,
     louder_when_high,

@@ -22,7 +22,7 @@ from ..step.steps import found_step
 _APART = 1e-3  # relative distance by which coincident poles are separated
 _LAST = 5  # a first step in the last samples of a record has no response to fit
 
-_FEWEST_SAMPLES = 20  # four for each of lag, gain, dead time, level and drift
+FEWEST_SAMPLES = 20  # four for each of lag, gain, dead time, level and drift
 _MOST_EDGES = 12  # an input with more of them is no step experiment
 _HOLDS = 0.2  # part of the step by which an input may stray between its edges
 _STRAY = 0.01  # part of the first step by which a clean input may stray before it
@@ -85,10 +85,10 @@ def checked_records(records: Record | Sequence[Record]) -> tuple[Record, ...]:
     for record in several:
         check_input(record, "fit_output_error")
         seen = int(np.count_nonzero(record.seen))
-        if seen < _FEWEST_SAMPLES:
+        if seen < FEWEST_SAMPLES:
             raise DataError(
                 f"{named('record', record.name)} has {seen} samples; a fit of delay, "
-                f"gain and lags needs at least {_FEWEST_SAMPLES}"
+                f"gain and lags needs at least {FEWEST_SAMPLES}"
             )
         moves = float(np.ptp(record.output[..., record.seen]))
         if moves < SMALLEST:

@@ -11,6 +11,7 @@ import control as ct
 import numpy as np
 
 from ..._checks import one_of, positive
+from ..._wording import named
 from ...data import Record
 from ...data.shown_units import in_shown_units
 from ...delayed import DelayedStateSpace
@@ -22,9 +23,11 @@ from ...numerics.output_error.step_data import own_regressors, step_data
 from ...numerics.output_error.step_fit import fit_step_record
 from ...numerics.parameters.process_form import ProcessForm
 from ...numerics.separable.varpro import KnownFactor, Structure
+from ...results import Flag
 from ..process_structures import Structures, requested
 from .actuated.alternatives import ASKED, Asked
 from .actuated.fit import with_actuator
+from .actuated.limits import fit_within_limits, without_cut_noise
 from .any_input import UnrelatedError, fit_any_input
 from .arguments import checked_records, edges_of, known_factor, step_data_of
 from .averaging import (
@@ -146,6 +149,12 @@ def fit_output_error(
     A slope before the step is modelled as a drift, the free response of the plant, or not at all,
     as chosen by the information criterion.
 
+    An output may clip. Behind its noise, samples at the highest or lowest value show it; before the
+    noise, a plateau that is reached with a kink and never passed, if the model of the other samples
+    passes it and explains the record clearly better together with the limit (of a single record,
+    and unless an actuator is asked for). Such samples are left out, and the flag
+    ``output_at_limit`` says so: gain and slow lags are extrapolated.
+
     Samples may be missing (NaN outputs, see `Record.from_samples`): the model is evaluated at the
     samples that there are, with the input at every sample. Their noise is white, or its correlation
     is taken as if they were neighbours; it is not prewhitened.
@@ -206,7 +215,9 @@ def fit_output_error(
         "huber": loss == "huber",
         "whiten": noise == "auto",
     }
-    linear = partial(_linear, several, limit, settings, own_gains=gains == "own")
+    linear = partial(
+        _linear, several, limit, settings, own_gains=gains == "own", may_clip=actuator is None
+    )
     try:
         result = checked(linear(), alone=known is None)
         if actuator is not None:
@@ -239,12 +250,18 @@ def _linear(
     settings: _Settings,
     *,
     own_gains: bool,
+    may_clip: bool,
     refuses: bool = True,
 ) -> OutputErrorFit:
     """Fit linear models. One that hardly follows the output is refused, or not."""
     any_input = partial(fit_any_input, refuses=refuses)
     if len(several) == 1:
-        return _fit_one(several[0], limit, settings, any_input)[0]
+        return fit_within_limits(
+            several[0],
+            lambda record: _fit_one(record, limit, settings, any_input)[0],
+            may_clip=may_clip,
+        )
+    several, at_limits = _without_cut_noise(several)
     # If all records are complete step experiments they can be averaged.
     stepped = all(not record.n_missing and edges_of(record) for record in several)
     way = _fit_mean if stepped else any_input
@@ -253,7 +270,18 @@ def _linear(
         result, _ = fit_own_gains(several, partial(way, several, limit, settings), start)
     else:
         result, _ = way(several, limit, settings)
-    return replace(result, flags=result.flags + same_record_flags(several))
+    return replace(result, flags=result.flags + at_limits + same_record_flags(several))
+
+
+def _without_cut_noise(records: tuple[Record, ...]) -> tuple[tuple[Record, ...], tuple[Flag, ...]]:
+    """Leave out samples at the limits of every record, and name the first that has some."""
+    kept, flags = zip(*map(without_cut_noise, records), strict=True)
+    named_flags = [
+        replace(flag, message=f"{named('record', record.name)}: {flag.message}")
+        for record, own in zip(records, flags, strict=True)
+        for flag in own
+    ]
+    return kept, tuple(named_flags[:1])
 
 
 def _fit_one(

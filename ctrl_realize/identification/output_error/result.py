@@ -54,7 +54,7 @@ class OutputErrorFit(FractionalDelayFit):
     time : ndarray, shape (N,)
         In s.
     records : tuple of Record
-        Records that were given.
+        Records that were given; samples at a limit of the output are missing in them.
     repeatability : Repeatability or None
         Delay of each record separately, if there are several.
     gains : RecordGains or None

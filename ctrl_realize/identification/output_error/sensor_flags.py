@@ -1,4 +1,4 @@
-"""Flags of what a sensor or its recorder did: held, stuck or clipped values, outliers, gaps."""
+"""Flags of what a sensor or its recorder did: held or stuck values, outliers, gaps."""
 
 from __future__ import annotations
 
@@ -7,12 +7,8 @@ import numpy as np
 from ..._wording import in_time
 from ...numerics.arrays import FloatArray
 from ...numerics.signals.noise import winsorised_sigma
-from ...numerics.validation.held_output import (
-    held_share,
-    longest_hold,
-    samples_at_limit,
-    stuck_samples,
-)
+from ...numerics.validation.held_output import held_share, longest_hold, stuck_samples
+from ...numerics.validation.limits import at_limit
 from ...results import Flag
 from .result import OutputErrorFit
 
@@ -32,9 +28,7 @@ _LEAD = 5  # samples next to the step that are looked at, and do not count as re
 
 def sensor_flags(fit: OutputErrorFit, output: FloatArray, fitted: FloatArray) -> list[Flag]:
     """Look for samples of one record (N,) that its plant does not explain."""
-    flags = limit_flags(output)
-    if not flags:
-        flags += _stuck(fit, output, fitted)
+    flags = [] if at_limit(output) else _stuck(fit, output, fitted)
     if np.isfinite(fit.onset):
         return flags + _onset_in_gap(fit) + _lead(fit, output, fitted)
     return flags + outliers(output, fitted, fit.residual if fit.at_noise_level else None)
@@ -92,20 +86,6 @@ def held_flags(output: FloatArray, fitted: FloatArray, dt: float) -> tuple[list[
         f"recorded late; the dead time may be up to {in_time(hold)} shorter",
     )
     return [flag], hold
-
-
-def limit_flags(output: FloatArray) -> list[Flag]:
-    """Report samples at the highest or lowest value of a noisy output."""
-    count = samples_at_limit(output)
-    if not count:
-        return []
-    return [
-        Flag(
-            "output_at_limit",
-            f"{count} samples are at the highest or lowest value, without noise: the output "
-            "saturates there, and gain and lags are those of the clipped signal",
-        )
-    ]
 
 
 def _stuck(fit: OutputErrorFit, output: FloatArray, fitted: FloatArray) -> list[Flag]:

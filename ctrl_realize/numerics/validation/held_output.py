@@ -1,4 +1,4 @@
-"""Outputs that are constant while the plant moves: held between samples, or at a limit.
+"""Outputs that are constant while the plant moves: held between samples, or stuck.
 
 Our own rule: noise of one quantisation step [1]_ rarely repeats a value, a held output does so most
 of the time.
@@ -80,20 +80,6 @@ def _runs(true: BoolArray) -> tuple[IntArray, IntArray]:
     """First positions of runs of True, and the positions after them."""
     ends = np.flatnonzero(np.diff(np.concatenate([[False], true, [False]]).astype(np.int8)))
     return ends[::2], ends[1::2]
-
-
-def samples_at_limit(output: FloatArray) -> int:
-    """Count the samples in runs at the highest or lowest value of a noisy output."""
-    same, nothing = _repeats(output), rounding_error(output)
-    count = 0
-    for limit in (output.max(), output.min()):
-        starts, ends = _runs(np.abs(output - limit) <= nothing)
-        runs = ends - starts
-        inside = int(runs[runs >= _LONG].sum())
-        elsewhere = same[np.abs(output[1:] - limit) > nothing]
-        if inside and elsewhere.size > _LONG and np.mean(elsewhere) <= _SELDOM:
-            count += inside
-    return count
 
 
 def stuck_samples(output: FloatArray, fitted: FloatArray) -> tuple[int, int]:

@@ -16,7 +16,8 @@ from ctrl_realize.numerics.signals.noise import (
     winsorised_sigma,
 )
 from ctrl_realize.numerics.signals.noise_model import noise_covariance, whitener
-from ctrl_realize.numerics.validation.held_output import held_share, longest_hold, samples_at_limit
+from ctrl_realize.numerics.validation.held_output import held_share, longest_hold
+from ctrl_realize.numerics.validation.limits import at_limit
 
 
 def white(n, seed=0):
@@ -168,6 +169,8 @@ def test_what_repeats_a_sample_does_so_but_for_its_last_digit():
 
 
 def test_samples_at_a_limit_are_there_but_for_their_last_digit():
-    output = 20 + np.minimum(np.random.default_rng(1).standard_normal(400), 5.0)
-    output[200:260] = 30.0
-    assert samples_at_limit(with_last_digits(output)) == samples_at_limit(output) == 60
+    output = np.minimum(20 + np.random.default_rng(1).standard_normal(400), 21.0)
+    for values in (output, with_last_digits(output)):
+        ((limit, samples),) = at_limit(values)
+        assert limit == pytest.approx(21.0)
+        assert np.all(samples[output == 21.0])

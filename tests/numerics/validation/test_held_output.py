@@ -1,4 +1,4 @@
-"""Outputs that repeat themselves while a plant moves, or stop at a limit."""
+"""Outputs that repeat themselves while a plant moves."""
 
 import numpy as np
 import pytest
@@ -6,7 +6,6 @@ import pytest
 from ctrl_realize.numerics.validation.held_output import (
     held_share,
     longest_hold,
-    samples_at_limit,
     stuck_samples,
 )
 
@@ -40,20 +39,6 @@ def test_a_coarse_converter_that_is_held_too_still_shows_it():
     held = np.round(RISE[TIME - TIME % 12] / 0.0445) * 0.0445
     assert held_share(held, RISE) > 0.6
     assert longest_hold(held, RISE) >= 11
-
-
-def test_an_output_that_is_cut_off_stands_without_noise():
-    noisy = RISE + 0.01 * np.random.default_rng(0).standard_normal(300)
-    assert samples_at_limit(noisy) == 0
-    cut = np.minimum(noisy, 0.6)
-    assert samples_at_limit(cut) == np.count_nonzero(cut == 0.6) - _strays(cut)
-    assert samples_at_limit(np.minimum(RISE, 0.6)) == 0  # nothing in it has noise
-
-
-def _strays(cut):
-    """Samples at the limit before it is reached for good: short runs do not count."""
-    below = np.flatnonzero(cut < 0.6)
-    return int(np.count_nonzero(cut[: below[-1]] == 0.6))
 
 
 @pytest.mark.parametrize(("first", "last"), [(10, 60), (110, 140), (200, 299)])

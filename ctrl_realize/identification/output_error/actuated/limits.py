@@ -1,0 +1,132 @@
+"""Outputs that clip: samples at a limit are left out of the fit, and it is told.
+
+They are bounds of what the plant does, not measurements of it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from ....data import Record
+from ....delayed.simulation import simulate_record
+from ....errors import DataError, UnsuitableSystemError
+from ....numerics.arrays import BoolArray, FloatArray
+from ....numerics.validation.limits import at_limit, clips, ends, passed, plateaus
+from ....results import Flag
+from ..arguments import FEWEST_SAMPLES, step_data_of
+from ..result import OutputErrorFit
+from ..summary import fitted_core, fitted_model
+
+_MORE = 0.05  # of the samples on plateaus that a model finds besides: it is fitted anew
+
+Fit = Callable[[Record], OutputErrorFit]
+
+
+def without_cut_noise(record: Record) -> tuple[Record, tuple[Flag, ...]]:
+    """Leave out samples at the highest or lowest value of a noisy output, and tell it.
+
+    They stay where there is no other baseline, or too little else.
+    """
+    output = np.ravel(record.output)
+    limits = at_limit(output)
+    if not limits:
+        return record, ()
+    data = step_data_of(record)
+    rest = 0 if data is None else data.edges[0][0]
+    left, flags = np.zeros(output.size, dtype=bool), []
+    for limit, samples in limits:
+        others = np.count_nonzero(record.seen[rest:] & ~(left | samples)[rest:])
+        left_out = not np.any(samples[:rest]) and bool(others >= FEWEST_SAMPLES)
+        if left_out:
+            left |= samples
+        flags.append(_at_limit(limit, samples, left_out=left_out))
+    return _without(record, left) if left.any() else record, tuple(flags)
+
+
+def _at_limit(limit: float, samples: BoolArray, *, left_out: bool) -> Flag:
+    return Flag(
+        "output_at_limit",
+        f"{np.count_nonzero(samples)} samples are at {limit:.4g} or among such samples, without "
+        "noise beyond: the output saturates there"
+        + (
+            "; they were left out of the fit, and what the plant does beyond is extrapolated"
+            if left_out
+            else ", and gain and lags are those of the clipped signal"
+        ),
+    )
+
+
+def fit_within_limits(record: Record, fit: Fit, *, may_clip: bool = True) -> OutputErrorFit:
+    """Fit a record without the samples at its limits, if there are any.
+
+    With `may_clip`, also those of a limit before the noise are looked for.
+    """
+    kept, flags = without_cut_noise(record)
+    try:
+        found = fit(kept)
+    except DataError:
+        if kept is record:
+            raise
+        # What is left shows no response.
+        found = fit(record)
+        flags = tuple(_at_limit(*end, left_out=False) for end in at_limit(np.ravel(record.output)))
+    if flags or not may_clip:
+        return replace(found, flags=found.flags + flags)
+    return _without_plateaus(record, found, fit) or found
+
+
+def _without_plateaus(record: Record, linear: OutputErrorFit, fit: Fit) -> OutputErrorFit | None:
+    """Fit a record without plateaus, if that and a limit explain it better than a linear plant."""
+    output = np.ravel(record.output)
+    held = plateaus(output, [edge for edge, _ in linear.data.edges])
+    if np.count_nonzero(record.seen & ~held) < FEWEST_SAMPLES or not held.any():
+        return None
+    rows = np.round((linear.time - record.time[0]) / record.dt).astype(np.int64)
+    try:
+        found = fit(_without(record, held))
+        beyond = _simulated(found)
+        further = passed(output, beyond, held) & ~held
+        if np.count_nonzero(further) > _MORE * np.count_nonzero(held):
+            held |= further
+            found = fit(_without(record, held))
+            beyond = _simulated(found)
+    except (DataError, UnsuitableSystemError):
+        return None
+    if not clips(output[rows], linear.fitted, beyond[rows], held[rows]):
+        return None
+    flag = Flag(
+        "output_at_limit",
+        f"{np.count_nonzero(held)} samples are at {_levels(output, held)}, which the output "
+        "reaches with a kink and does not pass: it saturates there, before the noise; they were "
+        "left out of the fit, and what the plant does beyond is extrapolated",
+    )
+    return replace(found, flags=(*found.flags, flag))
+
+
+def _simulated(found: OutputErrorFit) -> FloatArray:
+    """Response of a model to its record (N,), also where samples are missing."""
+    system = fitted_model(fitted_core(found.estimate, found.poles), found)
+    rest = np.isfinite(found.onset) and not found.estimate.relaxing
+    start = "rest" if rest else "estimate"
+    return np.ravel(simulate_record(system, found.records[0], start, gaps=True))
+
+
+def _levels(output: FloatArray, held: BoolArray) -> str:
+    return " and ".join(f"{sign * level:.4g}" for _, sign, level in ends(output, held))
+
+
+def _without(record: Record, samples: BoolArray) -> Record:
+    """Mark samples as missing."""
+    return Record(
+        record.time,
+        record.input,
+        np.where(samples, np.nan, record.output),
+        name=record.name,
+        input_labels=record.input_labels,
+        units=record.units,
+        output_labels=record.output_labels,
+        missing="keep",
+    )

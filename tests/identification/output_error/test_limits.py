@@ -1,0 +1,101 @@
+"""An output that clips: the model is that of the plant, and the flag says what was left out."""
+
+import re
+
+import control as ct
+import numpy as np
+import pytest
+from scipy.signal import lfilter
+
+import ctrl_realize as cr
+from tests.rigs import codes
+
+DT, GAIN, DEAD_TIME = 0.1, 2.0, 1.2
+TIME = DT * np.arange(500)
+PLANT = cr.delayed_ss(ct.tf([GAIN], [9, 6, 1]), dead_time=DEAD_TIME, dt=DT)
+FEW = [(1, 1), (2, 2), (2, 1)]
+
+
+def clipped(u, limit, where, seed=0, noise=0.004):
+    """Output of the plant for an input, clipped behind or before its noise."""
+    clean = np.ravel(PLANT.simulate(u))
+    rest = noise * np.random.default_rng(seed).standard_normal(u.size)
+    if where == "behind":
+        return np.minimum(clean + rest, limit)
+    return np.minimum(clean, limit) + rest
+
+
+def fitted(u, y, **options):
+    return cr.fit_output_error(cr.Record(TIME[: u.size], u, y), **options).fit
+
+
+def holds(fit):
+    low, high = fit.gain_interval
+    return low <= GAIN <= high and fit.interval[0] <= DEAD_TIME <= fit.interval[1]
+
+
+@pytest.mark.parametrize("where", ["behind", "before"])
+@pytest.mark.parametrize(("limit", "sign"), [(1.77, 1), (1.27, -1)])
+def test_gain_and_dead_time_of_a_step_hold_beyond_a_limit(where, limit, sign):
+    u = np.where(TIME < 6, 0.0, 1.0)
+    fit = fitted(u, sign * clipped(u, limit, where), structures=FEW)
+    low, high = sorted(sign * end for end in fit.gain_interval)
+    # as it is recorded the gain is the limit
+    assert low <= GAIN <= high
+    assert low > 1.05 * limit
+    assert fit.interval[0] <= DEAD_TIME <= fit.interval[1]
+    assert codes(fit) == {"output_at_limit"}
+    told = re.search(r"samples are at (\S+?),? ", str(fit.flags[0]))
+    assert float(told[1]) == pytest.approx(sign * limit, abs=0.002)
+
+
+@pytest.mark.parametrize("where", ["behind", "before"])
+def test_an_output_that_reaches_its_limit_by_the_second_of_two_steps(where):
+    u = 0.6 * (TIME >= 6) + 0.4 * (TIME >= 26)
+    fit = fitted(u, clipped(u, 1.7, where), structures=FEW)
+    assert holds(fit)
+    assert codes(fit) == {"output_at_limit"}
+
+
+@pytest.mark.parametrize("where", ["behind", "before"])
+def test_peaks_of_the_response_to_a_binary_input_that_clip(where):
+    u = np.repeat(np.random.default_rng(4).choice([-1.0, 1.0], 34), 15)[:500]
+    fit = fitted(u, clipped(u, 1.1, where, noise=0.02), structures=[(2, 2)])
+    assert holds(fit)
+    assert "output_at_limit" in codes(fit)
+
+
+def test_records_of_which_one_clips_are_fitted_together():
+    u = np.where(TIME < 6, 0.0, 1.0)
+    outputs = [clipped(u, limit, "behind", seed) for seed, limit in enumerate((1.5, 3.0))]
+    records = [cr.Record(TIME, u, y, name=name) for y, name in zip(outputs, "ab", strict=True)]
+    fit = cr.fit_output_error(records, structures=[(2, 2)]).fit
+    assert fit.gain == pytest.approx(GAIN, rel=0.02)
+    told = next(str(flag) for flag in fit.flags if flag.code == "output_at_limit")
+    assert told.startswith("record 'a'")
+
+
+def test_an_output_that_rests_at_its_limit_is_told_and_fitted_as_it_is():
+    u = np.where(TIME < 6, 0.0, 1.0)
+    rests = np.maximum(clipped(u, 9.0, "behind"), 0.0)
+    fit = fitted(u, rests, structures=[(2, 2)])
+    told = next(str(flag) for flag in fit.flags if flag.code == "output_at_limit")
+    assert "at 0 or" in told
+    assert "those of the clipped signal" in told
+    assert fit.measured.size == TIME.size
+
+
+def test_a_limit_that_leaves_no_response_is_told():
+    u = np.where(TIME < 6, 0.0, 1.0)
+    fit = fitted(u, clipped(u, 0.012, "behind"), structures=[(1, 1)])
+    told = next(str(flag) for flag in fit.flags if flag.code == "output_at_limit")
+    assert "those of the clipped signal" in told
+
+
+@pytest.mark.parametrize("pole", [0.0, 0.9])
+def test_a_response_that_settles_is_not_said_to_clip(pole):
+    noise = lfilter([1], [1, -pole], np.random.default_rng(5).standard_normal(500))
+    u = np.where(TIME < 6, 0.0, 1.0)
+    fit = fitted(u, clipped(u, 9.0, "behind") + 0.02 * noise, structures=FEW)
+    assert "output_at_limit" not in codes(fit)
+    assert fit.measured.size == TIME.size
