@@ -363,7 +363,7 @@ SWITCHES = (
     MODES,
     Switch(
         "coloured noise of any input",
-        {f"{FITS}.any_input.fit:in_coloured_noise": first},
+        {f"{FITS}.any_input.stretch:in_coloured_noise": first},
         called=True,
     ),
     Switch(

@@ -190,11 +190,12 @@ def _part(first: OutputErrorFit, latest: float | None) -> tuple[RecordPart, Step
     names = repeats.names if repeats is not None else ("",)
     used = [r for r, name in zip(first.records, names, strict=True) if name not in left_out]
     outputs, inputs = ([np.ravel(getattr(r, k)) for r in used] for k in ("output", "input"))
-    data = sampled_data(outputs, inputs, first.dt, first.dead_time)
+    data = sampled_data(outputs, inputs, first.dt, first.dead_time, first.data.every)
     time, signal = joined_signals(used, data)
     part = sampled_part(data, first.estimate, latest)
-    span = sum(data.lengths) * data.dt
-    return part, bare_data(part.output, signal, data.dt, first.residual, span), time
+    span = sum(data.lengths) * data.step
+    shown = bare_data(part.output, signal, data.dt, first.residual, span, data.every)
+    return part, shown, time
 
 
 def _spread(first: OutputErrorFit) -> list[tuple[EffectKey, float]]:

@@ -15,6 +15,7 @@ from ...numerics.arrays import FloatArray
 from ...numerics.constants import SMALLEST
 from ...numerics.output_error.any_input.data import SampledData
 from ...numerics.output_error.any_input.fit import SampledFit, fit_sampled
+from ...numerics.output_error.any_input.stretch import FOLLOWS
 from ...numerics.output_error.result import OutputErrorEstimate
 from ...numerics.output_error.step_data import bare_data
 from ...numerics.signals.counters import counter_period
@@ -30,9 +31,7 @@ from .result import OutputErrorFit
 from .sensor_flags import missing_code
 from .summary import summarise
 
-FOLLOWS = 36.0
-"""Least chi-square of the response to the input: six standard deviations. White noise without any
-relation to the input reached 23 in 25 records, for the best of all delays and lags."""
+_ALL = 0.99  # of a record, from which on the rest is not reported
 _APART = 5.0  # in standard deviations: largest distance of a record's gain from the others
 
 
@@ -170,13 +169,19 @@ def _summary(
     """Concatenate what was fitted on one time axis."""
     data = found.data
     time, signal = joined_signals([records[i] for i in used], data)
-    length = max(y.size for y in data.outputs) * data.dt
+    length = max(y.size for y in data.outputs) * data.step
     flags = sampled_flags(fit, data.dt, length, limit) + _cut(records, used, found) + flags
-    span = sum(data.lengths) * data.dt
-    joined = bare_data(np.concatenate(data.measured), signal, data.dt, fit.residual.std, span)
+    span = sum(data.lengths) * data.step
+    output, noise = np.concatenate(data.measured), fit.residual.std
+    joined = bare_data(output, signal, data.dt, noise, span, data.every)
     fit = replace(fit, fitted=np.concatenate(found.fitted))
     sums = found.condensed
     reasons: tuple[str, ...] = ()
+    if data.every > 1:
+        reasons = (
+            f"the plant is slow: {'means of' if data.width > 1 else 'one of'} {data.every} samples "
+            "each were fitted, and are what time, measured and fitted show",
+        )
     if sums is not None:
         reasons = (
             f"all {sums.samples} samples, condensed to {sums.data.size} sums of products over "
@@ -197,10 +202,11 @@ def _summary(
 def joined_signals(records: Sequence[Record], data: SampledData) -> tuple[FloatArray, FloatArray]:
     """Times of the samples that are fitted, record after record, and the input there."""
     times: list[FloatArray] = []
+    middle = data.dt * (data.width - 1) / 2
     for record, offset, rows in zip(records, data.offsets, data.rows, strict=True):
-        time = record.time[offset + rows]
-        times.append(time if not times else time - time[0] + times[-1][-1] + data.dt)
-    signals = [u[rows] for u, rows in zip(data.inputs, data.rows, strict=True)]
+        time = record.time[offset + data.every * rows] + middle
+        times.append(time if not times else time - time[0] + times[-1][-1] + data.step)
+    signals = [u[rows] for u, rows in zip(data.held, data.rows, strict=True)]
     return np.concatenate(times), np.concatenate(signals)
 
 
@@ -208,11 +214,11 @@ def _cut(records: tuple[Record, ...], used: tuple[int, ...], found: SampledFit) 
     """Report records of which only a part was used."""
     if found.condensed is not None:
         return ()
-    sizes = [output.size for output in found.data.outputs]
+    sizes = [found.data.every * output.size for output in found.data.outputs]
     long = [
         (records[i].n_samples, size, offset)
         for i, size, offset in zip(used, sizes, found.data.offsets, strict=True)
-        if records[i].n_samples > size
+        if size < _ALL * records[i].n_samples
     ]
     if not long:
         return ()

@@ -80,6 +80,8 @@ def checked(fit: OutputErrorFit, *, alone: bool = True) -> OutputErrorFit:
         if stepped:
             flags += _earlier_input(fit, codes)
         white = bool(fit.estimate.residual.noise_lags)
+        # Neither do they hold for means over blocks of samples.
+        complete = complete if shown.rows is None else ()
         coloured = alone and complete and (white or "coloured_residual" in codes)
         step = generalised_step(fit, shown.output, shown.drive) if coloured else None
         if step is not None:

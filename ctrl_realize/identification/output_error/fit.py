@@ -159,6 +159,13 @@ def fit_output_error(
     samples that there are, with the input at every sample. Their noise is white, or its correlation
     is taken as if they were neighbours; it is not prewhitened.
 
+    Of other inputs than steps up to 4000 samples are fitted one by one, and all further ones if the
+    response ends within 1000 samples. Of a slower plant means over blocks of samples are fitted,
+    evaluated exactly, so that the part that is fitted is as long as the record, or 40 of its
+    slowest time constants at least. Blocks are shorter than time constants; a dead time that is
+    shorter than a block is resolved as far as noise and input allow. If the part is shorter than
+    the record, that is reported (``cut``).
+
     In a model with more zeros than the plant the dead time has no Fisher information: a superfluous
     zero can take its place. Therefore the relative degree is chosen, not left free.
 

@@ -99,11 +99,18 @@ def step_part(data: StepData, fit: OutputErrorEstimate, latest: float | None) ->
 
 
 def sampled_data(
-    outputs: Sequence[FloatArray], inputs: Sequence[FloatArray], dt: float, dead_time: float
+    outputs: Sequence[FloatArray],
+    inputs: Sequence[FloatArray],
+    dt: float,
+    dead_time: float,
+    every: int = 1,
 ) -> SampledData:
-    """Select the samples of records with any input that do not depend on unknown past input."""
-    data = cut(outputs, inputs, dt)
-    late = int(np.ceil(_UNKNOWN * dead_time / dt))
+    """Select the samples of records with any input that do not depend on unknown past input.
+
+    Of `every` samples the mean, if the plant is slow.
+    """
+    data = cut(outputs, inputs, dt, every)
+    late = int(np.ceil(_UNKNOWN * dead_time / data.step))
     return replace(data, starts=tuple(min(late, y.size // 2) for y in data.outputs))
 
 
@@ -118,14 +125,15 @@ def sampled_part(data: SampledData, fit: OutputErrorEstimate, latest: float | No
     variance = float(error @ error) / max(error.size - lost, 1) * correlation
     calm = problem.data - error + np.clip(error, -limit, limit)
     lag = float(np.sum(1 / np.abs(fit.poles)))
-    quarter = 0.25 * max(y.size for y in data.outputs) * data.dt
+    dt = data.step
+    quarter = 0.25 * max(y.size for y in data.outputs) * dt
     return RecordPart(
         replace(problem, data=calm, root_weight=problem.root_weight / np.sqrt(variance)),
         Scales(
-            max(fit.dead_time, 0.5 * data.dt),
-            max(lag, 2 * data.dt),
-            max(data.lengths) * data.dt,
-            data.dt,
+            max(fit.dead_time, 0.5 * dt),
+            max(lag, 2 * dt),
+            max(data.lengths) * dt,
+            dt,
             quarter if latest is None else latest,
         ),
         error.size / correlation,

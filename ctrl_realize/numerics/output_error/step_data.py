@@ -73,6 +73,8 @@ class StepData:
         Duration of records without a step, in s.
     bend : float
         Noise about a baseline that bends; 0 if it does not.
+    every : int
+        Samples of a record for each output of a record without a step.
     """
 
     output: FloatArray
@@ -90,6 +92,7 @@ class StepData:
     relaxing: bool = False
     span: float | None = None
     bend: float = 0.0
+    every: int = 1
 
     @property
     def edge(self) -> int:
@@ -181,13 +184,12 @@ def step_data(
 
 
 def bare_data(
-    output: FloatArray, signal: FloatArray, dt: float, sigma: float, span: float
+    output: FloatArray, signal: FloatArray, dt: float, sigma: float, span: float, every: int = 1
 ) -> StepData:
     """Data of records without a step, with a duration `span` in s: there is no baseline."""
     rows = np.arange(output.size)
-    return StepData(
-        output, signal, dt, [(0, 1)], rows, sigma, 0.0, 0.0, 1.0, [], None, output, span=span
-    )
+    bare = StepData(output, signal, dt, [(0, 1)], rows, sigma, 0.0, 0.0, 1.0, [], None, output)
+    return replace(bare, span=span, every=every)
 
 
 def stop_at(data: StepData, part: float) -> int:

@@ -37,7 +37,7 @@ from ..arrays import ComplexArray, FloatArray, IntArray
 Modes: TypeAlias = tuple[FloatArray, Any, Any]
 """H (B, m), E (B, m, J) and T (B, m, J), the latter real where they are for all of B."""
 
-_TOGETHER = 1e-9  # samples by which a move and a sample may be apart and be at one time
+TOGETHER = 1e-9  # samples by which a move and a sample may be apart and be at one time
 _DISTANT = 20.0  # widths of a bin from an arrival, from which on two samples stand for it
 _PIECE = 2**16  # samples of a response that are found at a time, which bounds the memory
 
@@ -140,12 +140,12 @@ class StepSequence:
         if self.moves.size > 1 or self.samples is not None:
             return None
         arrival = self.moves[0] + tau
-        last = np.searchsorted(self.first, arrival + _TOGETHER * self.dt, side="right") - 1
-        within = self.first[last] + self.lengths[last] > arrival + _TOGETHER * self.dt
+        last = np.searchsorted(self.first, arrival + TOGETHER * self.dt, side="right") - 1
+        within = self.first[last] + self.lengths[last] > arrival + TOGETHER * self.dt
         if (within & (last >= 0)).any():
             return None
         since: FloatArray = self.first - arrival[:, None]
-        return np.where(since > _TOGETHER * self.dt, since, 0.0)
+        return np.where(since > TOGETHER * self.dt, since, 0.0)
 
     def means(self, rates: Any) -> tuple[Any, Any, IntArray]:
         """Mean of exp(p t) over kinds of bins (B, J, k), the mean time, and the kind of each bin.
@@ -208,7 +208,7 @@ class StepSequence:
     def _steps(self) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Times at which a change has arrived, times of the changes, and levels after them."""
         # For a dead time of whole samples rounding must not decide what has arrived.
-        arrivals = self.moves + _TOGETHER * self.dt
+        arrivals = self.moves + TOGETHER * self.dt
         level = np.concatenate([[0.0], np.cumsum(self.sizes)])
         return arrivals, np.concatenate([[np.inf], self.moves]), level
 
@@ -289,7 +289,7 @@ class SampledInput:
         slope = np.zeros_like(mode)
         for b in range(tau.size):
             # A change at sample l is first visible at the first sample after l + tau/dt.
-            whole = int(np.ceil(tau[b] / self.dt - _TOGETHER))
+            whole = int(np.ceil(tau[b] / self.dt - TOGETHER))
             if whole >= n:
                 continue
             rest = max(whole * self.dt - tau[b], 0.0)

@@ -104,17 +104,89 @@ def test_all_samples_of_a_long_record_count():
     assert any("condensed" in choice for choice in fit.choices)
     # what is shown is a stretch
     assert fit.time.size < 4000
-    assert np.std(fit.measured - fit.fitted) < 1.1 * noise / np.sqrt(1 - colour**2)
+    left = np.std(fit.measured - fit.fitted)
+    assert left < 1.1 * noise / np.sqrt(1 - colour**2)
+    assert fit.residual == pytest.approx(left, rel=0.1)
 
 
-def test_a_long_record_of_a_slow_plant_is_cut_and_says_so():
-    slow = lag(0.02)  # responses of 5000 samples
-    u = np.repeat(np.random.default_rng(0).choice([-1.0, 1.0], 100), 60)
-    y = cr.delayed_ss(slow, dead_time=DELAY * DT, dt=DT).simulate(u)
+SLOW = (30.4, 1.5, 0.04)  # a lag of 400 samples
+
+
+def slow_record(n, *, held, values=SLOW, sigma=0.05, seed=0):
+    """Binary levels held for some samples, from rest, and the whole input."""
+    u = np.repeat(np.random.default_rng(seed).choice([-1.0, 1.0], -(-n // held)), held)[:n]
+    y = respond(u, values) + sigma * np.random.default_rng(seed + 1).standard_normal(n)
+    return cr.Record(DT * np.arange(n), u, y), u
+
+
+def test_of_a_slow_plant_all_of_a_long_record_counts():
+    n, sigma = 60_000, 0.05
+    record, u = slow_record(n, held=1)
+    fit = cr.fit_output_error(record, structures=[(1, 1)]).fit
+    pole = np.exp(-2 * np.pi * SLOW[2] * DT)
+    # the gain is as well known as if all else but the level were
+    static = lfilter([1 - pole], [1, -pole], u)
+    known = sigma / np.sqrt(np.sum((static - np.mean(static)) ** 2))
+    low, high = fit.gain_interval
+    assert low <= SLOW[1] <= high
+    assert fit.gain_std_given_structure < 2.5 * known
+    assert fit.interval[0] <= SLOW[0] * DT <= fit.interval[1]
+    assert fit.flags == ()
+    assert any("means of" in choice for choice in fit.choices)
+    assert fit.dt == DT
+    # what is shown are means at their times
+    nearest = np.round(fit.time / DT).astype(int)
+    clean = respond(u, SLOW)[nearest]
+    assert np.std(fit.measured - clean) < sigma / 3
+
+
+def test_the_dead_time_of_means_is_as_exact_as_the_data_allow():
+    # Levels are held for longer than the blocks, so that means lose nothing.
+    record, u = slow_record(30_000, held=60)
+    fit = cr.fit_output_error(record, structures=[(1, 1)]).fit
+    limit = DT * joint_bound([np.append(np.zeros(SKIP), u)], [0.05], SLOW)
+    assert limit * 0.9 < fit.std_given_structure < 1.25 * limit
+    assert abs(fit.dead_time - SLOW[0] * DT) < 3.5 * limit
+
+
+@pytest.mark.parametrize("scattered", [True, False])
+def test_a_long_record_of_a_slow_plant_may_have_gaps(scattered):
+    record, u = slow_record(40_000, held=50)
+    y = np.array(np.ravel(record.output))
+    rng = np.random.default_rng(5)
+    y[rng.random(y.size) < 0.2 if scattered else slice(9000, 12_000)] = np.nan
+    part = cr.Record(record.time, u, y, missing="keep")
+    fit = cr.fit_output_error(part, structures=[(1, 1)]).fit
+    assert fit.gain_interval[0] <= SLOW[1] <= fit.gain_interval[1]
+    assert np.ptp(fit.gain_interval) < 0.04
+    assert abs(fit.dead_time - SLOW[0] * DT) < 3.5 * fit.std_given_structure
+    assert fit.flags == ()
+
+
+def test_a_dead_time_longer_than_the_first_part_of_a_record_is_found():
+    values = (5000.3, 1.5, 0.1)
+    record, _ = slow_record(40_000, held=100, values=values)
+    fit = cr.fit_output_error(record, structures=[(1, 1)]).fit
+    assert fit.interval[0] <= values[0] * DT <= fit.interval[1]
+    assert np.ptp(fit.interval) < 10 * DT
+
+
+def test_a_part_of_a_long_record_says_so():
+    plant = lag(0.1) * lag(4.0)  # a fast lag beside a slow one: the blocks are short
+    u = np.repeat(np.random.default_rng(0).choice([-1.0, 1.0], 300), 60)
+    y = cr.delayed_ss(plant, dead_time=DELAY * DT, dt=DT).simulate(u)
     y += 0.01 * np.random.default_rng(1).standard_normal(u.size)
-    fit = cr.fit_output_error(cr.Record(DT * np.arange(u.size), u, y), structures=[(1, 1)]).fit
-    assert fit.time.size < 4000
-    assert "cut" in [flag.code for flag in fit.flags]
+    fit = cr.fit_output_error(cr.Record(DT * np.arange(u.size), u, y), structures=[(2, 2)]).fit
+    assert [flag.code for flag in fit.flags] == ["cut"]
+    assert fit.interval[0] <= DELAY * DT <= fit.interval[1]
+
+
+def test_records_of_a_slow_plant_that_differ_in_length_are_fitted_together():
+    long, _ = slow_record(30_000, held=60)
+    short, _ = slow_record(3000, held=60, seed=7)
+    fit = cr.fit_output_error([long, short], structures=[(1, 1)]).fit
+    assert fit.gain_interval[0] <= SLOW[1] <= fit.gain_interval[1]
+    assert fit.interval[0] <= SLOW[0] * DT <= fit.interval[1]
 
 
 def test_a_long_dead_time_is_found_under_an_input_that_moves_at_every_sample():

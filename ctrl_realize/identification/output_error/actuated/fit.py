@@ -14,7 +14,7 @@ from ....numerics.actuated.choice import ActuatedFit, Rival, fit_actuated
 from ....numerics.actuated.errors import Errors, propagated
 from ....numerics.actuated.records import MOST_MOVES, ActuatedRecord, actuated_record
 from ....numerics.arrays import FloatArray, IntArray
-from ....numerics.output_error.any_input.fit import WHITE
+from ....numerics.output_error.any_input.stretch import WHITE
 from ....numerics.output_error.result import (
     DistributedLags,
     Followed,

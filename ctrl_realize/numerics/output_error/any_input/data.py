@@ -17,14 +17,18 @@ from ...separable.local_terms import Segments
 from ...separable.responses import HeldInput, SampledInput, SeveralInputs, StepSequence
 from ...separable.varpro import KnownFactor, Problem
 from ...signals.excitation import lively_start
+from .averaged_input import AveragedInput
 
 MOST_SAMPLES = 4000
 """Of longer records a stretch is taken: every sample counts, so that time grows with its length.
-Where their response ends in time all samples are fitted afterwards (`condensed`)."""
+Where their response ends in time all samples are fitted afterwards (`condensed`); where the plant
+is slow means over blocks of samples are fitted, so many of them."""
 
 _SPARSEST = 20
 """Samples, of which one is there, up to which a part is lengthened for what is missing in it. It is
 lengthened fully if the input moves seldom: time then grows with the samples that there are."""
+
+_INCOMPLETE = 0.5  # of the blocks, from which on a sample of each is taken
 
 MOST_MOVES = 200
 """Of an input that holds its values: beyond that the recursion over all samples takes less time."""
@@ -41,9 +45,9 @@ class SampledData:
     ----------
     inputs, outputs : tuple of ndarray
         Of every record, from its first sample on; without the mean of the input. The output is NaN
-        where a sample is missing.
+        where a sample is missing. Of blocks of samples the output is the mean.
     starts : tuple of int
-        Samples before these depend on the input before the record.
+        Outputs before these depend on the input before the record.
     scales : tuple of float
         Noise level of every record relative to the mean one. A linear plant is the same for input
         and output divided by it, and the records are then weighted correctly.
@@ -51,6 +55,8 @@ class SampledData:
         Sample time in s.
     offsets : tuple of int
         First sample of each within its record.
+    every, width : int
+        Inputs in a block for each output, and the samples of it of which an output is the mean.
     """
 
     inputs: tuple[FloatArray, ...]
@@ -59,21 +65,40 @@ class SampledData:
     scales: tuple[float, ...]
     dt: float
     offsets: tuple[int, ...] = ()
+    every: int = 1
+    width: int = 1
+
+    @property
+    def step(self) -> float:
+        """Time from an output to the next, in s."""
+        return self.every * self.dt
+
+    @property
+    def held(self) -> tuple[FloatArray, ...]:
+        """Input of every record, of blocks their mean."""
+        return tuple(_means(u, self.every, self.width) for u in self.inputs)
 
     @cached_property
     def rows(self) -> tuple[IntArray, ...]:
-        """Numbers of the samples of every record that are fitted, from its first one on."""
+        """Numbers of the outputs of every record that are fitted, from its first one on."""
         return tuple(
             start + np.flatnonzero(~np.isnan(y[start:]))
             for y, start in zip(self.outputs, self.starts, strict=True)
         )
 
+    def _drive(self, i: int) -> HeldInput:
+        """Input of a record, for all of its outputs."""
+        signal = self.inputs[i] / self.scales[i]
+        if self.every == 1:
+            return SampledInput(signal, self.dt)
+        return AveragedInput(signal, self.dt, self.every, self.width)
+
     def _sparse_input(self, i: int) -> tuple[HeldInput, IntArray]:
         """Input of a record with missing samples, and the responses of it that are needed."""
         rows, signal = self.rows[i], self.inputs[i] / self.scales[i]
         moves = np.flatnonzero(np.diff(signal, prepend=0.0))
-        if moves.size > MOST_MOVES:
-            return SampledInput(signal, self.dt), rows
+        if moves.size > MOST_MOVES or self.every > 1:
+            return self._drive(i), rows
         sizes = np.diff(signal, prepend=0.0)[moves]
         single = np.ones(rows.size, dtype=np.int64)
         times, when = (self.dt * index.astype(np.float64) for index in (rows, moves))
@@ -97,11 +122,11 @@ class SampledData:
     @property
     def spacing(self) -> float:
         """Mean distance of the samples that are fitted, in sample times."""
-        return sum(self.lengths) / max(sum(self.counts), 1)
+        return self.every * sum(self.lengths) / max(sum(self.counts), 1)
 
     @property
     def lengths(self) -> list[int]:
-        """Samples of every record from the first one fitted on, missing ones included."""
+        """Outputs of every record from the first one fitted on, missing ones included."""
         return [y.size - start for y, start in zip(self.outputs, self.starts, strict=True)]
 
     @property
@@ -120,7 +145,7 @@ class SampledData:
             return self
         return replace(
             self,
-            inputs=tuple(lfilter(noise, [1.0], u) for u in self.inputs),
+            inputs=tuple(_filtered(noise, u, self.every) for u in self.inputs),
             outputs=tuple(lfilter(noise, [1.0], y) for y in self.outputs),
             starts=tuple(start + order for start in self.starts),
         )
@@ -128,17 +153,14 @@ class SampledData:
     def problem(self, known: KnownFactor) -> Problem:
         """Set up the fit of all records together."""
         clocks = [
-            self.dt * (rows - start).astype(np.float64)
+            self.step * (rows - start).astype(np.float64)
             for rows, start in zip(self.rows, self.starts, strict=True)
         ]
         shapes = [_own_shapes(clock, known) for clock in clocks]
         m = int(self.edges[-1])
         if self.complete:
             drive = SeveralInputs(
-                tuple(
-                    SampledInput(u / scale, self.dt)
-                    for u, scale in zip(self.inputs, self.scales, strict=True)
-                ),
+                tuple(self._drive(i) for i in range(len(self.inputs))),
                 self.starts,
             )
         else:
@@ -152,10 +174,21 @@ class SampledData:
         return Problem(joined, np.ones(m), drive, np.empty((m, 0)), known, segments)
 
 
-def cut(outputs: Sequence[FloatArray], inputs: Sequence[FloatArray], dt: float) -> SampledData:
-    """Shorten long records to a part in which the input moves; the shortest are kept complete."""
-    sizes = np.array([y.size for y in outputs])
-    seen = np.array([np.count_nonzero(~np.isnan(y)) for y in outputs])
+def cut(
+    outputs: Sequence[FloatArray], inputs: Sequence[FloatArray], dt: float, every: int = 1
+) -> SampledData:
+    """Shorten long records to a part in which the input moves; the shortest are kept complete.
+
+    Of `every` samples one output is left: their mean, or the first one if so many samples are
+    missing that most blocks are not complete.
+    """
+    width = every
+    means = [_means(y, every, width) for y in outputs]
+    if every > 1 and any(np.isnan(y).mean() > _INCOMPLETE for y in means):
+        width = 1
+        means = [_means(y, every, width) for y in outputs]
+    sizes = np.array([y.size for y in means])
+    seen = np.array([np.count_nonzero(~np.isnan(y)) for y in means])
     lengths = np.minimum(seen, MOST_SAMPLES)
     share = MOST_SAMPLES
     while np.minimum(lengths, share).sum() > MOST_IN_ALL:
@@ -165,19 +198,41 @@ def cut(outputs: Sequence[FloatArray], inputs: Sequence[FloatArray], dt: float) 
     moves = np.array([np.count_nonzero(np.diff(u)) for u in inputs])
     sparse = np.where(moves < MOST_MOVES, sparse, np.minimum(sparse, _SPARSEST))
     lengths = np.minimum(sizes, (np.minimum(lengths, share) * sparse).astype(np.int64))
-    offsets = tuple(
-        lively_start(u[None], int(n)) if n < u.size else 0
-        for u, n in zip(inputs, lengths, strict=True)
-    )
-    parts = [slice(first, first + int(n)) for first, n in zip(offsets, lengths, strict=True)]
+    firsts = [
+        lively_start(u[None], every * int(n)) // every if n < y.size else 0
+        for u, y, n in zip(inputs, means, lengths, strict=True)
+    ]
+    parts = [slice(first, first + int(n)) for first, n in zip(firsts, lengths, strict=True)]
+    spans = [slice(every * part.start, every * part.stop) for part in parts]
     return SampledData(
-        tuple(u[part] - float(np.mean(u[part])) for u, part in zip(inputs, parts, strict=True)),
-        tuple(y[part] for y, part in zip(outputs, parts, strict=True)),
+        tuple(u[span] - float(np.mean(u[span])) for u, span in zip(inputs, spans, strict=True)),
+        tuple(y[part] for y, part in zip(means, parts, strict=True)),
         (0,) * len(lengths),
         (1.0,) * len(lengths),
         dt,
-        offsets=offsets,
+        offsets=tuple(span.start for span in spans),
+        every=every,
+        width=width,
     )
+
+
+def _means(values: FloatArray, every: int, width: int) -> FloatArray:
+    """Mean of the first `width` of `every` samples."""
+    if every == 1:
+        return values
+    count = values.size // every
+    blocks = values[: count * every].reshape(count, every)
+    return np.asarray(blocks[:, :width].mean(axis=1))
+
+
+def _filtered(noise: FloatArray, values: FloatArray, every: int) -> FloatArray:
+    """Filter with a polynomial in the delay by `every` samples."""
+    if every == 1:
+        return np.asarray(lfilter(noise, [1.0], values))
+    whole: FloatArray = noise[0] * values
+    for lag, weight in enumerate(noise[1:], start=1):
+        whole[lag * every :] += weight * values[: -lag * every]
+    return whole
 
 
 def _own_shapes(clock: FloatArray, known: KnownFactor) -> FloatArray:

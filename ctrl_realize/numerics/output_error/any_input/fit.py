@@ -44,24 +44,12 @@ from ..selection import chains_of
 from .condensed import MOST_LAGS, Condensed, condensed
 from .data import SampledData, cut
 from .own_response import own_response
-from .window import (
-    BEYOND,
-    ORDERS,
-    SampledWindow,
-    fit_windows,
-    in_coloured_noise,
-    modelled,
-    window_of,
-)
-
-WHITE = 3.0
-"""Correlation time of the residual, in samples, up to which a model is taken for right: twice what
-white noise scatters to. It decides on flags alone."""
+from .stretch import WHITE, explained, fit_stretch, response_samples, samples_in_a_block
+from .window import ORDERS, SampledWindow, modelled, window_of
 
 MORE_LAGS = (Structure(4, 4), Structure(5, 5))
 """Tried as well where three poles are chosen: zeros beside them imitate further lags. Ablation:
 fourth and fifth lag."""
-_DIED_AWAY = 10.0  # slowest time constants in which a response ends, but for 5e-5 of it
 _LEAST_LAGS = 30  # of a response that is condensed; fewer cost as much
 _CLEARLY = 4.0  # standard deviations of a chi-square: 3e-5 by chance
 
@@ -86,8 +74,8 @@ class SampledFit:
 
     def own_delay(self, output: FloatArray, signal: FloatArray) -> OwnResponse:
         """Shift and scale the common model to fit one record best, whether it was fitted or not."""
-        one = cut([output], [signal], self.data.dt)
-        start = min(max(self.data.starts), output.size // 2)
+        one = cut([output], [signal], self.data.dt, self.data.every)
+        start = min(max(self.data.starts), one.outputs[0].size // 2)
         one = replace(one, starts=(start,)).whitened(self.noise)
         return own_response(one, self.fit, self.known)
 
@@ -124,25 +112,29 @@ def fit_sampled(
     inputs and outputs are filtered by the residual's autoregressive model, which does not change a
     linear plant. Not if structures are given: the residual may be what they cannot describe.
 
+    Of a record of more than `data.MOST_SAMPLES` a part is fitted. If the response ends within
+    `condensed.MOST_LAGS` samples, all samples are fitted afterwards; if the plant is slower, means
+    over blocks of samples, with which the part is longer (`stretch`).
+
     Where samples are missing, there is no filter, and the correlation of the residual is that of
     its samples as if they were neighbours: an average over the gaps, as it counts for the errors of
     slow parameters.
     """
     factor = known or KnownFactor()
-    data = cut(outputs, inputs, dt)
-    limit = 0.25 * max(y.size for y in data.outputs) * dt if latest is None else latest
     tried = ORDERS if structures is None else tuple(structures)
-    part = fit_windows(data, factor, tried, limit, huber, np.ones(1))
-    unweighted = None
-    if part.fit.correlation > WHITE and structures is None and whiten and data.complete:
-        unweighted = part.model
-        part = in_coloured_noise(part)
+    fit_part = partial(fit_stretch, factor, latest, huber)
+    every, done = samples_in_a_block(outputs, inputs, dt, whiten, fit_part)
+    if done is None or structures is not None:
+        whiten &= structures is None
+        done = fit_part(whiten, cut(outputs, inputs, dt, every), tried)
+    part, unweighted = done
     data, stretch = part.data, part.fit
     fits = stretch
-    long = any(y.size > kept.size for y, kept in zip(outputs, data.outputs, strict=True))
+    long = any(y.size > every * kept.size for y, kept in zip(outputs, data.outputs, strict=True))
     usable = long and not any(np.isnan(y).any() for y in outputs)
     sums = _condensed(outputs, inputs, data, stretch, huber) if usable else None
     if sums is not None:
+        stretch = replace(stretch, scales=replace(stretch.scales, dt=dt))
         fits = _fit_condensed(sums, stretch, factor)
     if structures is None and fits.best.structure.order == ORDERS[-1].order:
         fits = extended(fits, MORE_LAGS)
@@ -161,7 +153,9 @@ def fit_sampled(
     else:
         fit = likelihood_fit(fits, adequate=white, chains=chains, better=better)
     if sums is not None:
-        fit = replace(fit, fitted=_on_stretch(data, fit, factor))
+        fitted = _on_stretch(data, fit, factor)
+        left = winsorised_sigma(window_of(data, factor).output - fitted, 0.0)
+        fit = replace(fit, fitted=fitted, residual=fit.residual._replace(std=left))
     elif part.noise.size > 1:
         fit = replace(_of_measured(part, fit), unweighted=unweighted)
     elif fit.distributed.chain:
@@ -177,7 +171,7 @@ def fit_sampled(
         fit,
         data,
         tuple(values * scale for values, scale in zip(parts, data.scales, strict=True)),
-        _explained(stretch),
+        explained(stretch),
         factor,
         part.noise,
         sums,
@@ -210,9 +204,7 @@ def _condensed(
     huber: bool,
 ) -> Condensed | None:
     """All samples of records of which a part was fitted, if their response is short enough."""
-    best = stretch.best
-    slowest = float(1.0 / np.abs(best.poles.real).min())
-    lags = (BEYOND * best.dead_time + _DIED_AWAY * slowest) / data.dt
+    lags = response_samples(stretch.best, data.dt)
     if not lags <= MOST_LAGS:
         return None
     return condensed(
@@ -258,12 +250,3 @@ def _on_stretch(data: SampledData, fit: OutputErrorEstimate, known: KnownFactor)
 
 def _parameters(fit: OutputErrorEstimate) -> FloatArray:
     return np.concatenate([[fit.dead_time], parameters_from_poles(fit.poles)])
-
-
-def _explained(fits: WindowFit) -> float:
-    """Chi-square of the forced response: local terms alone against local terms and input."""
-    problem, best = fits.problem, fits.best
-    assert problem.segments is not None
-    own = problem.local_terms(best.poles[None])
-    alone = float(np.sum(own.without(problem.data[None, :, None]) ** 2))
-    return (alone - best.cost) / max(fits.variance, 1e-300)

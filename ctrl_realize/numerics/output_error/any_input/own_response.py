@@ -35,7 +35,7 @@ def own_response(data: SampledData, fit: OutputErrorEstimate, known: KnownFactor
     own = problem.local_terms(poles_from_parameters(parameters_from_poles(fit.poles)[None])[0])
     target = own.without(problem.data[None, :, None])[0, :, 0]
     lost = problem.local_count(fit.poles.size)
-    h = 0.25 * data.dt
+    h = 0.25 * data.step
 
     def response(dead_time: float, stretch: float = 1.0) -> FloatArray:
         # The core with a slower time scale: poles divided by the stretch, with the same gain.
@@ -63,8 +63,8 @@ def own_response(data: SampledData, fit: OutputErrorEstimate, known: KnownFactor
         size = gain or 1.0
         move = float(solution[1]) / size
         error = float(errors[1]) / abs(size)
-        shift = at - fit.dead_time + float(np.clip(move, -20 * data.dt, 20 * data.dt))
-        if abs(move) < 1e-3 * data.dt:
+        shift = at - fit.dead_time + float(np.clip(move, -20 * data.step, 20 * data.step))
+        if abs(move) < 1e-3 * data.step:
             break
     # Small stretches: the derivative of the response with respect to the log of the time constants.
     turn = (response(at, 1 + _STRETCH) - response(at, 1 - _STRETCH)) / (2 * _STRETCH)
@@ -76,7 +76,7 @@ def own_response(data: SampledData, fit: OutputErrorEstimate, known: KnownFactor
     followed = fit_percent(target[None], forced[None])
     return OwnResponse(
         shift,
-        max(error, 1e-12 * data.dt),
+        max(error, 1e-12 * data.step),
         gain,
         max(gain_error, 1e-12),
         lag,

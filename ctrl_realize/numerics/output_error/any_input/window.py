@@ -89,7 +89,7 @@ def fit_windows(
 
     Dead times are sought up to `limit`, in s.
     """
-    dt, n, usual = data.dt, max(y.size for y in data.outputs), data.spacing * data.dt
+    dt, n, usual = data.step, max(y.size for y in data.outputs), data.spacing * data.dt
     order = noise.size - 1
     alike = (1.0,) * len(data.outputs)
     data = replace(data, starts=tuple(y.size // 20 for y in data.outputs), scales=alike)
@@ -144,7 +144,7 @@ def window_of(data: SampledData, known: KnownFactor) -> Window:
     """Set up the fit of all samples."""
     problem = data.problem(known)
     window = Window(0, problem.data, problem, problem.drive, problem.regressors, None)
-    return replace(window, spacing=data.spacing)
+    return replace(window, spacing=data.spacing / data.every)
 
 
 def _fit(
@@ -190,8 +190,8 @@ def _seen(data: SampledData, limit: float) -> list[float]:
     lie between the dead times that are tried otherwise. Missing samples are interpolated here.
     """
     found = []
-    for u, y in zip(data.inputs, data.outputs, strict=True):
-        most = int(min(limit / data.dt, u.size // 3))
+    for u, y in zip(data.held, data.outputs, strict=True):
+        most = int(min(limit / data.step, u.size // 3))
         if most > 1 and np.ptp(u) > 0:
             found.append(correlation_onset(u, without_gaps(y), most, _CONFIDENCE).onset)
     onsets = [float(lag) for lag in found if lag > 0]

@@ -1,0 +1,120 @@
+"""Part of long records that is fitted: every sample of fast plants, and means of slow ones.
+
+A plant is seen for as many of its time constants as the record has, up to a limit of computing
+time. The selection is our own rule.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import TypeAlias
+
+import numpy as np
+
+from ...arrays import FloatArray
+from ...separable.structures import Candidate
+from ...separable.varpro import KnownFactor, Structure
+from ...separable.window import WindowFit
+from ..result import UnweightedModel
+from .condensed import MOST_LAGS
+from .data import SampledData, cut
+from .window import BEYOND, ORDERS, SampledWindow, fit_windows, in_coloured_noise
+
+FOLLOWS = 36.0
+"""Least chi-square of the response to the input: six standard deviations. White noise without any
+relation to the input reached 23 in 25 records, for the best of all delays and lags."""
+WHITE = 3.0
+"""Correlation time of the residual, in samples, up to which a model is taken for right: twice what
+white noise scatters to. It decides on flags alone."""
+
+_DIED_AWAY = 10.0  # slowest time constants in which a response ends, but for 5e-5 of it
+_SEEN = 40.0  # slowest time constants in the part that is fitted, if the record is as long
+_RESOLVED = 4.0, 8.0  # blocks in the fastest and in the slowest time constant
+_GROWTH = 16  # of blocks, before the time constants are looked at again
+_SIMPLE = (Structure(1, 1), Structure(2, 2))
+_FEWEST = 200  # blocks in the shortest of several records
+_MOST_AVERAGED = 4e6  # samples of which means are formed if fewer show the plant for long enough
+_WORTHWHILE = 1.2  # length of a record over that of a part of it that is taken for all
+_NEARLY = 0.8  # of a record, from which on all of it is taken
+
+Stretch: TypeAlias = tuple[SampledWindow, UnweightedModel | None]
+"""Fit of a part of the records, and the model before the filter if its noise is coloured."""
+
+
+def fit_stretch(
+    known: KnownFactor,
+    latest: float | None,
+    huber: bool,
+    whiten: bool,
+    data: SampledData,
+    structures: Sequence[Structure],
+) -> Stretch:
+    """Fit structures to a part of the records, by default dead times up to a quarter of it."""
+    limit = 0.25 * max(y.size for y in data.outputs) * data.step if latest is None else latest
+    part = fit_windows(data, known, structures, limit, huber, np.ones(1))
+    if not (part.fit.correlation > WHITE and whiten and data.complete):
+        return part, None
+    return in_coloured_noise(part), part.model
+
+
+def samples_in_a_block(
+    outputs: Sequence[FloatArray],
+    inputs: Sequence[FloatArray],
+    dt: float,
+    whiten: bool,
+    fitted: Callable[[bool, SampledData, Sequence[Structure]], Stretch],
+) -> tuple[int, Stretch | None]:
+    """Samples of which the mean is fitted, so that a slow plant is seen for long enough.
+
+    That is, `_SEEN` of its slowest time constants if the record is as long, and more while blocks
+    are short beside its time constants. Simple structures tell, in coloured noise, which imitates a
+    slow plant, all of them; if that fit is the one that is wanted it is returned as well. The first
+    part may be too short, show no response, or leave room for a fast pole that is none: longer
+    blocks are looked at until they do not grow.
+    """
+    sizes = [y.size for y in outputs]
+    longest, every = max(sizes), 1
+    while True:
+        data = cut(outputs, inputs, dt, every)
+        rows = max(y.size for y in data.outputs)
+        if longest < _WORTHWHILE * every * rows:
+            return every, None
+        fit = fitted(False, data, _SIMPLE)[0].fit
+        if every == 1 and _seen_to_end(fit, dt):
+            return 1, None
+        if every == 1 and fit.correlation > WHITE and whiten and data.complete:
+            done = fitted(True, data, ORDERS)
+            fit = done[0].fit
+            if _seen_to_end(fit, dt):
+                return 1, done
+        wanted = min(longest / rows, max(min(sizes) / _FEWEST, 1.0))
+        if explained(fit) >= FOLLOWS:
+            poles = fit.best.poles * dt
+            slow, fast = 1.0 / float(np.abs(poles.real).min()), 1.0 / float(np.abs(poles).max())
+            most = min(fast / _RESOLVED[0], slow / _RESOLVED[1], _MOST_AVERAGED / rows)
+            enough = max(_SEEN * slow / rows, most, 1.0)
+            wanted = enough if enough < _NEARLY * wanted else wanted
+        following = int(np.ceil(min(wanted, _GROWTH * every)))
+        if following < _WORTHWHILE * every or following * rows >= longest:
+            return following, None
+        every = following
+
+
+def _seen_to_end(fit: WindowFit, dt: float) -> bool:
+    """Whether the output follows the input, and its response ends within `MOST_LAGS` samples."""
+    return explained(fit) >= FOLLOWS and response_samples(fit.best, dt) <= MOST_LAGS
+
+
+def response_samples(best: Candidate, dt: float) -> float:
+    """Samples until the response of a model to a pulse has ended."""
+    slowest = float(1.0 / np.abs(best.poles.real).min())
+    return (BEYOND * best.dead_time + _DIED_AWAY * slowest) / dt
+
+
+def explained(fits: WindowFit) -> float:
+    """Chi-square of the forced response: local terms alone against local terms and input."""
+    problem, best = fits.problem, fits.best
+    assert problem.segments is not None
+    own = problem.local_terms(best.poles[None])
+    alone = float(np.sum(own.without(problem.data[None, :, None]) ** 2))
+    return (alone - best.cost) / max(fits.variance, 1e-300)
