@@ -143,8 +143,8 @@ def fit_sampled(
     if structures is not None:
         # On the part also if all samples were fitted: what is ruled out there is ruled out in any
         # case.
-        every = partial(part.fit_of, ORDERS)
-        better = better_structure(stretch, stretch.best, every)
+        all_orders = partial(part.fit_of, ORDERS)
+        better = better_structure(stretch, stretch.best, all_orders)
     white = fits.correlation <= WHITE
     if forms:
         fit = process_fit(
