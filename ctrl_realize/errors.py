@@ -9,6 +9,24 @@ from __future__ import annotations
 import sys
 import warnings
 
+__all__ = [
+    "CtrlRealizeError",
+    "CtrlRealizeWarning",
+    "DataError",
+    "DataWarning",
+    "DelayRangeError",
+    "FileFormatError",
+    "MissingFileError",
+    "MissingPackageError",
+    "ModelWarning",
+    "NoStepError",
+    "OptionError",
+    "OrderError",
+    "TimeAxisError",
+    "UnresolvedWarning",
+    "UnsuitableSystemError",
+]
+
 _INSIDE = ("ctrl_realize", "control")
 """Packages whose frames are skipped when a warning is attributed to a line of the caller."""
 

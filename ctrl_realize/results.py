@@ -11,13 +11,23 @@ from dataclasses import dataclass
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, Literal
 
-from ._parameters import Parameter as Parameter
-from ._parameters import checked_time_unit, formula, parameter_table
+from ._parameters import Parameter, checked_time_unit, formula, parameter_table
 from ._shown import html_card, text_card
 from ._wording import ASSUMED, shown_unit, times_in
 
 if TYPE_CHECKING:
     import pandas as pd
+
+__all__ = [
+    "INTERVAL_LABELS",
+    "Drawable",
+    "Flag",
+    "FractionalDelayFit",
+    "IntervalKind",
+    "ModelFit",
+    "Parameter",
+    "Result",
+]
 
 IntervalKind = Literal["confidence", "conditional", "spanned", "flatness", "plausible", "tracked"]
 """Kinds of intervals of a dead time; see `ModelFit`."""

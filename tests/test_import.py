@@ -77,3 +77,12 @@ def test_completion_offers_what_is_public_and_no_module_of_ours(module):
         and not isinstance(value, types.ModuleType)
     }
     assert public <= set(offered)
+
+
+@pytest.mark.parametrize("name", sorted(SUBMODULES))
+def test_a_public_module_exports_its_own_names_only(name):
+    module = importlib.import_module(f"ctrl_realize.{name}")
+    owners = {one: getattr(getattr(module, one), "__module__", None) for one in module.__all__}
+    others = {o for o, at in owners.items() if at and not at.startswith(("ctrl_realize", "typing"))}
+    assert others == set()
+    assert not {"annotations", "Any", "dataclass", "warn_caller"} & set(module.__all__)
