@@ -108,6 +108,7 @@ def time_axis(table: Table, index: int, clock: Clock, date: int | None = None) -
     return TimeAxis(to_seconds(values, used), unit=used if unit else ASSUMED)
 
 
+@np.errstate(over="ignore", invalid="ignore")  # the largest doubles
 def _stated_unit(table: Table, index: int) -> str:
     """Unit of a column whose steps are the sample time that the file states, empty without one."""
     stated = {name: value for name, value in table.constants.items() if sample_time_unit(name)}

@@ -63,6 +63,10 @@ def test_a_stated_sample_time_is_compared_with_the_column(tmp_path):
     with pytest.raises(OptionError, match=r"steps of 0\.05, .*SampleTime\[ms\] 1; give time_unit="):
         cr.read_record(path)
     assert cr.read_record(path, time_unit="min").dt == pytest.approx(3.0)
+    # a column of that name is no statement
+    stamps = cr.read_record(columns(tmp_path / "b.csv", "ts [ms],u,y", 1e3), time=0)
+    assert_allclose(stamps.time, T, rtol=1e-12)
+    assert cr.read_record(tmp_path / "b.csv", time="ts [ms]").n_samples == T.size
     np.savez(tmp_path / "a.npz", u=U, y=Y, **{"dt [ms]": 1.0})
     assert cr.read_record(tmp_path / "a.npz").dt == 1e-3
 

@@ -83,6 +83,7 @@ QUALITIES = {  # header, cells behind time, u and y, what is asked, and which of
     "PI's Good": ("Good", ["True", "False", *["True"] * 4], {}, [1]),
     "flags of good": ("y.IsGood", [1, 0, 1, 1, 1, 0], {}, [1, 5]),
     "mixed": ("y quality", ["192", "Bad", "0", "192", "good", "192"], {}, [1, 2]),
+    "words beside numbers": ("Quality", ["1", "Bad", "2", "1", "1", "1"], {}, [1]),
     "other numbers": ("Status", [0, 1, 0, 1, 0, 1], {}, []),
     "a switch": ("Status", ["true", "false"] * 3, {}, []),
     "always the same": ("Quality", [0] * 6, {}, []),

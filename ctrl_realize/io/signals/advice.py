@@ -27,6 +27,7 @@ def tell_counters(path: Path, samples: Samples) -> None:
             )
 
 
+@np.errstate(over="ignore", invalid="ignore")  # the largest doubles
 def explained(error: TimeAxisError, table: Table, samples: Samples, dated: bool) -> str:
     """Message of a fault of the time axis, with its place in the file and what helps."""
     row = re.search(r"row (\d+)", str(error))

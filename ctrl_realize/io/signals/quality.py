@@ -129,20 +129,23 @@ class Rules:
 
         place, kinds = pd.factorize(cells, use_na_sentinel=False)
         bad = self._bad_kinds([str(kind).strip().casefold() for kind in kinds], name)
-        return None if bad is None else bad[place]
+        return None if bad is None else np.asarray(bad[place])
 
     def _bad_kinds(self, words: list[str], name: str) -> BoolArray | None:
         codes = np.array([_code(word) for word in words])
         if self.good:
             good = [word.casefold() for word in self.good]
             numbers = [_code(word) for word in good]
-            return ~(np.isin(codes, numbers) | np.array([word in good for word in words], bool))
+            fine = np.isin(codes, numbers) | np.array([word in good for word in words], dtype=bool)
+            return np.asarray(~fine)
         flags = {} if "status" in name else _FLAGS
         bad = np.array([flags.get(word, _is_bad(word)) for word in words], dtype=bool)
         if np.isnan(codes).all():
             return bad
         by_code = codes == 0 if "good" in name else _bad_codes(codes)
-        return by_code if by_code is None else by_code | bad
+        if by_code is None:
+            return bad if bad.any() else None
+        return np.asarray(by_code | bad)
 
 
 def rules_of(keep: bool, na_values: object, quality: str | int | None, good: object) -> Rules:
@@ -166,7 +169,7 @@ def _plain(name: str) -> str:
 
 def _tags(name: str) -> list[str]:
     """Names of a signal, with and without its unit and the word value at its end."""
-    return [re.sub(r" val(ue)?$", "", _plain(one)) for one in (split_unit(name)[0], name)]
+    return [re.sub(r" (value|val)$", "", _plain(one)) for one in (split_unit(name)[0], name)]
 
 
 def _qualities(table: Table) -> dict[int, str]:
@@ -199,9 +202,9 @@ def _bad_codes(codes: FloatArray) -> BoolArray | None:
     if np.any(np.abs(whole) >= 2**16):
         return np.asarray(whole >> 31 & 1 == 1)
     low = whole & 0xFF
-    if np.any((low >= _GOOD) & (low < _SYSTEM_STATES)):
+    if np.any((whole > 0) & (low >= _GOOD) & (low < _SYSTEM_STATES)):
         vendors = (whole > 0xFF) & (low != _GOOD) & (low != _FORCED)
-        return ~np.isnan(codes) & ((whole < _UNCERTAIN) | vendors)
+        return np.asarray(~np.isnan(codes) & ((whole < _UNCERTAIN) | vendors))
     return np.asarray(whole != 0) if np.any(whole >= _SYSTEM_STATES) else None
 
 

@@ -107,7 +107,7 @@ def in_utc(stamps: Stamps, zone: str) -> Stamps:
             reason = error
             continue
         utc = np.asarray(local.tz_convert("UTC").tz_localize(None), dtype="datetime64[ns]")
-        return utc[np.cumsum(new) - 1][::turned]
+        return np.asarray(utc[np.cumsum(new) - 1][::turned])
     raise DataError(
         f"time_zone={zone!r} does not fit the stamps: {reason}; expected an hour that comes twice, "
         "in order of time, where summer time ends"

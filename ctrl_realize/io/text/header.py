@@ -31,13 +31,13 @@ class Head:
         """Return the kinds of the cells of a line."""
         return [kind_of(cell, self.decimal) for cell in self.cells[row]]
 
-    def sample_times(self) -> dict[str, float]:
+    def sample_times(self, first: int) -> dict[str, float]:
         """Sample times with a unit in the lines above the data, such as ``SampleTime[ms];1``.
 
         NaN if there are different ones.
         """
         found: dict[str, float] = {}
-        for name, value in (pair for cells in self.cells for pair in pairwise(cells)):
+        for name, value in (pair for cells in self.cells[:first] for pair in pairwise(cells)):
             if sample_time_unit(name) and NUMBER[self.decimal].fullmatch(value):
                 number = float(value.replace(",", "."))
                 found[name] = number if found.get(name, number) == number else math.nan
@@ -50,9 +50,11 @@ class Head:
         """
         rows = range(len(self.cells))
         keyed = [
-            len(self.cells[row]) == self.width > 1 and self.kinds(row)[0] == "text" for row in rows
+            len(cells) == self.width > 1 and kind_of(cells[0], self.decimal) == "text"
+            for cells in self.cells
         ]
-        middle = next((k for k in rows if keyed[k] and sample_time_unit(self.cells[k][0])), None)
+        stated = [k for k in rows if keyed[k] and sample_time_unit(self.cells[k][0])]
+        middle = next((k for k in stated if self.kinds(k)[1] == "number"), None)
         if middle is None:
             return range(0)
         start = next((k + 1 for k in range(middle, -1, -1) if not keyed[k]), 0)
@@ -95,11 +97,11 @@ def column_names(head: Head, first: int) -> tuple[list[str], list[str]]:
         lines = {head.cells[row][0].lower(): head.cells[row] for row in reversed(block)}
         times = next(cells for key, cells in lines.items() if sample_time_unit(key))
         unit = sample_time_unit(times[0])
-        names = [
+        called = [
             f"time [{unit}]" if key == times[0] else name
             for name, key in zip(lines.get("name", times), times, strict=True)
         ]
-        return names, [unit_of(name[:MAX_NAME]) for name in names]
+        return called, [unit_of(name[:MAX_NAME]) for name in called]
     texts = [_header_cells(head, row, first) for row in range(first)]
     names = texts[-1] if texts else None
     if names is not None:

@@ -108,7 +108,7 @@ def sniff(source: TextSource, options: TextOptions) -> TextLayout:
     whole = len(head_bytes) < HEAD_BYTES and len(lines) < MAX_HEAD_LINES
     return TextLayout(
         encoding, delimiter, decimal, comment, begin.number, width, tuple(names), tuple(units),
-        begin.start, tuple(cells[first]), len(rows) - first, whole, head.sample_times(),
+        begin.start, tuple(cells[first]), len(rows) - first, whole, head.sample_times(first),
     )  # fmt: skip
 
 

@@ -20,6 +20,7 @@ _ANGLES = (2 * np.pi, 360.0)
 _BITS = tuple(2.0**bits for bits in range(8, 33))
 
 
+@np.errstate(over="ignore", invalid="ignore")  # the largest doubles
 def counter_period(values: FloatArray) -> float | None:
     """Find the range of a counter that starts again; None if the signal looks like no counter.
 
