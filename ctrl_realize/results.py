@@ -161,7 +161,7 @@ class ModelFit(Result):
         Of the dead time; `dead_time_interval` is the same, or None if it is not reliable.
     interval_kind : str or None
         Kind of `interval`. ``"confidence"``: a 95 % interval. ``"conditional"``: a 95 % interval if
-        the requested structure were right, although the data rule it out. ``"spanned"``: the range
+        the requested order or structure is right. ``"spanned"``: the range
         of several estimates, if no model fits down to the noise level. ``"flatness"``: delays
         within 5 % of the smallest IAE. ``"plausible"``: dead times that are not ruled out, without
         a probability. ``"tracked"``: for the samples within the forgetting time of a tracker.

@@ -15,8 +15,8 @@ from unittest import mock
 
 import numpy as np
 
+from ctrl_realize.numerics.output_error.before_the_step import _STRONG, _dies_away
 from ctrl_realize.numerics.output_error.selection import flows_of
-from ctrl_realize.numerics.output_error.step_fit import _STRONG, _dies_away
 from ctrl_realize.numerics.separable.structures import PLAUSIBLE, choose, needless_parameters
 
 Change = Callable[[Any], Any]
@@ -25,6 +25,7 @@ Change = Callable[[Any], Any]
 NUMERICS = "ctrl_realize.numerics"
 FITS = f"{NUMERICS}.output_error"
 STEP = f"{FITS}.step_fit"
+BEFORE = f"{FITS}.before_the_step"
 SEPARABLE = f"{NUMERICS}.separable"
 PUBLIC = "ctrl_realize.identification.output_error"
 
@@ -122,7 +123,7 @@ def _without_drift(make: Any) -> Any:
 
 
 def _while_it_dies_away(_: Any) -> Any:
-    return lambda data, whole, known: data.relaxing and not _dies_away(data, whole, known)
+    return lambda data, whole: data.relaxing and not _dies_away(data, whole)
 
 
 def _best_fit(_: Any) -> Any:
@@ -193,7 +194,7 @@ SWITCHES = (
         {
             f"{SEPARABLE}.structures:needless_parameters": giving(0.0),
             f"{FITS}.selection:needless_parameters": giving(0.0),
-            f"{STEP}:needless_parameters": giving(0.0),
+            f"{BEFORE}:needless_parameters": giving(0.0),
         },
         (f"{STEP}:fit_window", f"{FITS}.any_input.window:fit_window"),
         called=True,
@@ -272,22 +273,33 @@ SWITCHES = (
         {f"{FITS}.step_data:StepData.explanations": _only(lambda way: not way.relaxing)},
     ),
     Switch("exponential before the step", {f"{FITS}.step_data:relaxation": giving(None)}),
-    Switch("bend before the step", {f"{FITS}.step_data:noise_about_a_bend": giving(0.0)}),
+    Switch(
+        "swing before the step",
+        {f"{NUMERICS}.signals.baseline:_SMOOTH": value(np.inf)},
+        (f"{FITS}.step_data:noise_about_a_motion",),
+    ),
+    Switch(
+        "simple models alone",
+        {f"{STEP}:_FAR_POORER": value(np.inf)},
+        (f"{STEP}:_simple_ones_suffice",),
+    ),
+    Switch("time to move by the misfit", {f"{STEP}:_unseen": giving(0.0)}),
+    Switch("bend before the step", {f"{FITS}.step_data:noise_about_a_motion": giving(0.0)}),
     Switch(
         "slope that was nothing",
         {f"{FITS}.step_data:StepData.explanations": _only(lambda way: way.drift or way.relaxing)},
     ),
     Switch(
         "strong evidence of a motion",
-        {f"{STEP}:_STRONG": value(0.0)},
-        (f"{STEP}:_explained",),
+        {f"{BEFORE}:_STRONG": value(0.0)},
+        (f"{BEFORE}:_most_evident",),
     ),
     Switch(
         "very strong evidence of a drift",
-        {f"{STEP}:PLAUSIBLE": value(_STRONG)},
-        (f"{STEP}:_explained",),
+        {f"{BEFORE}:PLAUSIBLE": value(_STRONG)},
+        (f"{BEFORE}:_most_evident",),
     ),
-    Switch("motion that takes the gain", {f"{STEP}:_takes_the_gain": _while_it_dies_away}),
+    Switch("motion that takes the gain", {f"{BEFORE}:_takes_the_gain": _while_it_dies_away}),
     Switch(
         "least extrapolation",
         {

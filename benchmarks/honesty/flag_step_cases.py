@@ -221,10 +221,10 @@ def bounded(seed: int, high: float) -> Codes:
     return fit(step_case("white", "R2", _noise(seed), seed).record, structures=asked)
 
 
-def forced(seed: int, plant: str) -> Codes:
-    """One lag, asked for."""
-    case = step_case("white", plant, _noise(seed, LOW), seed)
-    return fit(case.record, structures=[(1, 1)])
+def forced(seed: int, plant: str, order: int = 1) -> Codes:
+    """A number of lags, asked for."""
+    case = step_case("white", plant, _noise(seed, LOW if order == 1 else HIGH), seed)
+    return fit(case.record, structures=[(order, order)])
 
 
 def scan(record: cr.Record, order: int | None = None, **options: object) -> Codes:
@@ -402,6 +402,9 @@ CASES: list[FlagCase] = [
              partial(bounded, high=0.05), "below 100 ms", partial(bounded, high=0.1)),
     FlagCase("fit_output_error", "apparent_dead_time", "one lag asked for of R2",
              partial(forced, plant="R2"), "one lag asked for of R1", partial(forced, plant="R1")),
+    FlagCase("fit_output_error", "structure_not_certain", "three lags asked for of R4",
+             partial(forced, plant="R4", order=3),
+             "one lag asked for of R1", partial(forced, plant="R1")),
     _fit("gain_not_resolved", "a response that dies away again", washed_out),
     _scan("delay_at_bound", "max_delay=20, delay 30 to 45", lambda s: scan(plain(s), max_delay=20),
           ANY, plain_scan),

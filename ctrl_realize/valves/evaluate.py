@@ -233,12 +233,11 @@ def _fit_of_operation(records: tuple[Record, ...]) -> tuple[Interval, Flag] | No
     if first is None:
         return None
     fit, interval = first
-    gain = np.nan if fit.gain is None else fit.gain
     more = "".join(f"; {flag}" for flag in fit.flags[:2])
     return interval, Flag(
         "operation_fit",
         f"a linear model of the record has a dead time of {interval.value:.3g} s and a gain of "
-        f"{gain:.3g} in the units of the record{more}",
+        f"{fit.gain:.3g} in the units of the record{more}",
     )
 
 

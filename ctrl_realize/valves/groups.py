@@ -11,8 +11,8 @@ import numpy as np
 from ..data import Record
 from ..errors import CtrlRealizeError, DataWarning
 from ..identification.methods import identify
+from ..identification.output_error.result import OutputErrorFit
 from ..numerics.constants import Z_95
-from ..results import ModelFit
 from .steps import STEP_METRICS, StepMetrics
 
 _SAME_SIZE = 0.15
@@ -179,17 +179,20 @@ def _fitted_dead_time(steps: list[StepMetrics], records: Sequence[Record]) -> In
         return Interval()
     cut = [cut_out(records[one.record], one) for one in settled]
     found = linear_fit(cut)
-    if found is not None and found[0].interval_kind != "confidence":
+    if found is not None and not _is_right(found[0]):
         found = linear_fit(cut, STRUCTURES_OF_MORE_LAGS)
     # no linear model fits a response at a limited rate: it has no dead time to report
-    if found is None or found[0].interval_kind != "confidence":
-        return Interval()
-    return found[1]
+    return found[1] if found is not None and _is_right(found[0]) else Interval()
+
+
+def _is_right(fit: OutputErrorFit) -> bool:
+    """Whether the data do not rule out the structures that were given."""
+    return fit.at_noise_level and fit.better is None
 
 
 def linear_fit(
     records: Sequence[Record], structures: Sequence[tuple[int, int]] = STRUCTURES
-) -> tuple[ModelFit, Interval] | None:
+) -> tuple[OutputErrorFit, Interval] | None:
     """Linear model of records with gains of their own, and its dead time; None if there is none."""
     try:
         # What a fit warns of concerns records given by a user, and these are cut out of one.
@@ -201,7 +204,7 @@ def linear_fit(
                 fit = identify(records, structures=structures, gains="own").fit
     except CtrlRealizeError:
         return None
-    if not isinstance(fit, ModelFit) or fit.dead_time is None or fit.interval is None:
+    if not isinstance(fit, OutputErrorFit):
         return None
     return fit, Interval(fit.dead_time, *fit.interval, len(records))
 

@@ -158,7 +158,7 @@ def fit_joint(
             normalized_rms=first.normalized_rms * growth,
             correlation=first.correlation,
         ),
-        better=first.better,
+        others=first.estimate.others,
     )
     result = JointFit(
         estimate=estimate,

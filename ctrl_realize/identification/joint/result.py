@@ -53,14 +53,15 @@ class JointFit(OutputErrorFit):
 
     @property
     def interval_kind(self) -> IntervalKind:
-        """``"confidence"`` if the two agree and the records alone leave noise.
+        """``"confidence"`` if the two agree, the records alone leave noise, and no order is given.
 
         ``"spanned"`` if they contradict each other: from the earliest to the latest dead time of
         both. Otherwise ``"conditional"``.
         """
         if self.agreement.contradicts:
             return "spanned"
-        return "confidence" if self.at_noise_level and self.better is None else "conditional"
+        free = self.estimate.others is None
+        return "confidence" if self.at_noise_level and free else "conditional"
 
     def response(self, omega: FloatArray) -> ComplexArray:
         """Evaluate model and dead time at `omega` in rad/s."""

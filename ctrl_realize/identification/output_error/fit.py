@@ -78,8 +78,11 @@ def fit_output_error(
         Models to try: (order, relative degree), a process model by name (``"P1D"``, ``"P2DZ"``,
         ``"P2DU"``, ``"P1DI"``, ``"FOPDT"``, ``"SOPDT"``, ...), a `ProcessStructure` with fixed or
         bounded parameters, or a sequence of them. Default: orders 1 to 5 with relative degrees 1 to
-        the order. If structures are given, the delay is that of the best of them, adequate or not;
-        where another one fits clearly better, it is reported as an apparent dead time.
+        the order. If structures are given, the delay is that of the best of them, adequate or not,
+        and its interval holds if the right one is among them (`interval_kind` is
+        ``"conditional"``). What structures of one more pole say stands beside it, with a flag where
+        they fit as well and differ; where another one fits clearly better, the dead time is
+        reported as an apparent one.
     max_delay : float, optional
         Largest dead time in samples. Default: the visible onset of the output, which the dead time
         cannot exceed.
@@ -301,7 +304,7 @@ def _fit_one(
     if data is None:
         return any_input((record,), limit, settings)
     latest = None if limit is None else limit * record.dt
-    fit = fit_step_record(data, latest=latest, **settings)
+    data, fit = fit_step_record(data, latest=latest, **settings)
     flags = fit_flags(data, fit, limit)
     return summarise(fit, data, record.time[data.rows], (record,), flags), fit
 
@@ -324,8 +327,8 @@ def _fit_mean(
             raise DataError(
                 "the mean of the records does not leave its baseline by 5 standard deviations"
             )
-        fit = fit_step_record(data, latest=latest, **settings)
-        own = own_regressors(data, fit.poles if fit.relaxing else None)
+        data, fit = fit_step_record(data, latest=latest, **settings)
+        own = own_regressors(data, fit.poles if data.relaxing else None)
         repeats = repeatability(steps, mean, fit.fitted, fit.dead_time, own)
         apart = (
             delay_outliers(repeats, mean.used)

@@ -11,7 +11,7 @@ from ...numerics.output_error.result import OutputErrorEstimate
 from ...numerics.output_error.step_data import StepData
 from ...numerics.separable.profile_ends import profile_limits
 from ...results import Flag
-from .model_flags import cancelled_pair, slow_modes, unresolved_gain
+from .model_flags import AS_GOOD, cancelled_pair, slow_modes, unresolved_gain
 from .sensor_flags import outliers
 from .words import ESTIMATE_WORDS, is_firm, structure_words
 
@@ -57,6 +57,7 @@ def model_flags(
     firm = "" if any(extrapolated) else _only_total(fit)
     return [
         _apparent(fit),
+        _contradicting(fit),
         _parameter_bound(fit),
         _bound(dt, fit, max_delay),
         _nothing(dt, fit),
@@ -110,6 +111,24 @@ def _apparent(fit: OutputErrorEstimate) -> Flag | None:
         f"{time_within(other.dead_time, *other.interval)} "
         f"({interval_in_time(*other.interval)})",
     )
+
+
+def _contradicting(fit: OutputErrorEstimate) -> Flag | None:
+    """Report that structures that were not requested fit as well, with another dead time."""
+    if fit.others is None or fit.better is not None:
+        return None
+    for other in fit.others.not_ruled_out:
+        if other.delta_bic <= AS_GOOD and not fit.low <= other.dead_time <= fit.high:
+            assert other.interval is not None
+            return Flag(
+                "structure_not_certain",
+                f"{structure_words(fit)} was requested; order {other.order}, relative degree "
+                f"{other.relative_degree} fits as well, with a dead time of "
+                f"{time_within(other.dead_time, *other.interval)} "
+                f"({interval_in_time(*other.interval)}): the interval holds only if the requested "
+                "structure is right; without it, identify gives one that covers the choice",
+            )
+    return None
 
 
 def _parameter_bound(fit: OutputErrorEstimate) -> Flag | None:
@@ -284,7 +303,7 @@ def _disturbances(data: StepData, fit: OutputErrorEstimate) -> list[Flag | None]
                 "differences of neighbouring samples, which do not show slow disturbances",
             )
         )
-    if fit.relaxing:
+    if data.relaxing:
         flags.append(
             Flag(
                 "not_at_rest",

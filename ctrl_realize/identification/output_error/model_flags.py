@@ -14,7 +14,7 @@ from .words import sign_is_told
 
 # Thresholds for flags alone are a matter of presentation.
 _GAINS_APART = 0.2  # relative difference of gain or total delay between structures
-_AS_GOOD = 4.0  # insignificant difference of the criterion: chi-square, one degree of freedom, 95 %
+AS_GOOD = 4.0  # insignificant difference of the criterion: chi-square, one degree of freedom, 95 %
 _CANCELLED = 0.05  # distance of a pole from a zero that cancels it, relative to its frequency
 
 SETTLED = 3.0
@@ -52,7 +52,7 @@ def unresolved_gain(fit: OutputErrorEstimate, length: float) -> Flag | None:
     """
     if fit.static is not None and not sign_is_told(fit.gain_ends):
         return Flag("gain_not_resolved", _no_sign(fit, fit.static, length))
-    kept = [line for line in fit.structures if line.delta_bic <= _AS_GOOD]
+    kept = [line for line in fit.structures if line.delta_bic <= AS_GOOD]
     gain, total = _gain_and_total(fit)
     gains = np.array([gain, *(line.gain for line in kept)])
     totals = np.array([total, *(line.total_delay for line in kept)])

@@ -235,7 +235,7 @@ class OutputErrorFit(FractionalDelayFit):
     @property
     def noise(self) -> float:
         """Standard deviation of the output's noise."""
-        return self.data.bend if self.data.bend and self.estimate.relaxing else self.data.sigma
+        return self.data.sigma
 
     @property
     def residual(self) -> float:
@@ -279,6 +279,15 @@ class OutputErrorFit(FractionalDelayFit):
         return float(fit_percent(self.measured[None], self.fitted[None])[0])
 
     @property
+    def simulated_percent(self) -> float:
+        """`fit_percent` of the model alone, simulated from rest; its level is that of the output.
+
+        Less than `fit_percent` where a drift, hum, or the free response to an earlier input was
+        estimated together with the model.
+        """
+        return self.estimate.followed.simulated
+
+    @property
     def dt(self) -> float:
         """Sample time in s."""
         return self.data.dt
@@ -294,8 +303,11 @@ class OutputErrorFit(FractionalDelayFit):
 
     @property
     def interval_kind(self) -> IntervalKind:
-        """Kind of `interval`: a confidence interval only if the residual is at noise level."""
-        if self.better is not None:
+        """Kind of `interval`: a confidence interval only if the residual is at noise level.
+
+        If structures were requested, it is one only if the right one is among them.
+        """
+        if self.estimate.others is not None:
             return "conditional"
         return "confidence" if self.at_noise_level else "spanned"
 
@@ -318,12 +330,29 @@ class OutputErrorFit(FractionalDelayFit):
             f"relative degree {self.relative_degree}, residual {level}>"
         )
 
+    def _other_orders(self) -> list[tuple[str, str]]:
+        """What structures of one more pole say that were not requested and are not ruled out."""
+        lines = [] if self.estimate.others is None else self.estimate.others.not_ruled_out
+        ends = [line.interval for line in lines if line.interval is not None]
+        if not ends:
+            return []
+        low, high = min(low for low, _ in ends), max(high for _, high in ends)
+        return [(f"with order {lines[0].order}", f"{interval_in_time(low, high)}, not ruled out")]
+
     def _fit_in_words(self) -> str:
-        own, alone = self.fit_percent, self.estimate.followed.simulated
+        own, alone = self.fit_percent, self.simulated_percent
         words = f"{own:.1f} % of the response"
-        if self.data.edges and own - alone > FOLLOWED_LESS:
-            words += f"; {alone:.1f} % by the model without drift, hum and free response"
+        if own - alone > FOLLOWED_LESS:
+            words += f"; {alone:.1f} % simulated from rest, without {self._fitted_along()}"
         return words
+
+    def _fitted_along(self) -> str:
+        """What was estimated together with the model, in words."""
+        if not np.isfinite(self.onset):
+            return "the level, drift and initial state of the record"
+        parts = ["the free response to an earlier input"] * self.data.relaxing
+        parts += ["the drift"] * bool(self.data.drift) + ["the hum"] * bool(self.data.hum)
+        return " and ".join(parts) or "its level"
 
     def _std(self) -> float:
         return self.std_given_structure
@@ -345,6 +374,7 @@ class OutputErrorFit(FractionalDelayFit):
             ("transfer function", self.formula),
             (self._kind(), f"{dead_time} = {samples} samples"),
             (self.interval_label, interval_in_time(low, high)),
+            *self._other_orders(),
             *([("visible onset", in_time(self.onset, 4))] if self.onset == self.onset else []),
             (
                 "total delay",

@@ -145,6 +145,7 @@ def with_rows(record: Problem, more: Problem) -> Problem:
             edges,
             np.concatenate([segments.clock, np.full(rows, _LATE)]),
             np.pad(segments.regressors, ((0, rows), (0, 0))),
+            segments.bins,
         )
     return replace(
         record,

@@ -45,7 +45,6 @@ from .result import (
     DistributedLags,
     OtherModel,
     OutputErrorEstimate,
-    StructureFit,
     assembled,
 )
 from .selection import Choice, choose_model
@@ -67,15 +66,13 @@ def likelihood_fit(
     flows: Sequence[DispersedFlow] = (),
     onset: float | None = None,
     may_stick: bool = False,
-    relaxing: bool = False,
-    better: StructureFit | None = None,
     near: tuple[CloseDecision, ...] = (),
 ) -> OutputErrorEstimate:
     """Determine dead time and interval from the likelihood.
 
     `onset` is the time of the visible onset; without it the structures are used alone. With
-    `may_stick` the interval reaches to where a stem behind the lags may come loose. `relaxing`
-    and `better` are those of the result, `near` are close decisions made before.
+    `may_stick` the interval reaches to where a stem behind the lags may come loose. `near`
+    are close decisions made before.
     """
     equal_lags = [chain for chain in chains if not chain.truncated]
     fits, choice, kept = _compared(fits, equal_lags, chains, flows)
@@ -110,8 +107,6 @@ def likelihood_fit(
         interval,
         own,
         static=static,
-        relaxing=relaxing,
-        better=better,
     )
     close: tuple[CloseDecision, ...] = near
     if choice.chain is None and choice.flow is None:

@@ -33,6 +33,7 @@ from .margins import CloseDecision
 from .result import (
     DelayInterval,
     Followed,
+    OtherStructures,
     OutputErrorEstimate,
     ProcessEstimate,
     StructureFit,
@@ -48,8 +49,7 @@ def process_fit(
     forms: Sequence[ProcessForm],
     *,
     is_noise: IsNoise,
-    better: StructureFit | None,
-    relaxing: bool = False,
+    others: OtherStructures,
     near: tuple[CloseDecision, ...] = (),
 ) -> OutputErrorEstimate:
     """Determine model, dead time and interval among process models of prescribed forms.
@@ -60,17 +60,17 @@ def process_fit(
         Fit of the structures of the forms, without their prescriptions.
     forms : sequence of ProcessForm
     is_noise : callable
-    better : StructureFit or None
-        A structure that rules out those of `fits`.
-    relaxing, near
+    others : OtherStructures
+        Beside those of `fits`.
+    near
         As for `likelihood_fit`.
     """
     adequate = is_noise(fits.normalized_rms, fits.correlation)
     length = fits.scales.length
     if all(form.admits(fits.candidates[form.structure], length) for form in forms):
-        found = likelihood_fit(fits, adequate=adequate, relaxing=relaxing, better=better, near=near)
+        found = likelihood_fit(fits, adequate=adequate, near=near)
         form = next(form for form in forms if form.structure == found.structure)
-        return replace(found, process=found.process._replace(form=form))
+        return replace(found, process=found.process._replace(form=form), others=others)
     form_fits = [_fitted(fits, form) for form in forms]
     values = [_criterion(fits, fit) for fit in form_fits]
     best = int(np.argmin(values))
@@ -102,8 +102,6 @@ def process_fit(
         {},
         interval,
         chosen.profile,
-        relaxing=relaxing,
-        better=_better(fits, chosen, better),
     )
     return replace(
         found,
@@ -118,6 +116,7 @@ def process_fit(
         structures=_table(form_fits, values, ends=dict(zip(map(id, kept), ends, strict=True))),
         process=ProcessEstimate(chosen.parameters, chosen.form, chosen.at_bound),
         close=near,
+        others=others._replace(better=_better(fits, chosen, others.better)),
     )
 
 

@@ -104,6 +104,17 @@ class StructureFit:
         return self.structure.relative_degree
 
 
+class OtherStructures(NamedTuple):
+    """What structures say that were not requested; their `delta_bic` is relative to the requested.
+
+    `better` rules out what was requested. `not_ruled_out` have one pole more than the best of the
+    requested ones; the criterion includes the charges with which structures are chosen.
+    """
+
+    better: StructureFit | None = None
+    not_ruled_out: tuple[StructureFit, ...] = ()
+
+
 class DelayInterval(NamedTuple):
     """95 % interval of a dead time in s, and its standard error if the structure is the plant's."""
 
@@ -188,11 +199,10 @@ class OutputErrorEstimate:
     is that of the likelihood. The model is exp(-L s) b(s) / a(s), L the dead time: `numerator`
     lists b from the lowest power on, `poles` are the roots of the monic a. `std` is the standard
     error of the dead time for the chosen structure. `adequate`: the residual is at noise level.
-    `open_start`: the relative degree, and with it the onset, is not identifiable; `relaxing`: the
-    plant was moving before the step, and its free response was fitted as well. `static` is the gain
-    of the model, `alike` those of the other structures that are not ruled out and resolve one, each
-    with its evidence over the model's. `better` is a structure that rules out those that were
-    requested; `close` are decisions that rounding errors may reverse. `unweighted` is the model of
+    `open_start`: the relative degree, and with it the onset, is not identifiable. `static` is the
+    gain of the model, `alike` those of the other structures that are not ruled out and resolve one,
+    each with its evidence over the model's. `others` is None if no structures were requested;
+    `close` are decisions that rounding errors may reverse. `unweighted` is the model of
     plain least squares, if the residual was whitened.
     """
 
@@ -213,11 +223,10 @@ class OutputErrorEstimate:
     latest: float
     process: ProcessEstimate
     open_start: bool = False
-    relaxing: bool = False
     distributed: DistributedLags = _PLAIN_LAGS
     static: StaticGain | None = None
     alike: tuple[tuple[StaticGain, float], ...] = ()
-    better: StructureFit | None = None
+    others: OtherStructures | None = None
     close: tuple[CloseDecision, ...] = ()
     unweighted: UnweightedModel | None = None
 
@@ -225,6 +234,11 @@ class OutputErrorEstimate:
     def robust(self) -> bool:
         """Whether the interval, too, is that of the delay estimates and not of a likelihood."""
         return bool(self.delay_estimates) and not self.adequate
+
+    @property
+    def better(self) -> StructureFit | None:
+        """A structure that rules out those that were requested, if there is one."""
+        return None if self.others is None else self.others.better
 
     @property
     def gain_ends(self) -> tuple[float, float]:
@@ -283,8 +297,6 @@ def assembled(
     profile: Profile,
     *,
     static: StaticGain | None = None,
-    relaxing: bool = False,
-    better: StructureFit | None = None,
 ) -> OutputErrorEstimate:
     """Put a result together.
 
@@ -320,10 +332,8 @@ def assembled(
         followed=followed_by(fits, chosen, numerator),
         profile=profile,
         latest=fits.scales.latest,
-        relaxing=relaxing,
         static=static,
         alike=tuple((other, weight) for other, weight in alike if other.resolved),
-        better=better,
         process=ProcessEstimate(
             fitted_parameters(fits.problem, chosen, numerator, fits.variance, fits.scales.length)
         ),

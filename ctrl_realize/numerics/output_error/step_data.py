@@ -20,8 +20,8 @@ from ..separable.responses import StepSequence
 from ..separable.structures import Scales
 from ..separable.varpro import KnownFactor, Problem
 from ..separable.window import Window
-from ..signals.baseline import noise_about_a_bend, relaxation
-from ..signals.bins import BINS_AT_REST, Bins, response_bins
+from ..signals.baseline import noise_about_a_motion, relaxation
+from ..signals.bins import Bins, response_bins
 from ..signals.filters import moving_mean
 from ..signals.noise import (
     colouring,
@@ -34,7 +34,6 @@ from ..signals.noise import (
 from ..signals.onset import FirstMotion, first_motion
 from ..signals.step_sequence import input_moves
 
-_BINS_RELAXING = 60  # of a rest in which the output comes to rest, so that lags show in it
 _MANY = 100  # samples at rest in which dither would show more than two levels
 _MOST_MISSING = 0.5  # of the samples at rest, for a sinusoid to be looked for
 
@@ -72,7 +71,7 @@ class StepData:
     span : float or None
         Duration of records without a step, in s.
     bend : float
-        Noise about a baseline that bends; 0 if it does not.
+        Noise about a baseline that bends or swings; 0 if it does neither.
     every : int
         Samples of a record for each output of a record without a step.
     """
@@ -124,13 +123,14 @@ class StepData:
         return bool(is_coarse(self.sigma, self.quantum) or two_levels)
 
     def explanations(self) -> list[StepData]:
-        """Models of a slope before the step: drift, free response of the plant, or none.
+        """Models of a motion before the step: drift, hum, free response of the plant, or none.
 
-        A drift continues to the end. A baseline that bends is no drift, and its noise is that
-        about the bend if it is a free response.
+        A drift continues to the end, and so does hum. A baseline that bends or swings is no drift,
+        and its noise is that about the motion if it is a free response.
         """
         if self.bend:
-            return [replace(self, relaxing=True, sigma=self.bend, colour=1.0), self]
+            free = replace(self, relaxing=True, hum=[], sigma=self.bend, colour=1.0)
+            return [free, self]
         if not self.drift:
             return [self]
         still = replace(self, drift=0.0)
@@ -171,8 +171,8 @@ def step_data(
         elif curve is not None:
             quiet, line, relaxing = output - curve, curve[:edge], True
             sigma, drift = rest_noise(quiet[:edge], quiet, quantum, at_rest)[0], 0.0
-        elif not drift:
-            bend = noise_about_a_bend(output[:edge], quantum, at_rest)
+        if curve is None and not drift:
+            bend = noise_about_a_motion(output[:edge], quantum, at_rest)
         colour = colouring(output[:edge] - line, sigma)
     span = float(np.ptp(output))
     sigma = max(sigma, 1e-4 * span)
@@ -219,10 +219,10 @@ def settled_at(data: StepData) -> int:
 def window(data: StepData, stop: int, known: KnownFactor) -> Window:
     """Set up the fit of the outputs up to `stop`, which is not among them."""
     crossing = data.motion.crossing if data.motion else 0
-    at_rest = _BINS_RELAXING if data.relaxing else BINS_AT_REST
     rows = data.rows[:stop]
     end = int(rows[-1]) + 1
-    bins = response_bins(end, [i for i, _ in data.edges if i < end], crossing, at_rest)
+    edges = [i for i, _ in data.edges if i < end]
+    bins = response_bins(end, edges, crossing, relaxing=data.relaxing)
     index, size = input_moves(data.input, data.edges, end)
     times = _at(rows, data.dt)
     if rows.size < end:
@@ -234,7 +234,7 @@ def window(data: StepData, stop: int, known: KnownFactor) -> Window:
         drive = replace(drive, samples=times)
     own: tuple[Segments | None, Segments | None] = None, None
     if data.relaxing:
-        own = _free_response(data, bins, columns)
+        own = _free_response(data, bins, drive, columns)
         columns = columns[:, :0]
     problem = Problem(
         bins.average(data.output[:stop]),
@@ -252,14 +252,13 @@ def window(data: StepData, stop: int, known: KnownFactor) -> Window:
     )
 
 
-def _free_response(data: StepData, bins: Bins, columns: FloatArray) -> tuple[Segments, Segments]:
+def _free_response(
+    data: StepData, bins: Bins, drive: StepSequence, columns: FloatArray
+) -> tuple[Segments, Segments]:
     """Local terms of the record, on bins and at every sample: regressors and free response."""
-    # In the middle of a bin, which is narrow compared with the decay of the free response there.
-    rows = data.rows[: len(columns)].astype(np.float64)
-    middle = data.dt * bins.average(rows)
-    every = data.dt * rows
+    every = _at(data.rows[: len(columns)], data.dt)
     return (
-        Segments(np.array([0, middle.size]), middle, bins.average(columns)),
+        Segments(np.array([0, drive.first.size]), drive.first, bins.average(columns), drive),
         Segments(np.array([0, every.size]), every, columns),
     )
 
@@ -270,8 +269,12 @@ def step_scales(data: StepData, stop: int, latest: float | None) -> Scales:
     motion, dt = data.motion, data.dt
     end = int(data.rows[stop - 1]) + 1
     risen = int(data.rows[min(stop, stop_at(data, 0.63)) - 1]) + 1
-    rise = risen - data.edges[0][0] - motion.onset
+    since = risen - data.edges[0][0]
+    rise = since - motion.onset
     last = (motion.crossing + max(1.0, 0.05 * motion.crossing)) * dt
+    if data.relaxing and data.bend:
+        # Beside a motion that goes on, that of the response is not visible before it is large.
+        last = max(last, since * dt)
     return Scales(
         onset=max(motion.onset, 0.5) * dt,
         rise=max(rise, 2.0) * dt,

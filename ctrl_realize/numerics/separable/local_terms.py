@@ -32,6 +32,7 @@ from itertools import pairwise
 import numpy as np
 
 from ..arrays import ComplexArray, FloatArray, IntArray
+from .responses import StepSequence
 
 _OVER = 1e-12
 """Part of a free response that is left at the first row, below which nothing of it counts."""
@@ -46,15 +47,18 @@ class Segments:
     edges : ndarray of int, shape (R + 1,)
         Segment r has the rows ``edges[r]...edges[r + 1] - 1``.
     clock : ndarray, shape (m,)
-        Time since the first sample of the segment, in s.
+        Time since the first sample of the segment, in s; of a bin that of its first sample.
     regressors : ndarray, shape (m, q)
         Known shapes, which have separate coefficients in every segment. A segment with fewer of
         them has zeros in its last columns.
+    bins : StepSequence, optional
+        With the bins over which the first rows are means; the other rows are single samples.
     """
 
     edges: IntArray
     clock: FloatArray
     regressors: FloatArray
+    bins: StepSequence | None = None
 
     @property
     def rows(self) -> list[slice]:
@@ -100,8 +104,7 @@ class LocalTerms:
         self._rows = segments.rows
         self._poles = poles
         self._weight = fixed.weight
-        self._clock = segments.clock
-        self._decay = _decay(segments, poles)
+        self._decay, self._slope = _decay(segments, poles)
         self._known = segments.regressors.shape[1]
         columns = _free_columns(self._decay, poles) * self._weight[:, None]
         self._bases: list[FloatArray] = []
@@ -143,8 +146,7 @@ class LocalTerms:
         out = np.empty((*rest.shape, dpoles.shape[2]))
         for i, rows in enumerate(self._rows):
             amplitudes = self._amplitudes(self._weights(i, rest)[:, self._known :])
-            slope = self._clock[rows, None] * self._decay[:, rows]
-            out[:, rows] = (slope @ (amplitudes[:, :, None] * dpoles)).real
+            out[:, rows] = (self._slope[:, rows] @ (amplitudes[:, :, None] * dpoles)).real
         return out * self._weight[:, None]
 
     def fitted(self, rest: FloatArray, where: Segments) -> FloatArray:
@@ -180,11 +182,20 @@ class LocalTerms:
 
 def local_columns(segments: Segments, poles: ComplexArray) -> FloatArray:
     """Regressors, and free responses at poles (B, n); shape (B, m, q + n)."""
-    return _columns(segments, _decay(segments, poles), poles)
+    return _columns(segments, _decay(segments, poles)[0], poles)
 
 
-def _decay(segments: Segments, poles: ComplexArray) -> ComplexArray:
-    return np.asarray(np.exp(segments.clock[:, None] * poles[:, None, :]))
+def _decay(segments: Segments, poles: ComplexArray) -> tuple[ComplexArray, ComplexArray]:
+    """Exponentials (B, m, n) of the poles, and their derivatives."""
+    decay = np.exp(segments.clock[:, None] * poles[:, None, :])
+    slope = segments.clock[:, None] * decay
+    if segments.bins is not None:
+        mean, turn, kind = segments.bins.bin_means(poles)
+        mean, turn = mean.take(kind, axis=1), turn.take(kind, axis=1)
+        rows = slice(kind.size)
+        slope[:, rows] = slope[:, rows] * mean + decay[:, rows] * turn
+        decay[:, rows] *= mean
+    return np.asarray(decay), np.asarray(slope, dtype=np.complex128)
 
 
 def _columns(segments: Segments, decay: ComplexArray, poles: ComplexArray) -> FloatArray:

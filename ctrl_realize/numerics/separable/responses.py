@@ -109,7 +109,7 @@ class StepSequence:
         static, mode, slope = self._decayed(held, rates[:, None], since, row, here)
         if self._kinds[0][-1] == 1:
             return static, mode, slope
-        mean, turn, kind = self._means(rates)
+        mean, turn, kind = self.bin_means(rates)
         mean = mean.take(kind, axis=1)
         slope *= mean
         slope += mode * turn.take(kind, axis=1)
@@ -178,7 +178,7 @@ class StepSequence:
             return np.asarray(self.dt * within, dtype=np.float64)
         return np.asarray(self.samples[self._starts[column] + within] - self.first[column])
 
-    def _means(self, rates: Any) -> tuple[Any, Any, IntArray]:
+    def bin_means(self, rates: Any) -> tuple[Any, Any, IntArray]:
         """Means of exp(p t) and t exp(p t) over kinds of bins (B, k, J), and the kind of each.
 
         The time t is that from the first sample of a bin.

@@ -183,6 +183,11 @@ class WindowFit:
             del left[structure]
         return self.candidates[first]
 
+    def misfit(self, candidate: Candidate) -> float:
+        """Root mean square of the residual of a candidate, in units of `normalized_rms`."""
+        least = self.candidates[choose(self.criterion)].cost
+        return self.normalized_rms * float(np.sqrt(candidate.cost / max(least, SMALLEST)))
+
     def static(self, candidate: Candidate) -> StaticGain:
         """Gain and total delay of a candidate, with their errors."""
         return static_gain(self.problem, candidate, self.variance, self.scales.length)

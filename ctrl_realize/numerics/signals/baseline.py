@@ -16,7 +16,7 @@ from scipy.ndimage import median_filter
 
 from ..arrays import FloatArray, IntArray
 from .edges import difference_noise
-from .noise import correlation_time, is_drift, rounding_error, winsorised_sigma
+from .noise import correlation_time, is_drift, mad_sigma, rounding_error, winsorised_sigma
 
 FEW = 5
 """With fewer samples before the step, those after it that are still at the baseline are added."""
@@ -69,6 +69,11 @@ FEWEST = 24
 parameter, after a median of five."""
 _SIGNIFICANT = 30.0  # chi-square to beat the line; ablation: exponential before the step
 _BEND_ERRORS = 5.0  # standard errors, as of a drift; ablation: bend before the step
+_SMOOTH = 20.0
+"""Deviation over that of the noise in fourth differences, from which on a baseline that no
+polynomial describes is a motion. AR(1) noise with a pole of 0.99 has 13, a motor with hum 12, an
+arm that swings 650. Ablation: swing before the step."""
+_LEAST = 1e-4  # of a motion, that its noise is at least, as of a response
 _ENOUGH = 4096  # samples that show a bend
 _RATES = np.geomspace(0.5, 30.0, 24)  # decay over the samples before the step, next ones 20 % apart
 
@@ -118,11 +123,12 @@ def relaxation(output: FloatArray, edge: int, rows: IntArray | None = None) -> F
     return np.asarray(_level_and_decay(rate, clock) @ weights)
 
 
-def noise_about_a_bend(before: FloatArray, quantum: float, rows: IntArray | None = None) -> float:
-    """Noise about a baseline that bends, as after an earlier pulse; 0 if it does not.
+def noise_about_a_motion(before: FloatArray, quantum: float, rows: IntArray | None = None) -> float:
+    """Noise about a baseline that bends or swings, as after an earlier input; 0 if it does not.
 
     The free response of several lags may rise and fall, which neither a line nor an exponential
-    does. A polynomial of degree four stands for it.
+    does: a polynomial of degree four stands for it. That of a weakly damped pair swings, and is far
+    smoother than its size.
 
     Parameters
     ----------
@@ -133,6 +139,7 @@ def noise_about_a_bend(before: FloatArray, quantum: float, rows: IntArray | None
     rows : ndarray, shape (P,), optional
         Their positions, if others are missing.
     """
+    size = float(np.std(before))
     if before.size < FEWEST or np.ptp(before) <= rounding_error(before):
         return 0.0
     every = -(-before.size // _ENOUGH)
@@ -144,7 +151,14 @@ def noise_about_a_bend(before: FloatArray, quantum: float, rows: IntArray | None
     left = before - powers @ weights
     sigma = max(winsorised_sigma(left, quantum, lost=5), quantum / np.sqrt(12))
     error = sigma * np.sqrt(correlation_time(left))
-    return float(sigma) if np.abs(weights[2:]).max() > _BEND_ERRORS * error else 0.0
+    if np.abs(weights[2:]).max() > _BEND_ERRORS * error:
+        return float(sigma)
+    if rows is not None:
+        return 0.0
+    # 70 is the sum of the squared coefficients of a fourth difference.
+    rough = mad_sigma(np.diff(before, 4)) / np.sqrt(70)
+    noise = max(rough, quantum / np.sqrt(12), _LEAST * size)
+    return float(noise) if size > _SMOOTH * noise else 0.0
 
 
 def _level_and_decay(rate: float, time: FloatArray) -> FloatArray:

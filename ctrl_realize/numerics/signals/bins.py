@@ -41,7 +41,7 @@ class Bins:
         return Bins(first[width > 0], width[width > 0])
 
 
-def response_bins(stop: int, edges: list[int], crossing: int, at_rest: int = BINS_AT_REST) -> Bins:
+def response_bins(stop: int, edges: list[int], crossing: int, *, relaxing: bool = False) -> Bins:
     """Divide samples 0...stop - 1 of a record into bins.
 
     Parameters
@@ -53,13 +53,16 @@ def response_bins(stop: int, edges: list[int], crossing: int, at_rest: int = BIN
     crossing : int
         Visible onset after an edge, in samples. Bins are single samples there, and their width
         grows by 4 % of the distance from it.
-    at_rest : int, optional
-        Number of bins before the first edge.
+    relaxing : bool, optional
+        The record begins with a free response, which decays from its first sample on as a response
+        does from its onset. Otherwise the samples before the first edge are twelve bins.
     """
-    bounds = sorted({*np.linspace(0, edges[0], min(at_rest, edges[0]) + 1).astype(int)})
     starts = [*edges, stop]
     onsets = np.array(edges) + crossing
-    k = edges[0]
+    if relaxing:
+        bounds, k, onsets = [0], 0, np.append(onsets, 0)
+    else:
+        bounds, k = _at_rest(edges[0]), edges[0]
     while k < stop:
         distance = float(np.abs(onsets - k).min())
         width = int(_WIDTHS[np.searchsorted(_WIDTHS, max(_GROWTH * distance, 1.0), "right") - 1])
@@ -68,3 +71,8 @@ def response_bins(stop: int, edges: list[int], crossing: int, at_rest: int = BIN
         bounds.append(k)
     limits = np.array(bounds)
     return Bins(limits[:-1], np.diff(limits))
+
+
+def _at_rest(edge: int) -> list[int]:
+    """Bounds of equal bins before the first edge."""
+    return sorted({*np.linspace(0, edge, min(BINS_AT_REST, edge) + 1).astype(int)})

@@ -43,7 +43,7 @@ def test_a_process_model_by_name_has_the_parameters_of_the_plant(name, plant, tr
         assert abs(table.loc[key, "value"] - value) < 4 * error
     assert fit.interval[0] <= DEAD_TIME <= fit.interval[1]
     assert fit.better is None
-    assert fit.interval_kind == "confidence"
+    assert fit.interval_kind == "conditional"
 
 
 def test_an_integrator_is_exact_in_the_model_and_in_words():

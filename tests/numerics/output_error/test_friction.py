@@ -63,7 +63,7 @@ def test_it_is_the_end_of_the_likelihood_of_two_modes_that_begin_late(seed):
 
 def test_the_interval_of_a_record_holds_the_moment_at_which_a_stem_comes_loose():
     data, loose = stepped(0.06, 0.008, 3)
-    fit = fit_step_record(data)
+    _, fit = fit_step_record(data)
     structures = [one.interval for one in fit.structures if one.interval is not None]
     assert max(high for _, high in structures) < loose < fit.high
     assert fit.low < loose

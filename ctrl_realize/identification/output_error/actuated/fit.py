@@ -109,7 +109,7 @@ def _only_part(result: OutputErrorFit) -> ActuatedRecord:
     output, command = np.ravel(record.output).copy(), np.ravel(record.input)
     if np.isfinite(result.onset):
         every = replace(data, rows=np.arange(command.size), output=np.zeros(command.size))
-        own = own_regressors(every, result.estimate.poles if result.estimate.relaxing else None)
+        own = own_regressors(every, result.estimate.poles if result.data.relaxing else None)
         return actuated_record(output, command, record.dt, edges=data.edges, own=own)
     rows = _rows(result)
     output[: rows[0]] = np.nan
@@ -261,7 +261,7 @@ def _estimate(
         distributed=DistributedLags(),
         static=errors.static,
         alike=(),
-        better=None,
+        others=None,
         close=(),
         process=result.estimate.process._replace(parameters=errors.parameters),
         unweighted=None,

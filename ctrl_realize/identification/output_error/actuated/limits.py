@@ -109,7 +109,7 @@ def _without_plateaus(record: Record, linear: OutputErrorFit, fit: Fit) -> Outpu
 def _simulated(found: OutputErrorFit) -> FloatArray:
     """Response of a model to its record (N,), also where samples are missing."""
     system = fitted_model(fitted_core(found.estimate, found.poles), found)
-    rest = np.isfinite(found.onset) and not found.estimate.relaxing
+    rest = np.isfinite(found.onset) and not found.data.relaxing
     start = "rest" if rest else "estimate"
     return np.ravel(simulate_record(system, found.records[0], start, gaps=True))
 

@@ -35,9 +35,9 @@ from ...separable.window import Window, WindowFit, extended
 from ...signals.correlation import fit_percent
 from ...signals.noise import correlation_time, winsorised_sigma
 from ...validation.own_response import OwnResponse
-from ..better_structure import better_structure
 from ..interval import likelihood_fit
 from ..margins import close_to
+from ..other_structures import other_structures
 from ..process_models import process_fit
 from ..result import OutputErrorEstimate, followed_by
 from ..selection import chains_of
@@ -139,19 +139,18 @@ def fit_sampled(
     if structures is None and fits.best.structure.order == ORDERS[-1].order:
         fits = extended(fits, MORE_LAGS)
     chains = chains_of(fits) if structures is None else []
-    better = None
+    others = None
     if structures is not None:
         # On the part also if all samples were fitted: what is ruled out there is ruled out in any
         # case.
-        all_orders = partial(part.fit_of, ORDERS)
-        better = better_structure(stretch, stretch.best, all_orders)
+        others = other_structures(stretch, partial(part.fit_of, ORDERS))
     white = fits.correlation <= WHITE
-    if forms:
+    if forms and others is not None:
         fit = process_fit(
-            fits, forms, is_noise=lambda _, correlation: correlation <= WHITE, better=better
+            fits, forms, is_noise=lambda _, correlation: correlation <= WHITE, others=others
         )
     else:
-        fit = likelihood_fit(fits, adequate=white, chains=chains, better=better)
+        fit = replace(likelihood_fit(fits, adequate=white, chains=chains), others=others)
     if sums is not None:
         fitted = _on_stretch(data, fit, factor)
         left = winsorised_sigma(window_of(data, factor).output - fitted, 0.0)

@@ -1,4 +1,4 @@
-"""Test whether another structure explains a record better than the requested ones.
+"""What structures that were not requested say of a record.
 
 A structure is ruled out by a difference of criteria that [1]_ calls very strong.
 
@@ -15,19 +15,26 @@ from collections.abc import Callable
 import numpy as np
 
 from ..separable.profile_ends import profile_limits
-from ..separable.structures import ALL_STRUCTURES, PLAUSIBLE, Candidate, needless_parameters, search
+from ..separable.structures import (
+    ALL_STRUCTURES,
+    LEAST_CHARGE,
+    PLAUSIBLE,
+    Candidate,
+    charged,
+    needless_parameters,
+    plausible,
+    search,
+)
 from ..separable.varpro import Structure, evaluate
-from ..separable.window import WindowFit
+from ..separable.window import WindowFit, extended
 from .profiles import profile_of
-from .result import StructureFit
+from .result import OtherStructures, StructureFit
 
 _MOST_ORDER = ALL_STRUCTURES[-1].order  # highest order that is tried
 
 
-def better_structure(
-    fits: WindowFit, given: Candidate, refit: Callable[[], WindowFit]
-) -> StructureFit | None:
-    """Find a structure that rules out the given one; None if there is none.
+def other_structures(fits: WindowFit, refit: Callable[[], WindowFit]) -> OtherStructures:
+    """Find structures that rule out the requested ones, or are not ruled out beside them.
 
     One more pole is tried first, starting from the given optimum, which is cheap; only if it fits
     significantly better are all structures fitted again.
@@ -36,41 +43,64 @@ def better_structure(
     ----------
     fits : WindowFit
         Of the requested structures.
-    given : Candidate
-        The best of them.
     refit : callable
         Fit of the default structures.
     """
-    if not _lacks_a_pole(fits, given):
-        return None
-    free = refit()
+    given = fits.best
+    if given.structure.order >= _MOST_ORDER:
+        return OtherStructures()
+    better = _better(refit(), given) if _lacks_a_pole(fits, given) else None
+    return OtherStructures(better, () if better is not None else _not_ruled_out(fits, given))
+
+
+def _better(free: WindowFit, given: Candidate) -> StructureFit | None:
     best = free.best
     if best.structure == given.structure:
         return None
     cost = _cost(free, given)
     own = free.criteria({given.structure: Candidate(given.structure, given.parameters, cost)})
-    excess = own[given.structure] + needless_parameters(given.structure)
-    excess -= free.criterion[best.structure] + needless_parameters(best.structure)
+    excess = _charged(own, given.structure) - _charged(free.criterion, best.structure)
     # Too many poles are not excluded: their residual is as small.
     if excess <= PLAUSIBLE or cost <= best.cost + PLAUSIBLE * free.variance:
         return None
-    static = free.static(best)
-    interval = profile_limits(*profile_of(free, best))
+    return _line(free, best.structure, -excess)
+
+
+def _not_ruled_out(fits: WindowFit, given: Candidate) -> tuple[StructureFit, ...]:
+    """List structures of one pole more that the data do not rule out, the best first."""
+    order = given.structure.order + 1
+    more = tuple(Structure(order, r) for r in range(order, 0, -1))
+    free = extended(fits, more)
+    level = _charged(free.criterion, given.structure)
+    least = level + max(LEAST_CHARGE - free.penalty, 0.0) * (order - 1 + given.structure.zeros)
+    kept = plausible(
+        free.candidates, charged(free.criterion, free.penalty), free.variance, given, least
+    )
+    lines = [_line(free, s, _charged(free.criterion, s) - level) for s in kept if s in more]
+    return tuple(sorted(lines, key=lambda line: line.delta_bic))
+
+
+def _charged(criterion: dict[Structure, float], structure: Structure) -> float:
+    return criterion[structure] + needless_parameters(structure)
+
+
+def _line(fits: WindowFit, structure: Structure, excess: float) -> StructureFit:
+    candidate = fits.candidates[structure]
+    static = fits.static(candidate)
+    interval = profile_limits(*profile_of(fits, candidate))
     return StructureFit(
-        best.structure,
-        best.dead_time,
+        structure,
+        candidate.dead_time,
         static.total,
-        -float(excess),
+        float(excess),
         interval,
-        best.poles,
+        candidate.poles,
         static.gain,
     )
 
 
 def _lacks_a_pole(fits: WindowFit, given: Candidate) -> bool:
     n, r = given.structure.order, given.structure.relative_degree
-    if n >= _MOST_ORDER:
-        return False
     # Without Huber's clipping towards the given model, which may hide its errors.
     problem = fits.window.problem
     state = evaluate(problem, given.structure, given.parameters[None])

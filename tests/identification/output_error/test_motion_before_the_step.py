@@ -1,0 +1,72 @@
+"""What an output does before the step: a free response, or nothing that was fitted. Simulated."""
+
+import control as ct
+import numpy as np
+import pytest
+from scipy.signal import lfilter
+
+import ctrl_realize as cr
+from tests.rigs import codes, covers
+
+EDGE, SAMPLES = 300, 900
+
+
+def lagged(signal, constant):
+    pole = np.exp(-1 / constant)
+    return lfilter([0, 1 - pole], [1, -pole], signal)
+
+
+def late(signal):
+    """A signal 8 samples later."""
+    return np.concatenate([np.zeros(8), signal[:-8]])
+
+
+def heater(seed):
+    """Lags of 60 and 20 samples, still cooling when the step comes; dead time 8 samples."""
+    k = np.arange(-2000, SAMPLES)
+    u = 1.0 * (k < -40) + (k >= EDGE)
+    y = 2 * lagged(lagged(late(u), 60), 20)[-SAMPLES:]
+    y += 0.01 * np.random.default_rng(seed).standard_normal(SAMPLES)
+    return cr.Record(np.arange(SAMPLES) * 1.0, u[-SAMPLES:], y)
+
+
+def test_a_free_response_holds_at_every_sample_and_not_at_the_means_alone():
+    # Modes faster than the means at rest were free to be anything between them: 4.2e4 here.
+    fit = cr.fit_output_error(heater(0), structures=[(4, 3)]).fit
+    assert fit.data.relaxing
+    assert np.abs(fit.measured - fit.fitted).max() < 6 * 0.01
+    assert fit.fit_percent > 98
+
+
+@pytest.mark.parametrize("before", [-200, -150])
+def test_an_arm_that_still_swings_is_fitted_with_its_free_response(before):
+    dt, frequency = 0.01, 9.0
+    plant = ct.tf([2 * frequency**2], [1, 0.04 * frequency, frequency**2])
+    k = np.arange(-400, SAMPLES)
+    u = 0.5 * (k >= before) + 0.5 * (k >= EDGE)
+    y = ct.forced_response(ct.c2d(plant, dt), dt * (k + 400), late(u)).outputs[-SAMPLES:]
+    y = y + 0.002 * np.random.default_rng(0).standard_normal(SAMPLES)
+    record = cr.Record(dt * np.arange(SAMPLES), u[-SAMPLES:], y)
+    fit = cr.identify(record).fit
+    assert "not_at_rest" in codes(fit)
+    assert not codes(fit) & {"hum", "cancelled_pair"}
+    assert fit.structure == (2, 2)
+    assert covers(fit, 8.0)
+    assert abs(fit.delay - 8.0) < 0.5
+    assert abs(fit.gain - 2.0) < 0.002
+    assert fit.residual == pytest.approx(0.002, rel=0.1)
+    # what the model says from rest, and why it says less than the fit
+    assert fit.simulated_percent < fit.fit_percent - 1
+    assert "simulated from rest" in fit.report()
+
+
+def test_a_drift_is_told_where_it_was_fitted_and_nowhere_else():
+    k = np.arange(SAMPLES)
+    y = 0.002 * k + 2 * lagged(late(1.0 * (k >= EDGE)), 20)
+    y += 0.01 * np.random.default_rng(1).standard_normal(SAMPLES)
+    record = cr.Record(k * 1.0, 1.0 * (k >= EDGE), y)
+    fit = cr.identify(record).fit
+    assert "drift" in codes(fit)
+    assert abs(fit.data.drift - 0.002) < 2e-4
+    assert fit.fit_percent > fit.simulated_percent + 1
+    assert "simulated from rest" in fit.report()
