@@ -17,7 +17,7 @@ sample time is a third of it moves by 0.28 of its response in a sample."""
 _FEWEST = 30  # samples of which a tenth at most are jumps
 _SEVERAL = 4  # jumps of a counter of another range; one jump of a noisy step may look alike
 _ANGLES = (2 * np.pi, 360.0)
-_BITS = tuple(2.0**bits for bits in range(8, 33))  # of the registers that count: bytes to double words
+_BITS = tuple(2.0**bits for bits in range(8, 33))  # registers of counters: a byte to four
 
 
 @np.errstate(over="ignore", invalid="ignore")  # the largest doubles

@@ -62,7 +62,7 @@ def test_a_furnace_in_minutes_is_reported_and_drawn_in_minutes(tmp_path):
     rows = dict(line.strip().split("  ", 1) for line in system.fit.report().splitlines()[1:5])
     assert rows["dead time"].strip().startswith("6.0")
     assert " min = 6.0" in rows["dead time"]
-    assert rows["95 % interval"].endswith(" min")
+    assert rows[system.fit.interval_label].endswith(" min")
     flag = next(flag for flag in system.fit.flags if flag.code == "drift")
     assert flag.message.startswith("a drift of 0.012 per min")
     assert system.fit.plot().figure.axes[1].get_xlabel() == "time [min]"
