@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..._parameters import Parameter, gain_unit
+from ..._parameters import Parameter, formula, gain_unit
 from ..._wording import (
     in_time,
     interval_in_time,
@@ -23,7 +23,7 @@ from ...numerics.separable.lag_chains import lag_sum
 from ...numerics.separable.static_gain import INTEGRATOR
 from ...numerics.signals.correlation import fit_percent
 from ...results import Flag, FractionalDelayFit, IntervalKind
-from ..process_parameters import with_intervals
+from ..process_parameters import jump, not_seen_in_words, told, with_intervals
 from .actuated.result import ActuatorFit
 from .record_gains import RecordGains
 from .repeat_flags import BY_CHANCE
@@ -136,7 +136,12 @@ class OutputErrorFit(FractionalDelayFit):
         Infinite if the record does not determine it. Called well determined if its ends are within
         a tenth of the estimate.
         """
-        return self.estimate.total_ends
+        return self.estimate.total_ends if self._jump is None else self.interval
+
+    @property
+    def _jump(self) -> int | None:
+        fit = self.estimate
+        return jump(fit.poles, fit.numerator, fit.dead_time, self.interval, self.dt)
 
     @property
     def order(self) -> int:
@@ -221,6 +226,16 @@ class OutputErrorFit(FractionalDelayFit):
             integrating=self.integrators > 0,
             several=len(self.structures) > 1 and self.better is None,
         )
+
+    @property
+    def formula(self) -> str:
+        """The transfer function in one line, in seconds.
+
+        Without lags that the data do not distinguish from zero. The dead time of a response that
+        jumps from one sample to the next is written in whole samples.
+        """
+        shown, _ = told(self.parameters, self.dt, self._jump)
+        return formula(shown, self.integrators, self.time_unit)
 
     @property
     def at_noise_level(self) -> bool:
@@ -364,15 +379,27 @@ class OutputErrorFit(FractionalDelayFit):
         return "dead time" if self.better is None else "apparent dead time"
 
     def _title(self) -> str:
-        return f"Output-error fit: {self._kind()} {time_within(self.dead_time, *self.interval)}"
+        return f"Output-error fit: {self._kind()} {self._dead_time_in_words()[0]}"
+
+    def _dead_time_in_words(self) -> tuple[str, str]:
+        """Dead time and what follows it: in s and in samples, of a jump in samples."""
+        low, high = self.interval
+        if (after := self._jump) is not None:
+            same = interval_in_time((after - 1) * self.dt, after * self.dt)
+            return (
+                f"{after} sample{'s' * (after > 1)}",
+                f" ({same} give the same samples behind a hold)",
+            )
+        samples = number_within(self.delay, *self.delay_interval)
+        return time_within(self.dead_time, low, high), f" = {samples} samples"
 
     def _rows(self) -> list[tuple[str, str]]:
         low, high = self.interval
-        dead_time = time_within(self.dead_time, low, high)
-        samples = number_within(self.delay, *self.delay_interval)
+        _, left_out = told(self.parameters, self.dt, self._jump)
         rows = [
             ("transfer function", self.formula),
-            (self._kind(), f"{dead_time} = {samples} samples"),
+            *([("not seen", not_seen_in_words(left_out))] if left_out else []),
+            (self._kind(), "".join(self._dead_time_in_words())),
             (self.interval_label, interval_in_time(low, high)),
             *self._other_orders(),
             *([("visible onset", in_time(self.onset, 4))] if self.onset == self.onset else []),

@@ -19,6 +19,7 @@ import numpy as np
 from ..arrays import FloatArray
 from ..constants import Z_95
 from ..parameters.form_fit import FormFit, fit_form
+from ..parameters.lag_profiles import with_profiled_lags
 from ..parameters.process_form import ProcessForm
 from ..separable.lag_chains import lag_sum
 from ..separable.profile_ends import profile_limits
@@ -70,7 +71,11 @@ def process_fit(
     if all(form.admits(fits.candidates[form.structure], length) for form in forms):
         found = likelihood_fit(fits, adequate=adequate, near=near)
         form = next(form for form in forms if form.structure == found.structure)
-        return replace(found, process=found.process._replace(form=form), others=others)
+        if np.count_nonzero(found.poles.imag > 0) == int(form.pair):
+            parameters = with_profiled_lags(
+                fits.problem, fits.scales, form, found.process.parameters, fits.variance
+            )
+            return replace(found, process=ProcessEstimate(parameters, form), others=others)
     form_fits = [_fitted(fits, form) for form in forms]
     values = [_criterion(fits, fit) for fit in form_fits]
     best = int(np.argmin(values))
@@ -114,7 +119,11 @@ def process_fit(
         static=_static(fits, chosen),
         alike=(),
         structures=_table(form_fits, values, ends=dict(zip(map(id, kept), ends, strict=True))),
-        process=ProcessEstimate(chosen.parameters, chosen.form, chosen.at_bound),
+        process=ProcessEstimate(
+            with_profiled_lags(fits.problem, fits.scales, chosen.form, chosen.parameters, variance),
+            chosen.form,
+            chosen.at_bound,
+        ),
         close=near,
         others=others._replace(better=_better(fits, chosen, others.better)),
     )

@@ -15,7 +15,7 @@ References
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -24,6 +24,7 @@ from scipy.optimize import least_squares
 from ..arrays import ComplexArray, FloatArray
 from ..constants import CHI2_95, SMALLEST, Z_95
 from ..separable.poles import parameters_from_poles
+from ..separable.profile import profile_curve, within_a_sample
 from ..separable.static_gain import INTEGRATOR
 from ..separable.structures import FASTEST, SLOWEST, Candidate, Scales
 from ..separable.varpro import Problem, respond
@@ -58,7 +59,7 @@ class FormFit:
 
 
 @dataclass(frozen=True, eq=False)
-class _Search:
+class FormSearch:
     """Least squares over some of the parameters; lags and times in logarithms."""
 
     problem: Problem
@@ -102,18 +103,26 @@ class _Search:
 
     def residual(self, values: Mapping[str, float]) -> FloatArray:
         """Weighted residual (m,) without the terms that enter linearly."""
-        candidate, numerator = self.model(values)
+        return self._residual(values)[0]
+
+    def _residual(self, values: Mapping[str, float]) -> tuple[FloatArray, float]:
+        """Residual (m,), and the gain, which is the best one if it is not given."""
+        candidate, numerator = self.model({"gain": 1.0, **values})
         problem = self.problem
         model = respond(problem.drive, problem.known, numerator, candidate.parameters)
-        left = problem.weighted((problem.data - model)[:, None])
+        left = problem.weighted(np.stack([problem.data, model], axis=1))
         if problem.segments is not None:
             terms = problem.local_terms(candidate.poles[None])
             fixed = problem.weighted(problem.regressors)
             both = terms.without(np.concatenate([left, fixed], axis=1)[None])[0]
-            left, basis = both[:, :1], np.linalg.qr(both[:, 1:])[0]
+            left, basis = both[:, :2], np.linalg.qr(both[:, 2:])[0]
         else:
             basis = self._basis
-        return np.asarray((left - basis @ (basis.T @ left))[:, 0])
+        data, unit = (left - basis @ (basis.T @ left)).T
+        if "gain" in values:
+            return np.asarray(data - unit), values["gain"]
+        gain = float(data @ unit / max(unit @ unit, SMALLEST))
+        return np.asarray(data - gain * unit), gain
 
     @cached_property
     def _basis(self) -> FloatArray:
@@ -130,20 +139,28 @@ class _Search:
     def value(self, name: str, coordinate: float) -> float:
         """Inverse of `coordinate`."""
         if name == "gain":
-            return coordinate * self.gain_scale
+            return float(coordinate * self.gain_scale)
         if name in ("dead_time", "lead_1"):
-            return coordinate * self.scales.rise
+            return float(coordinate * self.scales.rise)
         return float(np.exp(coordinate))
 
     def solve(
-        self, start: Mapping[str, float], fixed: Mapping[str, float] | None = None
+        self,
+        start: Mapping[str, float],
+        fixed: Mapping[str, float] | None = None,
+        exact: float = 1e-12,
     ) -> tuple[dict[str, float], float]:
-        """Best values from a start, and their sum of squares; `fixed` ones stay."""
+        """Best values from a start, and their sum of squares, `exact` to a part of it.
+
+        `fixed` ones stay.
+        """
         held = {name: low for name, (low, high) in self.limits.items() if low == high}
         held |= fixed or {}
         names = [name for name in self.form.names if name not in held]
+        if not np.isfinite(self.limits["gain"]).any():
+            names.remove("gain")  # enters linearly
         if not names:
-            return held, float(np.sum(self.residual(held) ** 2))
+            return self._with_gain(held)
         low, high = (
             np.array([self.coordinate(name, self.limits[name][end]) for name in names])
             for end in (0, 1)
@@ -154,16 +171,20 @@ class _Search:
 
         def left(x: FloatArray) -> FloatArray:
             pairs = zip(names, x, strict=True)
-            return self.residual(held | {name: self.value(name, float(at)) for name, at in pairs})
+            return self.residual(held | {name: self.value(name, at) for name, at in pairs})
 
         found = least_squares(
             left, first, bounds=(low, high), x_scale="jac", max_nfev=_MOST_TURNS,
-            xtol=1e-10, ftol=1e-12, gtol=1e-12,
+            xtol=1e-10, ftol=exact, gtol=1e-12,
         )  # fmt: skip
-        values = held | {
-            name: self.value(name, float(at)) for name, at in zip(names, found.x, strict=True)
-        }
-        return values, 2 * float(found.cost)
+        return self._with_gain(
+            held | {name: self.value(name, at) for name, at in zip(names, found.x, strict=True)}
+        )
+
+    def _with_gain(self, values: dict[str, float]) -> tuple[dict[str, float], float]:
+        """Add the gain, and the sum of squares."""
+        left, gain = self._residual(values)
+        return values | {"gain": gain}, float(left @ left)
 
 
 def fit_form(
@@ -192,12 +213,14 @@ def fit_form(
     for one, numerator in zip(like, numerators, strict=True):
         moving = one.poles[np.abs(one.poles) * scales.length >= INTEGRATOR]
         gains.append(float(numerator[0] / np.prod(-moving).real))
-    search = _Search(problem, form, scales, max(abs(gains[0]), SMALLEST))
+    search = FormSearch(problem, form, scales, max(abs(gains[0]), SMALLEST))
     starts = [_start(form, one, gain, scales) for one, gain in zip(like, gains, strict=True)]
     starts += [{**one, "dead_time": 0.5 * one["dead_time"]} for one in starts]
     tried = [search.solve({**one, **form.start}) for one in starts]
     values, cost = min(tried, key=lambda pair: pair[1])
     values, cost = search.solve(values)
+    alike = form.free_lags
+    values |= dict(zip(alike, sorted((values[name] for name in alike), reverse=True), strict=True))
     names = [
         name
         for name, (low, high) in search.limits.items()
@@ -255,7 +278,7 @@ def _at_end(value: float, low: float, high: float) -> bool:
 
 
 def _covariance(
-    search: _Search, values: Mapping[str, float], names: Sequence[str], variance: float
+    search: FormSearch, values: Mapping[str, float], names: Sequence[str], variance: float
 ) -> FloatArray:
     if not names:
         return np.zeros((0, 0))
@@ -286,14 +309,15 @@ def _in_total(name: str, values: Mapping[str, float]) -> float:
 
 
 def _profile(
-    search: _Search, values: Mapping[str, float], cost: float, std: float, variance: float
+    search: FormSearch, values: Mapping[str, float], cost: float, std: float, variance: float
 ) -> tuple[FloatArray, FloatArray]:
     """Misfit of the best model for each of a range of dead times, as in `dead_time_profile`."""
     low, high = search.limits["dead_time"]
     at = values["dead_time"]
-    points = {at: cost}
+    best = replace(search.model(values)[0], cost=cost)
+    points = {at: best}
     if low < high:
-        grid = np.linspace(low, high, _FAR)
+        grid = np.concatenate([np.linspace(low, high, _FAR), within_a_sample(best, search.scales)])
         if np.isfinite(std) and std > 0:
             grid = np.concatenate([grid, at + Z_95 * std * _NEAR])
         ahead = sorted({float(x) for x in np.clip(grid, low, high) if x > at})
@@ -301,9 +325,8 @@ def _profile(
         for path in (ahead, behind):
             near = dict(values)
             for dead_time in path:
-                near, points[dead_time] = search.solve(near, {"dead_time": dead_time})
-                if points[dead_time] > cost + 30 * CHI2_95 * variance:
+                near, there = search.solve(near, {"dead_time": dead_time})
+                points[dead_time] = replace(search.model(near)[0], cost=there)
+                if there > cost + 30 * CHI2_95 * variance:
                     break
-    dead_times = np.array(sorted(points))
-    costs = np.array([points[x] for x in dead_times])
-    return dead_times, (costs - costs.min()) / max(variance, SMALLEST)
+    return profile_curve(points, best, max(variance, SMALLEST), search.scales)

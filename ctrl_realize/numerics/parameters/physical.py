@@ -35,12 +35,14 @@ class ProcessParameter(NamedTuple):
     `name` is ``gain`` (with an integrator the slope per second), ``dead_time``, ``lag_1``,
     ``lag_2`` (the slowest first), ``pair_time_1`` and ``pair_damping_1`` of poles that oscillate,
     ``lead_1`` (negative for a zero in the right half plane), ``zero_time_1``, ``zero_damping_1``.
-    Times are in s. `std` is NaN if it is not known.
+    Times are in s. `std` is NaN if it is not known. `ends` is a 95 % interval if it is not that of
+    the standard error; `std` is then half of it over 1.96.
     """
 
     name: str
     value: float
     std: float = float("nan")
+    ends: tuple[float, float] | None = None
 
 
 def process_parameters(

@@ -51,6 +51,12 @@ class ProcessForm:
         return ("gain", "dead_time", *lags, *pair, *(("lead_1",) if self.lead else ()))
 
     @property
+    def free_lags(self) -> tuple[str, ...]:
+        """Lags that are neither fixed nor bounded, and are told apart by their order alone."""
+        given = {*self.fixed, *self.bounds}
+        return tuple(name for name in self.names if name.startswith("lag_") and name not in given)
+
+    @property
     def prescribed(self) -> bool:
         """Whether parameters are fixed or bounded, or a start is given."""
         return bool(self.fixed or self.bounds or self.start)

@@ -36,7 +36,7 @@ _FAR = 9  # points all over the range, where it is none
 _SHORT = 0.1  # samples by which the optimum of a jump may lie before the sample that it belongs to
 _LATE = 0.2  # samples before a jump is over; a lag of a twentieth of that fits noise of 1 %
 _INSIDE = np.array([-0.5, 0.02, 0.4, 1 - _LATE, 1.2])  # of the sample in which the optimum lies
-_JUMP = 4.0  # pole, in 1/samples, whose response is over within a sample
+JUMP = 4.0  # pole, in 1/samples, whose response is over within a sample
 _NOTHING = 1e-9  # part of a sensitivity that is rounding
 _SWEEPS, _HIGH, _SAME = 3, 30.0, 1e-3
 """Rounds in which points start from those beside them: in single starts from the optimum, profiles
@@ -85,9 +85,7 @@ def profile_points(
     grid = np.linspace(low, high, _FAR)
     if np.isfinite(half):
         grid = np.concatenate([candidate.dead_time + half * _NEAR, grid])
-    if _jumps(candidate, scales):
-        # Nothing changes while the jump remains between the same two samples.
-        grid = np.concatenate([(_jump_sample(candidate, scales) + _INSIDE) * scales.dt, grid])
+    grid = np.concatenate([within_a_sample(candidate, scales), grid])
     grid = np.unique(np.clip(grid, low, high))
     starts = np.tile(candidate.parameters, (grid.size, 1))
     starts[:, 0] = grid
@@ -166,8 +164,15 @@ def profile_curve(
     return dead_time, (excess - excess.min()) / variance
 
 
+def within_a_sample(candidate: Candidate, scales: Scales) -> FloatArray:
+    """Dead times between the two samples of a jump, where nothing changes; empty without one."""
+    if not _jumps(candidate, scales):
+        return np.zeros(0)
+    return np.asarray((_jump_sample(candidate, scales) + _INSIDE) * scales.dt)
+
+
 def _jumps(candidate: Candidate, scales: Scales) -> bool:
-    return float(np.abs(candidate.poles).max()) * scales.dt > _JUMP
+    return float(np.abs(candidate.poles).max()) * scales.dt > JUMP
 
 
 def _jump_sample(candidate: Candidate, scales: Scales) -> float:
