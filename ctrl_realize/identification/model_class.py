@@ -155,12 +155,13 @@ def _chosen(
     dead_time = dt * _delay(system)
     known = {flag.code for flag in modes.flags}
     kept = [flag for flag in lags.flags if flag.code in _KEPT and flag.code not in known]
-    flags = [*cut, *modes.flags, *kept]
+    flags, notes = [*cut, *modes.flags, *kept], list[str]()
     if len(modes.checks) == 1 and all(flag.code != "feedback" for flag in flags):
         check = modes.checks[0]
         output, drive = np.ravel(check.record.output), np.ravel(check.record.input)
         shown, total = Shown(output, np.ravel(check.simulated), drive), _total_delay(system)
-        flags += against_one_model(shown, _delay(system))
+        changes, notes = against_one_model(shown, _delay(system))
+        flags += changes
         if total is not None and all(flag.code != "not_linear" for flag in flags):
             flags += nonlinear_flags(shown, _delay(system), total / dt)
     if own[0] <= _NOTHING:
@@ -191,7 +192,7 @@ def _chosen(
     fit = replace(
         modes,
         timing=Timing(dead_time, (low, high), _total_delay(system), lags),
-        choices=(*reasons, *modes.choices),
+        choices=(*reasons, *modes.choices, *notes),
         flags=tuple(flags),
     )
     return system.replace(fit=fit)

@@ -10,7 +10,7 @@ from ..._wording import in_time
 from ...numerics.constants import Z_95
 from ...numerics.validation.own_response import homogeneity
 from ...results import Flag
-from ..output_error.repeat_flags import BY_CHANCE, NO_COMMON_GAIN, SAME
+from ..output_error.repeat_flags import BY_CHANCE, NO_COMMON_GAIN, SAME, time_apart
 from .rows import CampaignRow
 
 Rows = tuple[CampaignRow, ...]
@@ -83,7 +83,8 @@ def _different_times(rows: Rows) -> list[Flag]:
         # The interval of a scan has no confidence level, and gives no standard error.
         errors[~(errors > 0) | ~np.isfinite([row.gain_std for row in rows])] = np.inf
         statistic, chance = homogeneity(values, errors)
-        if chance < BY_CHANCE:
+        known = values[np.isfinite(errors)]
+        if chance < BY_CHANCE and np.ptp(known) > time_apart(float(np.median(known)), rows[0].dt):
             flags.append(
                 Flag(
                     code,
@@ -147,7 +148,8 @@ def _amplitude_trend(rows: Rows, method: str) -> Flag | None:
         # Student's distribution gives 1 in 350): the delays themselves must be correlated, too.
         chance = max(chance, pearsonr(heights, delays).pvalue)
     # 1 %: one false alarm in a hundred campaigns of a linear plant.
-    if not chance < 0.01:
+    trend = abs(np.polyfit(heights, delays, 1)[0]) * np.ptp(heights)
+    if not chance < 0.01 or trend <= time_apart(float(np.median(delays)), 1.0) / 2:
         return None
     way = "longer" if correlation > 0 else "shorter"
     # Noise is larger relative to a smaller step: the bias of a scan grows, and a fit misses fast

@@ -80,7 +80,8 @@ def fit_any_input(
             break
         used = tuple(i for i in used if i not in apart)
     fit = widened(found.fit, repeats, used)
-    return _summary(found, fit, records, used, limit, repeat_flags(repeats), repeats), fit
+    flags = repeat_flags(repeats, fit.dead_time, dt)
+    return _summary(found, fit, records, used, limit, flags, repeats), fit
 
 
 def _signals(record: Record) -> tuple[FloatArray, FloatArray]:

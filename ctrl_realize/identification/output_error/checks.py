@@ -27,14 +27,12 @@ from .loop_flags import (
     past_inputs,
     unstable_flags,
 )
+from .repeat_flags import time_apart
 from .result import OutputErrorFit
 from .sensor_flags import held_flags, sensor_flags
 
 # The following thresholds for flags are a matter of presentation.
-_GAINS_APART = 0.1
-_DELAYS_APART = 0.05
-"""Least difference between groups of samples for a flag: of gains, and of the dead time (at least
-one sample), relative to the common one."""
+_GAINS_APART = 0.1  # least relative difference between groups of samples for a flag
 _EXPLAINED = 0.05
 """Fraction of the residual that products of inputs must explain for a flag."""
 _REACHED = 1.5
@@ -62,6 +60,7 @@ def checked(fit: OutputErrorFit, *, alone: bool = True) -> OutputErrorFit:
     """
     codes = {flag.code for flag in fit.flags}
     flags: list[Flag] = []
+    notes: list[str] = []
     low, high = fit.interval
     stepped = bool(np.isfinite(fit.onset))
     # Regressions on past samples need all of them.
@@ -91,12 +90,15 @@ def checked(fit: OutputErrorFit, *, alone: bool = True) -> OutputErrorFit:
             high = max(high, step.dead_time + Z_95 * step.dead_time_error)
         # Parts of one step are not several responses.
         if not loop and not (stepped and _moves(shown.drive) < 2):
-            flags += against_one_model(shown, fit.delay)
+            changes, notes = against_one_model(shown, fit.delay)
+            flags += changes
             if complete and not stepped and all(flag.code != "not_linear" for flag in flags):
                 flags += nonlinear_flags(shown, fit.delay, fit.total_delay / fit.dt)
     known = [flag for flag in flags if flag.code not in codes]
     estimate = replace(fit.estimate, low=low, high=high)
-    return replace(fit, estimate=estimate, flags=(*fit.flags, *known))
+    return replace(
+        fit, estimate=estimate, flags=(*fit.flags, *known), choices=(*fit.choices, *notes)
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -141,13 +143,17 @@ def _moves(drive: FloatArray) -> int:
     return int(np.count_nonzero(np.abs(np.diff(drive)) > 0.1 * np.ptp(drive)))
 
 
-def against_one_model(shown: Shown, delay: float) -> tuple[Flag, ...]:
-    """Test whether one gain and one dead time (in samples) hold for the whole record."""
+def against_one_model(shown: Shown, delay: float) -> tuple[list[Flag], list[str]]:
+    """Test whether one gain and one dead time (in samples) hold for the whole record.
+
+    Returns flags, and a note where the differences are too small to matter.
+    """
     fitted, residual, size = shown.fitted, shown.residual, shown.fitted.size
     late = shown.earlier(round(delay))
     parts = np.minimum(3 * np.arange(size) // size, 2)
     flags = []
-    if changes := _changes(parameter_change(residual, fitted, parts, shown.rows), delay):
+    change = parameter_change(residual, fitted, parts, shown.rows)
+    if changes := _changes(change, delay):
         flags.append(
             Flag(
                 "time_varying",
@@ -169,7 +175,7 @@ def against_one_model(shown: Shown, delay: float) -> tuple[Flag, ...]:
                 )
             )
             break
-    return tuple(flags)
+    return flags, [] if flags else _small_changes(change)
 
 
 def nonlinear_flags(shown: Shown, delay: float, total: float) -> tuple[Flag, ...]:
@@ -208,7 +214,7 @@ def _changes(change: ParameterChange | None, delay: float) -> str:
     """Describe the differences of gains and delays; empty if they are small."""
     if change is None or change.chance >= RARE:
         return ""
-    apart = np.ptp(change.shifts) > max(_DELAYS_APART * delay, 1.0)
+    apart = np.ptp(change.shifts) > time_apart(delay, 1.0)
     if not apart and np.ptp(change.gains) <= _GAINS_APART:
         return ""
     gains = ", ".join(f"{100 * gain:+.2g}" for gain in change.gains)
@@ -217,6 +223,17 @@ def _changes(change: ParameterChange | None, delay: float) -> str:
         f"the gain deviates by {gains} % and the delay by {shifts} samples from the common "
         f"values (p = {change.chance:.1g})"
     )
+
+
+def _small_changes(change: ParameterChange | None) -> list[str]:
+    if change is None or change.chance >= RARE:
+        return []
+    gain, shift = 50 * np.ptp(change.gains), np.ptp(change.shifts) / 2
+    return [
+        "small but significant differences between the thirds of the record (gain "
+        f"+-{gain:.1g} %, delay +-{shift:.1g} samples, p = {change.chance:.1g}): harmless for "
+        "tuning; often the input moved between two samples"
+    ]
 
 
 def _earlier_input(fit: OutputErrorFit, codes: set[str]) -> list[Flag]:

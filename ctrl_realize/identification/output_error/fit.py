@@ -339,6 +339,6 @@ def _fit_mean(
             break
         skip = apart
     fit = widened(fit, repeats, mean.used)
-    flags = fit_flags(data, fit, limit) + repeat_flags(repeats)
+    flags = fit_flags(data, fit, limit) + repeat_flags(repeats, fit.dead_time, mean.dt)
     time = mean.dt * np.arange(-mean.edge, mean.output.size - mean.edge, dtype=np.float64)
     return summarise(fit, data, time, records, flags, repeatability=repeats), fit

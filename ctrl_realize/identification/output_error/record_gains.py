@@ -126,7 +126,7 @@ class RecordGains(Result):
 
     @property
     def differ(self) -> bool:
-        """Whether the gains differ by more than their noise explains, and by more than 1 %."""
+        """Whether the gains differ by more than their noise explains, and by more than 3 %."""
         apart = float(np.max(np.abs(self.ratios[self._used] - 1), initial=0.0))
         return self.p_value < BY_CHANCE and apart > SAME
 

@@ -36,8 +36,10 @@ _LEAST_SHARE = 0.05
 class ParameterChange:
     """Shift and scale of the response of each group relative to the common model.
 
-    ``shifts`` (g,) in samples and ``gains`` (g,) relative to the common gain, with `errors` and
-    `gain_errors`; `chance` is the p-value of such differences for a constant plant.
+    ``shifts`` (g,) in samples and ``gains`` (g,) relative to the common gain are those of least
+    squares; `errors`, `gain_errors` and `chance`, the p-value of such differences for a constant
+    plant, are those of generalised least squares. These estimate no large shift: its residual is
+    taken for colour, and in a simulated record 1.3 samples remained of 6.
     """
 
     shifts: FloatArray
@@ -73,7 +75,8 @@ def parameter_change(
         return None
     members = [(groups == g).astype(np.float64) for g in used]
     blocks = [np.stack([m, m * slope, m * size], axis=1) for m in members]
-    columns, target, used_up = whitened(np.concatenate(blocks, axis=1), residual)
+    plain = np.concatenate(blocks, axis=1)
+    columns, target, used_up = whitened(plain, residual)
     common = sum(columns[:, 3 * i : 3 * i + 3] for i in range(used.size))
     freedom = target.size - columns.shape[1] - used_up
     if freedom < LEAST_FREEDOM:
@@ -84,8 +87,7 @@ def parameter_change(
     solution, _, rank, _ = np.linalg.lstsq(columns / scale, target, rcond=1e-9)
     if rank < columns.shape[1]:
         return None
-    solution = solution / scale
-    left = target - columns @ solution
+    left = target - columns @ (solution / scale)
     alone = target - common @ np.linalg.lstsq(common, target, rcond=None)[0]
     variance = float(left @ left) / freedom
     if variance <= 0:
@@ -95,10 +97,11 @@ def parameter_change(
     _, singular, turned = np.linalg.svd(columns / scale, full_matrices=False)
     spread = np.sum((turned / singular[:, None]) ** 2, axis=0) / scale**2
     errors = np.sqrt(variance * spread)
+    found = np.linalg.lstsq(plain / scale, residual, rcond=1e-9)[0] / scale
     return ParameterChange(
-        solution[1::3],
+        found[1::3],
         errors[1::3],
-        solution[2::3],
+        found[2::3],
         errors[2::3],
         float(fdtrc(3 * (used.size - 1), freedom, max(ratio, 0.0))),
     )
