@@ -92,5 +92,5 @@ def test_a_pure_dead_time_is_told_in_samples(structure, seed):
     assert fit.interval[0] <= 3.2 <= fit.interval[1]
     assert fit.total_delay_interval == fit.interval
     assert fit.formula.endswith("e^(-3.5 s)")
-    assert "dead time          7 samples (3.00 to 3.50 s give the same samples" in fit.report()
+    assert "7 samples (3.00 to 3.50 s give the same samples" in fit.report()
     assert np.isreal(fit.poles).all()  # P2D has two lags, no pair
