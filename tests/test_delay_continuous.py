@@ -7,6 +7,7 @@ import control as ct
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from scipy.optimize import brentq
 from scipy.special import lambertw
 
 import ctrl_realize as cr
@@ -323,3 +324,57 @@ def test_discrete_and_continuous_delays_are_made_alike():
     assert cr.delay(0.3, 0.1).delay == 3
     assert cr.delay(0).internal_delays == ()
     assert cr.delay(0.5)(1j) == pytest.approx(np.exp(-0.5j))
+
+
+def lag_ring(gain, dead_times):
+    """Lags of 1 s, each after a dead time, in one loop of negative feedback."""
+    q = len(dead_times)
+    before = np.roll(np.eye(q), 1, axis=0)
+    before[0] *= -gain
+    B = np.hstack([np.eye(q)[:, :1], np.eye(q)])
+    C = np.vstack([np.eye(q)[-1:], before])
+    return cr.DelaySystem(ct.ss(-np.eye(q), B, C, np.zeros((q + 1, q + 1))), dead_times)
+
+
+@pytest.mark.parametrize("count", [1, 5, 40])
+def test_a_ring_of_lags_and_dead_times_is_stable_up_to_its_ultimate_gain(count):
+    dead_times = 0.3 + 0.01 * np.arange(count)
+    # (j w + 1)^n exp(j w T) = -k: n atan(w) + w T = pi, k = (1 + w^2)^(n / 2)
+    omega = brentq(lambda w: count * np.arctan(w) + w * dead_times.sum() - np.pi, 1e-6, 50)
+    ultimate = (1 + omega**2) ** (count / 2)
+    assert lag_ring(0.999 * ultimate, dead_times).is_stable()
+    assert not lag_ring(1.001 * ultimate, dead_times).is_stable()
+
+
+def test_many_loops_beside_one_another_are_stable_if_each_is():
+    # tan(w) = -w at the ultimate frequency of exp(-s) / (s + 1), K = sqrt(1 + w^2)
+    ultimate = np.sqrt(1 + 2.028757838110434**2)
+    for share, stable in ((0.999, True), (1.001, False)):
+        gains = np.full(60, 0.5)
+        gains[37] = share * ultimate
+        loops = cr.DelaySystem(
+            ct.ss(
+                -np.eye(60),
+                np.hstack([np.ones((60, 1)), np.diag(-gains)]),
+                np.vstack([np.ones((1, 60)), np.eye(60)]),
+                np.zeros((61, 61)),
+            ),
+            np.ones(60),
+        )
+        assert loops.is_stable() is stable
+
+
+@pytest.mark.parametrize("direct", [0.0, 0.2])
+def test_stability_of_random_loops_is_that_of_their_rightmost_pole(direct):
+    rng = np.random.default_rng(5)
+    found = []
+    for _ in range(30):
+        n, q = rng.integers(1, 4, 2)
+        A = rng.standard_normal((n, n)) - np.eye(n)
+        B, C = rng.standard_normal((n, q + 1)), rng.standard_normal((q + 1, n))
+        D = direct * rng.uniform(-1, 1, (q + 1, q + 1))
+        loop = cr.DelaySystem(ct.ss(A, B, C, D), rng.uniform(0.1, 3, q))
+        assert loop.neutral_gain() < 1
+        found.append(loop.is_stable())
+        assert found[-1] is bool(loop.dominant_poles(1)[0].real < 0)
+    assert 5 < sum(found) < 25

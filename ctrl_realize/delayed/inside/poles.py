@@ -10,10 +10,9 @@ from scipy.optimize import brentq
 
 from ..._checks import integer, real
 from ...errors import UnsuitableSystemError
-from ...numerics.arrays import ComplexArray, FloatArray
-from ...numerics.internal_delays import characteristic, dominant, spectrum
+from ...numerics.arrays import ComplexArray
+from ...numerics.internal_delays import characteristic, dominant, spectrum, stability
 from ...numerics.internal_delays.form import inverse
-from ...numerics.loops.crossings import frequency_grid
 from ..host_responses import HostResponses
 from ..operators import DelayOperators
 
@@ -98,7 +97,7 @@ class InsidePoles(HostResponses, DelayOperators):
         """
         if self.neutral_gain() >= 1:
             return False
-        count, marginal = self._unstable()
+        count, marginal = stability.unstable_count(self._form(), float(self.dt or 0))
         return count == 0 and not marginal
 
     def neutral_gain(self) -> float:
@@ -114,23 +113,6 @@ class InsidePoles(HostResponses, DelayOperators):
            Systems, 2nd ed., SIAM 2014, section 1.2, doi:10.1137/1.9781611973631.
         """
         return 0.0 if self.dt else spectrum.neutral_gain(self._form())
-
-    def _unstable(self) -> tuple[int, bool]:
-        return dominant.unstable_count(self._form(), self._grid(), dt=float(self.dt or 0))
-
-    def _grid(self) -> FloatArray:
-        """Frequencies in rad/s at which no turn of the response is missed."""
-        features, dead_time = self.features()
-        sizes = np.abs(features)
-        if self.dt:
-            top = np.pi / float(self.dt)
-        else:
-            top = float(sizes.max(initial=1 / dead_time if dead_time else 1.0))
-            top = dominant.settled_frequency(self._form(), top)
-        low = 1e-3 * min(
-            float(sizes[sizes > 0].min(initial=top)), 1 / dead_time if dead_time else top
-        )
-        return frequency_grid(low, top, features, dead_time)
 
     def bandwidth(self, dbdrop: float = -3) -> float:
         """Lowest frequency in rad/s at which the gain is `dbdrop` dB below that at 0."""
@@ -148,7 +130,7 @@ class InsidePoles(HostResponses, DelayOperators):
             points = np.exp(s * float(self.dt)) if self.dt else s
             return np.abs(self.horner(points, warn_infinite=False)[0, 0]) - level
 
-        grid = self._grid()
+        grid = stability.grid(self._form(), float(self.dt or 0))
         (below,) = np.nonzero(excess(grid) < 0)
         if below.size == 0:
             return float("inf")
@@ -171,7 +153,7 @@ class InsidePoles(HostResponses, DelayOperators):
         -------
         ndarray, shape (K,)
         """
-        return dominant.characteristic(self._form(), x, discrete=bool(self.dt))
+        return stability.characteristic(self._form(), x, discrete=bool(self.dt))
 
     def zeros(self) -> ComplexArray:
         """Finite zeros; for a continuous loop with dead time the right-most ones.
@@ -216,10 +198,4 @@ class InsidePoles(HostResponses, DelayOperators):
 
     def features(self) -> tuple[ComplexArray, float]:
         """Poles in the s-plane where the response changes quickly, and the largest delay in s."""
-        dt = float(self.dt or 0)
-        poles = np.concatenate([self._core.poles(), self.dominant_poles(6)])
-        if not dt:
-            return np.asarray(poles, dtype=np.complex128), float(sum(self.internal_delays))
-        poles = poles[np.abs(poles) > 0.05]
-        dead_time = float(sum(self.internal_delays)) * dt
-        return np.asarray(np.log(poles) / dt, dtype=np.complex128), dead_time
+        return stability.features(self._form(), float(self.dt or 0))

@@ -191,14 +191,22 @@ def shifted_polynomial(
 def _line_factor(system: DelayLineController) -> Factor:
     dt = float(system.dt)
     ratio = pole_ratio(system.inner_poles, dt)
+    last: list[ComplexArray] = []
+
+    def paths(w: ComplexArray) -> list[ComplexArray]:
+        # The sums over a long line take most of the time, and response and characteristic are asked
+        # for at the same frequencies.
+        if not last or not np.array_equal(last[0], w):
+            last[:] = [w, *system.paths(w + 1)]
+        return last[1:]
 
     def response(w: ComplexArray) -> ComplexArray:
-        forward, back = system.paths(w + 1)
+        forward, back = paths(w)
         with np.errstate(divide="ignore", invalid="ignore"):
             return np.asarray(forward / back, dtype=np.complex128)
 
     def characteristic(w: ComplexArray) -> ComplexArray:
-        return np.asarray(ratio(w) * system.paths(w + 1)[1], dtype=np.complex128)
+        return np.asarray(ratio(w) * paths(w)[1], dtype=np.complex128)
 
     return Factor(
         response,

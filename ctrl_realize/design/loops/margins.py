@@ -131,7 +131,7 @@ def margins(
 def loop_margins(loop: Loop) -> Margins:
     """Margins of a loop."""
     omega, values = follow(loop, loop.grid())
-    count, marginal = closed_loop_count(loop, omega)
+    count, marginal = closed_loop_count(loop, omega, values)
     crossings = _crossings(loop, omega, values)
     if loop.dt:
         crossings = replace(crossings, phases=_with_ends(loop, crossings.phases))
@@ -157,7 +157,7 @@ class _Crossings:
 
 
 def _crossings(loop: Curve, omega: FloatArray, values: ComplexArray) -> _Crossings:
-    distance, closest = smallest_distance(lambda w: 1 + loop(w), omega)
+    distance, closest = smallest_distance(lambda w: 1 + loop(w), omega, 1 + values)
     return _Crossings(
         omega,
         values,
@@ -181,8 +181,12 @@ def _with_ends(loop: Loop, phases: FloatArray) -> FloatArray:
     return phases
 
 
-def closed_loop_count(loop: Loop, omega: FloatArray) -> tuple[int, bool]:
+def closed_loop_count(
+    loop: Loop, omega: FloatArray, response: ComplexArray | None = None
+) -> tuple[int, bool]:
     """Count the closed-loop poles outside the stability region.
+
+    `response` is that of the loop at `omega`, if it is known.
 
     Returns
     -------
@@ -190,7 +194,8 @@ def closed_loop_count(loop: Loop, omega: FloatArray) -> tuple[int, bool]:
     marginal : bool
         A closed-loop pole is too close to the boundary for a decision.
     """
-    _, values = follow(loop.characteristic, omega)
+    known = None if response is None else (1 + response) * loop.open_characteristic(omega)
+    _, values = follow(loop.characteristic, omega, values=known)
     if not loop.dt:
         # The grid ends where the loop has no gain left that could encircle -1. Its factors may
         # still turn there, as those of a controller with a pole at 0 and a fast one do.

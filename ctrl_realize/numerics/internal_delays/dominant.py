@@ -1,10 +1,9 @@
-"""Dominant poles of long discrete loops, and how many poles are unstable.
+"""Dominant poles of long discrete loops.
 
 A loop with a long delay has nearly all of its poles next to the unit circle, about evenly spaced:
 Newton's method from points on the circle, and from points beside it where z^d is as large as the
 loop's gain, finds those of largest magnitude. The argument principle [1]_ tells whether these are
-all; if not, as for several long delays, all poles are computed. The starts are our own. How many
-poles are unstable follows from the argument principle alone.
+all; if not, as for several long delays, all poles are computed. The starts are our own.
 
 References
 ----------
@@ -21,7 +20,6 @@ from ..loops.crossings import follow, half_turns
 from ..state_space.responses import frequency_response, schur_form
 from .characteristic import discrete_poles, loops, newton_polished, newton_steps
 from .form import DelayForm
-from .response import CHUNK, characteristic_matrices
 
 ALL = 400
 """Number of poles up to which all are found together in a few hundredths of a second."""
@@ -31,10 +29,6 @@ MULTIPLE = 1e-7
 
 RESIDUAL = 1e-10
 """Relative Newton step below which a point counts as a pole."""
-
-
-NEAR_ONE = 0.3
-"""Distance from 1 at which a characteristic function cannot turn about 0 any more."""
 
 
 def dominant_discrete_poles(form: DelayForm, count: int) -> ComplexArray:
@@ -167,70 +161,3 @@ def with_pairs(roots: ComplexArray) -> ComplexArray:
     real = np.abs(roots.imag) < 1e-9 * np.maximum(np.abs(roots), 1e-3)
     upper = apart(np.abs(roots.imag[~real]) * 1j + roots.real[~real])
     return np.concatenate([roots[real].real.astype(np.complex128), upper, upper.conj()])
-
-
-def characteristic(form: DelayForm, points: ComplexArray, *, discrete: bool) -> ComplexArray:
-    """Evaluate the characteristic function over a polynomial of its degree with stable roots only.
-
-    Its zeros are the poles of the system; it has no poles on or outside the border of stability.
-    """
-    rate = float(np.abs(np.linalg.eigvals(form.A)).max(initial=0.0)) or 1.0
-    out = np.empty(points.size, dtype=np.complex128)
-    for start in range(0, points.size, CHUNK):
-        part = points[start : start + CHUNK]
-        P = characteristic_matrices(form, part, discrete=discrete)
-        P[:, : form.states] /= (part if discrete else part + rate)[:, None, None]
-        values = np.linalg.det(P)
-        if not discrete and form.delays:
-            # What is left at high frequency: 1 for a system of retarded type. Without zeros to the
-            # right of the axis where the gain of the direct terms is below 1.
-            lines = P[:, form.states :, form.states :]
-            values = values / np.linalg.det(lines)
-        out[start : start + CHUNK] = values
-    return out
-
-
-def settled_frequency(form: DelayForm, low: float) -> float:
-    """Find the frequency in rad/s from which on a continuous function stays near 1."""
-    top = low
-    for _ in range(80):
-        omega = top * np.geomspace(1, 1e4, 60)
-        points = np.asarray(1j * omega, dtype=np.complex128)
-        values = characteristic(form, points, discrete=False)
-        if np.all(np.abs(values - 1) < NEAR_ONE):
-            return top
-        top *= 2
-    return top
-
-
-def unstable_count(form: DelayForm, grid: FloatArray, *, dt: float) -> tuple[int, bool]:
-    """Count the poles outside the stable region by the argument principle.
-
-    Parameters
-    ----------
-    form : DelayForm
-    grid : ndarray, shape (K,)
-        Rising frequencies in rad/s from near 0 to where nothing turns any more (the Nyquist
-        frequency).
-    dt : float
-        Sample time in s, 0 for continuous time.
-
-    Returns
-    -------
-    count : int
-    marginal : bool
-        A pole is so close to the border that its side cannot be determined.
-    """
-
-    def curve(omega: FloatArray) -> ComplexArray:
-        x = np.exp(1j * omega * dt) if dt else 1j * omega
-        return characteristic(form, np.asarray(x, dtype=np.complex128), discrete=bool(dt))
-
-    _, values = follow(curve, grid)
-    if np.any(values == 0) or not np.isfinite(values).all():
-        return 0, True
-    steps = np.abs(np.angle(values[1:] / values[:-1]))
-    turned = half_turns(values)
-    start = abs(float(np.sin(np.angle(values[0]))))
-    marginal = bool(np.any(steps > 2.0) or abs(turned - round(turned)) > 0.1 or start > 0.5)
-    return max(0, -round(turned)), marginal

@@ -62,12 +62,16 @@ def frequency_grid(low: float, top: float, features: ComplexArray, turn_time: fl
 
 
 def follow(
-    curve: Curve, grid: FloatArray, largest_turn: float = 0.5
+    curve: Curve,
+    grid: FloatArray,
+    largest_turn: float = 0.5,
+    values: ComplexArray | None = None,
 ) -> tuple[FloatArray, ComplexArray]:
     """Refine a grid until the curve turns by less than `largest_turn` rad between its points.
 
     Intervals whose ends differ by more than a factor of 2 in magnitude are halved too. A curve
     through zero would need infinitely many points; the refinement stops after 24 halvings.
+    `values` are those of the curve on the grid, if they are known.
 
     Returns
     -------
@@ -75,7 +79,7 @@ def follow(
     values : ndarray, shape (K,)
         ``curve(grid)``.
     """
-    values = curve(grid)
+    values = curve(grid) if values is None else values
     for _ in range(MAX_REFINEMENTS):
         with np.errstate(divide="ignore", invalid="ignore"):
             ratio = values[1:] / values[:-1]
@@ -140,13 +144,15 @@ def negative_axis_crossings(curve: Curve, grid: FloatArray, values: ComplexArray
     return _roots(height, grid[at], grid[at + 1])
 
 
-def smallest_distance(curve: Curve, grid: FloatArray) -> tuple[float, float]:
+def smallest_distance(
+    curve: Curve, grid: FloatArray, values: ComplexArray | None = None
+) -> tuple[float, float]:
     """Smallest magnitude of a curve, and the frequency where it is reached.
 
     The grid is first refined until neighbours differ by less than a factor of 2; every local
     minimum within 30 % of the smallest value is then narrowed by nested grids.
     """
-    grid, values = follow(curve, grid)
+    grid, values = follow(curve, grid, values=values)
     size = np.abs(values)
     padded = np.concatenate([[np.inf], size, [np.inf]])
     lows = np.flatnonzero((size <= padded[:-2]) & (size <= padded[2:]))
