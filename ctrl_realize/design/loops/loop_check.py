@@ -218,13 +218,18 @@ def _over_intervals(made: LoopCheck) -> tuple[Flag, ...]:
     if worst is None or worst.ms <= MOST_SENSITIVE * (1 + ROUNDED):
         return ()
     if worst.ms == float("inf"):
-        text = f"the loop is unstable at {worst}, ends of the intervals from the identification"
-        return (Flag("unstable_within_interval", text),)
-    text = (
-        f"Ms is {worst.ms:.3g}, more than {MOST_SENSITIVE:g}, at {worst}, ends of the intervals "
-        "from the identification"
+        unstable = Flag(
+            "unstable_within_interval",
+            f"the loop is unstable at {worst}, ends of the intervals from the identification",
+        )
+        return (unstable,)
+    return (
+        Flag(
+            "sensitive_within_interval",
+            f"Ms is {worst.ms:.3g}, more than {MOST_SENSITIVE:g}, at {worst}, ends of the "
+            "intervals from the identification",
+        ),
     )
-    return (Flag("sensitive_within_interval", text),)
 
 
 def _unstable_inside(found: DelayRobustness) -> Flag:
