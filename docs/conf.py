@@ -42,7 +42,8 @@ extensions = [
     "entries",
 ]
 # Tables are parts of pages, but for the one that is a page of its own.
-PARTS = sorted(path.name for path in HERE.glob("*_table.md") if path.name != "defects_table.md")
+PARTS = [f"tables/{path.name}" for path in sorted((HERE / "tables").glob("*_table.md"))]
+PARTS.remove("tables/defects_table.md")
 exclude_patterns = [
     "_build",
     "_ext",
@@ -76,32 +77,35 @@ _notebooks_into_source()
 
 # Tables that the benchmarks write, or a line that says how to make them.
 TABLES = {
-    "performance": ("docs/performance_table.md", "python -m benchmarks.speed"),
-    "accuracy": ("docs/accuracy_table.md", "python -m benchmarks.accuracy"),
-    "honesty": ("docs/honesty_table.md", "python -m benchmarks.honesty"),
-    "worlds": ("docs/worlds_table.md", "python -m benchmarks.worlds"),
-    "kernels": ("docs/kernels_table.md", "python -m benchmarks.kernels"),
-    "ablation": ("docs/ablation_table.md", "python -m benchmarks.ablation"),
+    "performance": ("docs/tables/performance_table.md", "python -m benchmarks.speed"),
+    "accuracy": ("docs/tables/accuracy_table.md", "python -m benchmarks.accuracy"),
+    "honesty": ("docs/tables/honesty_table.md", "python -m benchmarks.honesty"),
+    "worlds": ("docs/tables/worlds_table.md", "python -m benchmarks.worlds"),
+    "kernels": ("docs/tables/kernels_table.md", "python -m benchmarks.kernels"),
+    "ablation": ("docs/tables/ablation_table.md", "python -m benchmarks.ablation"),
     "ablation_worlds": (
-        "docs/ablation_worlds_table.md",
+        "docs/tables/ablation_worlds_table.md",
         "python -m benchmarks.ablation --made-for 6",
     ),
     "ablation_measured": (
-        "docs/ablation_measured_table.md",
+        "docs/tables/ablation_measured_table.md",
         "python -m benchmarks.ablation --kinds measured --only ... "
-        "--output docs/ablation_measured_table.md",
+        "--output docs/tables/ablation_measured_table.md",
     ),
     "campaign": (
-        "docs/campaign_table.md",
-        "python -m benchmarks.campaign --output docs/campaign_table.md",
+        "docs/tables/campaign_table.md",
+        "python -m benchmarks.campaign --output docs/tables/campaign_table.md",
     ),
-    "missing": ("docs/missing_table.md", "python -m benchmarks.accuracy.missing"),
-    "loops": ("docs/loops_table.md", "python -m benchmarks.loops"),
-    "fuzz": ("docs/fuzz_table.md", "python3 tools/fuzz_table.py"),
-    "peers": ("docs/peers_table.md", "python -m benchmarks.peers simulated"),
-    "crossed": ("docs/crossed_table.md", "python -m benchmarks.peers crossed"),
-    "joint": ("docs/joint_table.md", "python -m benchmarks.peers joint"),
-    "peers_measured": ("docs/peers_measured_table.md", "python -m benchmarks.peers measured"),
+    "missing": ("docs/tables/missing_table.md", "python -m benchmarks.accuracy.missing"),
+    "loops": ("docs/tables/loops_table.md", "python -m benchmarks.loops"),
+    "fuzz": ("docs/tables/fuzz_table.md", "python3 tools/fuzz_table.py"),
+    "peers": ("docs/tables/peers_table.md", "python -m benchmarks.peers simulated"),
+    "crossed": ("docs/tables/crossed_table.md", "python -m benchmarks.peers crossed"),
+    "joint": ("docs/tables/joint_table.md", "python -m benchmarks.peers joint"),
+    "peers_measured": (
+        "docs/tables/peers_measured_table.md",
+        "python -m benchmarks.peers measured",
+    ),
 }
 (GENERATED / "tables").mkdir(exist_ok=True)
 for _name, (_file, _command) in TABLES.items():

@@ -42,7 +42,7 @@ def test_sources_of_the_paper_are_cited_and_those_cited_are_there():
 
 
 def column(table: str, row: str, place: int) -> str:
-    lines = (ROOT / "docs" / table).read_text(encoding="utf-8").splitlines()
+    lines = (ROOT / "docs" / "tables" / table).read_text(encoding="utf-8").splitlines()
     (line,) = [each for each in lines if each.startswith(row)]
     return line.split("|")[place].strip()
 
@@ -89,13 +89,13 @@ def test_counts_in_the_paper_are_those_of_the_measured_records(stated, row):
 
 def test_coverage_and_silent_misses_in_the_paper_are_those_of_the_studies():
     row = "| white | 0.5 % |"
-    lines = (ROOT / "docs" / "honesty_table.md").read_text(encoding="utf-8").splitlines()
+    lines = (ROOT / "docs" / "tables" / "honesty_table.md").read_text(encoding="utf-8").splitlines()
     cells = next(line for line in lines if line.startswith(row)).split("|")
     assert int(cells[3]) == 252
     union, own = first(cells[4].strip()), first(cells[7].strip())
     assert f"{union:.1f} % (252 records" in PAPER.replace("\n", " ")
     assert f"in {own:.1f} % of simulated records" in PAPER.replace("\n", " ")
-    worlds = (ROOT / "docs" / "worlds_table.md").read_text(encoding="utf-8")
+    worlds = (ROOT / "docs" / "tables" / "worlds_table.md").read_text(encoding="utf-8")
     silent, records = re.search(r"Silent: (\d+) of (\d+) records", worlds).groups()
     missed = re.search(r"missed at all: (\d+)", worlds)[1]
     said = " ".join(PAPER.split())

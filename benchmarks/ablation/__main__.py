@@ -29,7 +29,7 @@ from .page import KINDS, Seen, page
 from .switches import MODES, SWITCHES, Switch
 from .touched import watched
 
-DOCS = Path(__file__).parents[2] / "docs"
+DOCS = Path(__file__).parents[2] / "docs" / "tables"
 PAGE, OWN_WORLDS = DOCS / "ablation_table.md", DOCS / "ablation_worlds_table.md"
 MOST, FEW = 6, 12
 """Records of a kind on which a rule is tried, evenly among those that it touches; where these are

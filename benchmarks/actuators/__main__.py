@@ -1,4 +1,4 @@
-"""Fit simulated records, and write docs/actuators_table.md.
+"""Fit simulated records, and write docs/tables/actuators_table.md.
 
 ``python -m benchmarks.actuators --seeds 200`` writes every trial as a line of JSON as well and goes
 on where it was stopped.
@@ -69,7 +69,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(prog="python -m benchmarks.actuators", description=__doc__)
     parser.add_argument("--seeds", type=int, default=40)
     parser.add_argument("--rows", type=Path, default=Path("actuators_rows.jsonl"))
-    parser.add_argument("--out", type=Path, default=Path("docs/actuators_table.md"))
+    parser.add_argument("--out", type=Path, default=Path("docs/tables/actuators_table.md"))
     parser.add_argument("--only", nargs="*", default=[], help="names of cases")
     parser.add_argument("--table", action="store_true", help="write the page from the rows alone")
     parser.add_argument("--note", default="", help="a sentence about the rows, for the page")

@@ -18,7 +18,7 @@ from ..speed.__main__ import conditions
 from ..speed.measure import cpu_seconds, once, seconds
 from ..speed.rigs import TS, valve
 
-TABLE = Path(__file__).resolve().parents[2] / "docs" / "loops_table.md"
+TABLE = Path(__file__).resolve().parents[2] / "docs" / "tables" / "loops_table.md"
 DELAYS = (37, 300, 1000, 10_000)
 LARGEST = 1000
 """Samples up to which python-control is asked: the matrix of 10 000 states takes hours."""

@@ -15,7 +15,7 @@ import scipy
 from . import models, scans, sizes
 from .measure import Line
 
-TABLE = Path(__file__).resolve().parents[2] / "docs" / "performance_table.md"
+TABLE = Path(__file__).resolve().parents[2] / "docs" / "tables" / "performance_table.md"
 
 
 def conditions() -> str:

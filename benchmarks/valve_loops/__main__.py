@@ -16,7 +16,7 @@ import ctrl_realize as cr
 
 from .worlds import CAUSES, worlds
 
-TABLE = Path(__file__).resolve().parents[2] / "docs" / "valve_loops_table.md"
+TABLE = Path(__file__).resolve().parents[2] / "docs" / "tables" / "valve_loops_table.md"
 DATA = Path(__file__).resolve().parents[3] / "shared" / "data" / "valve_loops"
 SEEDS = 10
 VERDICTS = (

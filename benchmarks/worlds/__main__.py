@@ -26,7 +26,7 @@ GROUPS = {
     "loops": loops,
     "described": described,
 }
-PAGE = Path(__file__).parents[2] / "docs" / "worlds_table.md"
+PAGE = Path(__file__).parents[2] / "docs" / "tables" / "worlds_table.md"
 DOUBTS = DELAY | GAIN | MODEL
 
 

@@ -26,7 +26,9 @@ def _leading(cell: str) -> float:
 
 def numbers(docs: Path) -> dict[str, str]:
     """Return name -> text of every number that pages quote as `|name|`."""
-    text = {name: (docs / f"{name}_table.md").read_text(encoding="utf-8") for name in TABLES}
+    text = {
+        name: (docs / "tables" / f"{name}_table.md").read_text(encoding="utf-8") for name in TABLES
+    }
     single = next(
         row
         for row in rows(text["accuracy"], "rms error")
