@@ -243,7 +243,7 @@ def _of_lower_orders(
     What repeats in every point of a measurement, such as drift or a nonlinearity, is smooth along
     frequency: poles describe it as if it were the plant, and the residual does not show it.
     """
-    best = {}
+    best: dict[int, FRFStructure] = {}
     for row in rows:
         left = _residual_ratio(data, fits[_key(row)])
         if row.order < rows[0].order and left < _ACCURACY:

@@ -49,6 +49,9 @@ COMPOSED = {
     "or the interval of the gain contains zero",
     "actuator_not_resolved": "S, J, or another parameter of an actuator, lies between … and …, and "
     "the records do not determine it more closely; … would",
+    "output_at_limit": "… samples are at …, the output saturates there: they were left out of the "
+    "fit, and what the plant does beyond is extrapolated; or gain and lags are those of the "
+    "clipped signal",
     "estimates_disagree": "delay estimates far from their median: …",
 }
 """Messages that are put together from parts."""
