@@ -22,8 +22,19 @@ def test_the_path_of_a_step_record_has_not_grown():
 
 def test_lines_of_code_are_those_that_hold_code(tmp_path):
     file = tmp_path / "one.py"
-    lines = ['"""Words."""', "import os", "# why", "A = (", "    1,", ")", "", "def f():", '    """Words."""',
-             "    return A"]  # fmt: skip
+    words = '    """Words."""'
+    lines = [
+        words.strip(),
+        "import os",
+        "# why",
+        "A = (",
+        "1,",
+        ")",
+        "",
+        "def f():",
+        words,
+        "    return A",
+    ]
     file.write_text("\n".join(lines) + "\n")
     assert house.code_lines(file) == 5  # three of the tuple, def, return
     assert house.constants(file) == 1
