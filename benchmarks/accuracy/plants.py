@@ -6,9 +6,10 @@ import control as ct
 import numpy as np
 
 import ctrl_realize as cr
-from ctrl_realize.numerics.cramer_rao import dead_time_bound
 from ctrl_realize.numerics.separable.varpro import KnownFactor
 from tests import rigs
+
+from .cramer_rao import dead_time_bound
 
 BEFORE, AFTER = 3840, 2600
 SENSOR = rigs.lag(30.0)

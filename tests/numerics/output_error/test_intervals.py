@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from benchmarks.accuracy.cramer_rao import dead_time_bound
 from ctrl_realize.identification.output_error.flags import sampled_flags
-from ctrl_realize.numerics.cramer_rao import dead_time_bound
 from ctrl_realize.numerics.output_error.interval import likelihood_fit
 from ctrl_realize.numerics.output_error.margins import CLOSE, close_to
 from ctrl_realize.numerics.output_error.profiles import laid_profiles, lower_minima

@@ -16,12 +16,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from .arrays import ComplexArray, FloatArray
-from .separable.poles import parameters_from_poles
-from .separable.profile import dead_time_error
-from .separable.responses import StepSequence
-from .separable.structures import Candidate
-from .separable.varpro import KnownFactor, Problem, Structure, respond
+from ctrl_realize.numerics.arrays import ComplexArray, FloatArray
+from ctrl_realize.numerics.separable.poles import parameters_from_poles
+from ctrl_realize.numerics.separable.profile import dead_time_error
+from ctrl_realize.numerics.separable.responses import StepSequence
+from ctrl_realize.numerics.separable.structures import Candidate
+from ctrl_realize.numerics.separable.varpro import KnownFactor, Problem, Structure, respond
 
 
 def dead_time_bound(
@@ -65,7 +65,7 @@ def dead_time_bound(
     Examples
     --------
     >>> import numpy as np
-    >>> from ctrl_realize.numerics.cramer_rao import dead_time_bound
+    >>> from benchmarks.accuracy.cramer_rao import dead_time_bound
     >>> pole = -2 * np.pi * np.array([2.0 + 0j])
     >>> gain = np.array([2 * np.pi * 2.0])
     >>> error = dead_time_bound(pole, gain, 0.03, 1 / 1280, (1000, 1100), 0.01)
