@@ -70,7 +70,7 @@ def fitted_core(fit: OutputErrorEstimate, poles: ComplexArray) -> ct.StateSpace:
 
 def _choices(fit: OutputErrorEstimate) -> tuple[str, ...]:
     s = fit.structure
-    simple = " with up to three poles" if fit.robust else ""
+    simple = " with up to three poles" if fit.robust and s.order <= 3 else ""
     kind = (
         model_words(fit.distributed.chain)
         if fit.distributed.chain
@@ -143,7 +143,7 @@ def _closest(fit: OutputErrorEstimate) -> list[str]:
         + (
             "not more than additional parameters follow noise (information criterion)"
             if fit.adequate
-            else "no structure reaches the noise, and the simple ones are more reliable then"
+            else "no structure reaches the noise, and simpler ones are more reliable then"
         )
     ]
 
