@@ -15,7 +15,7 @@ from ..errors import DataError, OptionError, OrderError
 from ..numerics.arrays import FloatArray
 from ..numerics.blas_threads import single_threaded
 from ..numerics.rational.error_floor import fit_with_floor
-from ..numerics.rational.fit import FRFData
+from ..numerics.rational.frf_data import FRFData
 from ..numerics.rational.search import DEFAULT_ORDERS, dead_time_bound, fit_structures
 from ..numerics.rational.spectra import hold_response
 from ..numerics.rational.starts import longest_search
@@ -65,9 +65,9 @@ def fit_frf(
     weighting : {"auto", "std", "relative", "uniform"}
         "std": the FRF's standard deviation. "relative": an error proportional to the response,
         weighted by the coherence if there is one. "uniform": the same error everywhere. "auto":
-        "std" if there is one, otherwise "relative"; if that explains less than nine tenths of the
-        response, as where noise hides an anti-resonance, with a floor that is estimated from the
-        residuals of "uniform".
+        "std" if there is one, otherwise "relative", with a floor if the residuals have one: with
+        relative weights noise that does not fall with the response, as at an anti-resonance, would
+        outweigh all other points.
     hold : {"auto", "zoh", None}
         "zoh": the FRF was estimated from samples of a held input. The hold is divided out (`dt`
         must be its sample time if the FRF has none), and points near the Nyquist frequency, where

@@ -11,32 +11,26 @@ from .._wording import plainly
 from ..delayed import DelayedStateSpace, delayed_ss
 from ..numerics.arrays import locked, read_only
 from ..numerics.constants import Z_95
-from ..numerics.rational.fit import FRFData, RationalFit
-from ..numerics.rational.model import chain_state_space
+from ..numerics.rational.frf_data import (
+    FRFData,
+    modal_state_space,
+    pole_deviations,
+)
 from ..numerics.rational.search import (
     DEFAULT_ORDERS,
     dead_time_bound,
     fit_structures,
-    information_criteria,
-    residual_variance,
-    smallest_cost,
 )
-from ..numerics.rational.uncertainty import (
-    covariance,
-    error_root,
-    pole_deviations,
-    profile_interval,
-)
+from ..numerics.separable.structures import Candidate
+from ..numerics.separable.varpro import Structure
 from ..numerics.statistics import mixture_quantile
 from ..results import Flag
 from .frf_fit import FRFFit, FRFStructure
+from .frf_structures import ComparedFits, compared_fits, key_of, residual_ratio
 from .points import FRFPoints
 
 _POOR_MISFIT = 2.0
 """Residual over the measured noise from which a word is said."""
-_NEAR_BIC = 8.0
-"""Difference to the best BIC below which a structure widens the interval; beyond, its weight is
-below 2 %."""
 _SHARE = 0.1
 """Part of the dead time by which structures must disagree for a word about it: the interval covers
 all of them in any case, and some other structure nearly always widens a narrow one."""
@@ -55,7 +49,7 @@ _FAR_BETTER = 0.5
 def chosen_model(
     frf: Any,
     data: FRFData,
-    fits: dict[tuple[int, int], RationalFit],
+    fits: dict[Structure, Candidate],
     points: FRFPoints,
     unit: float,
     size: float,
@@ -83,29 +77,30 @@ def chosen_model(
     name : str or None
     """
     frequency, noise_known = points.frequency_hz, points.noise_known
-    rows, scales = _structures(data, fits, unit, noise_known)
+    compared = compared_fits(data, fits, unit, noise_known)
+    fits, rows, scales = compared.fits, compared.rows, compared.scales
     best = rows[0]
     n, r = best.order, best.relative_degree
-    chosen = fits[n, r]
-    within = _profiles(data, fits, rows, scales, unit)
+    chosen = fits[key_of(best)]
+    ends = [compared.interval(data, key_of(row), solved=row is best) for row in compared.near]
+    within = [(low / unit, high / unit) for low, high in ends]
     interval, flags = _cover(rows, within, data.max_dead_time / unit, 1 / float(frequency[-1]))
-    residual_ratio = _residual_ratio(data, chosen)
-    if not noise_known and n > max(DEFAULT_ORDERS) and residual_ratio < _ACCURACY:
-        interval, systematic = _of_lower_orders(data, fits, rows, scales, unit, interval)
+    ratio = residual_ratio(data, chosen)
+    if not noise_known and n > max(DEFAULT_ORDERS) and ratio < _ACCURACY:
+        interval, systematic = _of_lower_orders(data, compared, unit, interval)
         flags.extend(systematic)
-    if noise_known and residual_ratio > _POOR_MISFIT:
+    if noise_known and ratio > _POOR_MISFIT:
         flags.append(
             Flag(
                 "misfit",
-                f"the residual is {plainly(residual_ratio, 2)} times the measured noise: the "
+                f"the residual is {plainly(ratio, 2)} times the measured noise: the "
                 f"plant is not exactly of order {n}, or is nonlinear; the interval is widened "
                 "accordingly",
             )
         )
     flags.extend(_leading_phase(data, fits, chosen, unit))
-    errors = error_root(data, chosen, scales[n, r], robust=not noise_known)
-    poles, pole_std = pole_deviations(chosen, errors)
-    A, B, C, D = chain_state_space(chosen.theta, chosen.numerator * size, n)
+    poles, pole_std = pole_deviations(data, chosen, scales[key_of(best)], robust=not noise_known)
+    A, B, C, D = modal_state_space(data, chosen)
     used = best.dead_time
     if r == 0:
         used, rounded = _whole_samples(best.dead_time, dt)
@@ -120,8 +115,13 @@ def chosen_model(
         measured=locked(points.response),
         sigma=read_only(points.sigma),
         noise_known=noise_known,
-        weighted_rms=residual_ratio,
-        matrices=(read_only(A * unit), read_only(B * unit), read_only(C), read_only(D)),
+        weighted_rms=ratio,
+        matrices=(
+            read_only(A * unit),
+            read_only(B * unit),
+            read_only(C * size),
+            read_only(D * size),
+        ),
         poles=locked(poles * unit),
         pole_std=read_only(pole_std * unit),
         structures=tuple(rows),
@@ -131,28 +131,6 @@ def chosen_model(
         flags=tuple(flags),
     )
     return delayed_ss(result.core, dead_time=used, dt=dt, fit=result, name=name)
-
-
-def _structures(
-    data: FRFData, fits: dict[tuple[int, int], RationalFit], unit: float, noise_known: bool
-) -> tuple[list[FRFStructure], dict[tuple[int, int], float]]:
-    """List what was tried, best first, and the residual variance of each."""
-    rows, scales = [], {}
-    criteria = information_criteria(data, fits)
-    for (n, r), fit in fits.items():
-        freedom = 2 * data.s.size - (2 * n + 2 - r)
-        scales[n, r] = residual_variance(data, fit, freedom, noise_known)
-        rows.append(
-            FRFStructure(
-                order=n,
-                relative_degree=r,
-                dead_time=float(fit.theta[n]) / unit,
-                std=float(np.sqrt(covariance(data, fit, scales[n, r])[n, n])) / unit,
-                cost=smallest_cost(data, fit),
-                bic=criteria[n, r],
-            )
-        )
-    return sorted(rows, key=lambda row: row.bic), scales
 
 
 def _whole_samples(dead_time: float, dt: float) -> tuple[float, list[Flag]]:
@@ -172,7 +150,7 @@ def _whole_samples(dead_time: float, dt: float) -> tuple[float, list[Flag]]:
 
 
 def _leading_phase(
-    data: FRFData, fits: dict[tuple[int, int], RationalFit], chosen: RationalFit, unit: float
+    data: FRFData, fits: dict[Structure, Candidate], chosen: Candidate, unit: float
 ) -> list[Flag]:
     """Say so where a response that comes before its input fits far better.
 
@@ -180,14 +158,14 @@ def _leading_phase(
     """
     # Half a radian at the highest frequency: what is less may as well be none.
     half_radian = 0.5 / float(np.abs(data.s).max())
-    if chosen.theta[chosen.order] > half_radian:
+    if chosen.dead_time > half_radian:
         return []
-    n = min(chosen.order, _ORDER_OF_LEAD)
-    as_is = [fit.cost for (order, _), fit in fits.items() if order == n] or [chosen.cost]
+    n = min(chosen.structure.order, _ORDER_OF_LEAD)
+    as_is = [fit.cost for key, fit in fits.items() if key.order == n] or [chosen.cost]
     lead = dead_time_bound(data.response.conj(), np.abs(data.s), 1 / data.weight)
     turned = replace(data, response=data.response * np.exp(-data.s * lead), max_dead_time=lead)
     earlier = min(fit_structures(turned, (n,), (1,)).values(), key=lambda fit: fit.cost)
-    dead_time = float(earlier.theta[n]) - lead
+    dead_time = earlier.dead_time - lead
     if dead_time > -half_radian or earlier.cost > _FAR_BETTER * min(as_is):
         return []
     return [
@@ -202,64 +180,27 @@ def _leading_phase(
     ]
 
 
-def _profiles(
-    data: FRFData,
-    fits: dict[tuple[int, int], RationalFit],
-    rows: list[FRFStructure],
-    scales: dict[tuple[int, int], float],
-    unit: float,
-) -> list[tuple[float, float]]:
-    """Return the profile intervals of the structures that come close to the best, best first.
-
-    Where a numerator is freer than the plant's, the standard deviation is infinite, or says
-    nothing; the profile is finite all the same.
-    """
-    found = []
-    for row in rows:
-        if row.bic - rows[0].bic < _NEAR_BIC:
-            key = row.order, row.relative_degree
-            count = row.order + 1 - row.relative_degree
-            ends = profile_interval(data, fits[key], count, scales[key], row.std * unit)
-            found.append((ends[0] / unit, ends[1] / unit))
-    return found
-
-
-def _residual_ratio(data: FRFData, fit: RationalFit) -> float:
-    """Weighted rms residual, over the degrees of freedom."""
-    lost = 0.5 * (fit.order + 1 + fit.numerator.size)
-    return float(np.sqrt(fit.cost / (data.s.size - lost)))
-
-
 def _of_lower_orders(
-    data: FRFData,
-    fits: dict[tuple[int, int], RationalFit],
-    rows: list[FRFStructure],
-    scales: dict[tuple[int, int], float],
-    unit: float,
-    interval: tuple[float, float],
+    data: FRFData, compared: ComparedFits, unit: float, interval: tuple[float, float]
 ) -> tuple[tuple[float, float], list[Flag]]:
     """Widen an interval to those of lower orders within the accuracy of frequency responses.
 
     What repeats in every point of a measurement, such as drift or a nonlinearity, is smooth along
     frequency: poles describe it as if it were the plant, and the residual does not show it.
     """
+    fits, rows = compared.fits, compared.rows
     best: dict[int, FRFStructure] = {}
     for row in rows:
-        left = _residual_ratio(data, fits[_key(row)])
+        left = residual_ratio(data, fits[key_of(row)])
         if row.order < rows[0].order and left < _ACCURACY:
             best.setdefault(row.order, row)
     if not best:
         return interval, []
-    ends = []
-    for row in best.values():
-        count = row.order + 1 - row.relative_degree
-        ends.append(
-            profile_interval(data, fits[_key(row)], count, scales[_key(row)], row.std * unit)
-        )
+    ends = [compared.interval(data, key_of(row), solved=True) for row in best.values()]
     low = min(interval[0], *(first / unit for first, _ in ends))
     high = max(interval[1], *(last / unit for _, last in ends))
     least, most = best[min(best)], rows[0]
-    above, left = (100 * _residual_ratio(data, fits[_key(row)]) for row in (least, most))
+    above, left = (100 * residual_ratio(data, fits[key_of(row)]) for row in (least, most))
     return (low, high), [
         Flag(
             "systematic_error",
@@ -270,10 +211,6 @@ def _of_lower_orders(
             "state the order",
         )
     ]
-
-
-def _key(row: FRFStructure) -> tuple[int, int]:
-    return row.order, row.relative_degree
 
 
 def _cover(

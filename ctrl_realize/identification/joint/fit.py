@@ -36,7 +36,6 @@ from ..process_structures import Structures, plain_pairs
 from .flags import joint_flags
 from .result import JointFit
 
-_MOST_ORDER = 4  # of a frequency response; it takes 2 order + 1 points
 _LEAST = 1e-6  # of the response: noise of exact points, for which the weights must be finite
 
 
@@ -128,7 +127,7 @@ def fit_joint(
     other = fit_of(
         fit_frf(
             frf,
-            _orders(frf) if pairs is None else sorted({n for n, _ in pairs}),
+            None if pairs is None else sorted({n for n, _ in pairs}),
             relative_degree=None if pairs is None else sorted({r for _, r in pairs}),
             dt=held,
             weighting=weighting,
@@ -173,12 +172,6 @@ def fit_joint(
     )
     result = replace(result, flags=joint_flags(result, max_delay))
     return fitted_model(fitted_core(estimate, result.poles), result)
-
-
-def _orders(frf: ct.FrequencyResponseData) -> range | None:
-    """Orders that a short frequency response can determine; None: those of `fit_frf`."""
-    points = int(np.size(getattr(frf, "omega", ())))
-    return range(1, max((points - 1) // 2, 1) + 1) if points < 2 * _MOST_ORDER + 1 else None
 
 
 def _part(first: OutputErrorFit, latest: float | None) -> tuple[RecordPart, StepData, FloatArray]:

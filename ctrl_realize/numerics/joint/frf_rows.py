@@ -1,16 +1,7 @@
-r"""Points of a frequency response as rows of a separable least-squares problem.
+"""Rows of time records and points of a frequency response below one another.
 
-In `varpro` a model is a sum of modes of an input. A point of a frequency response is the response
-to another input, :math:`e^{j \omega t}`: with the residues r_j of ``G(s) / s`` at its poles p_j and
-its static gain g, a strictly proper G has
-
-.. math:: e^{-j \omega \tau} G(j \omega) =
-          e^{-j \omega \tau} \Bigl( g + \sum_j r_j \frac{j \omega}{j \omega - p_j} \Bigr),
-
-so that ``E_j = exp(-j omega tau) j omega / (j omega - p_j)`` takes the place of the exponentials of
-a step response. The derivative with respect to the dead time is ``-sum_j r_j p_j E_j`` for both,
-since ``g + sum_j r_j = 0``. Real and imaginary parts are separate rows, each with half of the
-variance of the complex value [1]_.
+Real and imaginary parts of a point are separate rows, each with half of the variance of the complex
+value [1]_; see `signals.sines`.
 
 References
 ----------
@@ -26,41 +17,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..arrays import ComplexArray, FloatArray
-from ..rational.model import stacked_parts
 from ..separable.local_terms import Segments
 from ..separable.responses import HeldInput, Modes
 from ..separable.varpro import KnownFactor, Problem
+from ..signals.sines import Sines, stacked_parts
 
 _LATE = 1e200
 """Time in s at which every free response has ended: a frequency response has no initial state."""
-
-
-@dataclass(frozen=True, eq=False)
-class Sines:
-    """Steady state of sines: real parts of all points, then imaginary parts.
-
-    Attributes
-    ----------
-    omega : ndarray, shape (K,)
-        In rad/s.
-    """
-
-    omega: FloatArray
-
-    def pieces(self) -> list[Sines]:
-        """All points."""
-        return [self]
-
-    def modes(self, tau: FloatArray, poles: ComplexArray) -> Modes:
-        """Evaluate H, E and T of every row; see `HeldInput`."""
-        s = 1j * self.omega
-        turn = np.exp(-s * tau[:, None])
-        gap = s[:, None] - poles[:, None, :]
-        mode = turn[:, :, None] * (s[:, None] / gap)
-        # Re(-j z) is the imaginary part of z.
-        static = np.concatenate([turn.real, turn.imag], axis=1)
-        both = np.concatenate([mode, -1j * mode], axis=1)
-        return static, both, both / np.concatenate([gap, gap], axis=1)
 
 
 @dataclass(frozen=True, eq=False)

@@ -27,12 +27,12 @@ from scipy.stats import f as f_distribution
 
 from ..arrays import ComplexArray, FloatArray
 from ..output_error.result import OutputErrorEstimate
-from ..rational.model import stacked_parts
 from ..separable.compared_fits import settled
 from ..separable.poles import parameters_from_poles
 from ..separable.responses import HeldInput, Modes
 from ..separable.structures import Candidate, Scales
 from ..separable.varpro import KnownFactor, Problem, evaluate, respond
+from ..signals.sines import stacked_parts
 from .frf_rows import MeasuredPoints, both_together, with_rows
 from .record_part import RecordPart
 

@@ -21,8 +21,9 @@ from dataclasses import replace
 import numpy as np
 
 from ..arrays import FloatArray
-from .fit import FRFData, RationalFit
-from .model import project
+from ..separable.structures import Candidate
+from ..separable.varpro import Structure
+from .frf_data import FRFData
 from .search import (
     MISSING,
     correlation_cost,
@@ -39,10 +40,10 @@ _TRIED = 100  # floors over the range of the response: 10 % apart over four deca
 
 def fit_with_floor(
     data: FRFData, orders: Sequence[int] | None, degrees: Sequence[int] | None
-) -> tuple[FRFData, dict[tuple[int, int], RationalFit]]:
-    """Fit all structures to points with relative weights; with a floor if that explains nothing.
+) -> tuple[FRFData, dict[Structure, Candidate]]:
+    """Fit all structures to points with relative weights, and with a floor if the errors have one.
 
-    What the errors are is then seen in a fit with uniform weights.
+    Where relative weights explain little, the errors are seen in a fit with uniform ones.
 
     Returns
     -------
@@ -51,11 +52,11 @@ def fit_with_floor(
     fits : dict
     """
     fits = fit_structures(data, orders, degrees)
-    if unexplained(data, _best(data, fits)) <= MISSING:
-        return data, fits
-    uniform = replace(data, weight=np.ones(data.s.size))
-    best = _best(uniform, fit_structures(uniform, orders, degrees))
-    floor = error_floor(*_errors(uniform, best))
+    seen, best = data, _best(data, fits)
+    if unexplained(data, best) > MISSING:
+        seen = replace(data, weight=np.ones(data.s.size))
+        best = _best(seen, fit_structures(seen, orders, degrees))
+    floor = error_floor(*_errors(seen, best))
     if floor == 0:
         return data, fits
     other = replace(data, weight=1 / np.hypot(np.abs(data.response), floor))
@@ -64,17 +65,14 @@ def fit_with_floor(
     return (other, again) if correlation_cost(other, _best(other, again)) == 1.0 else (data, fits)
 
 
-def _best(data: FRFData, fits: dict[tuple[int, int], RationalFit]) -> RationalFit:
+def _best(data: FRFData, fits: dict[Structure, Candidate]) -> Candidate:
     criteria = information_criteria(data, fits)
     return fits[min(criteria, key=lambda key: criteria[key])]
 
 
-def _errors(data: FRFData, fit: RationalFit) -> tuple[FloatArray, FloatArray]:
+def _errors(data: FRFData, fit: Candidate) -> tuple[FloatArray, FloatArray]:
     """Magnitudes of a model and of its residual, shapes (K,)."""
-    found = project(
-        data.s, data.response, data.weight, fit.theta, fit.order, fit.numerator.size
-    ).residual
-    residual = (found[: data.s.size] + 1j * found[data.s.size :]) / data.weight
+    residual = data.misfit(fit) / data.weight
     return np.abs(data.response - residual), np.abs(residual)
 
 

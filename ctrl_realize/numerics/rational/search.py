@@ -19,8 +19,11 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..arrays import ComplexArray, FloatArray
-from .fit import FRFData, RationalFit, refine_best
-from .model import factor_parameters, poles_of, project
+from ..separable.compared_fits import settled
+from ..separable.poles import parameters_from_poles
+from ..separable.structures import Candidate
+from ..separable.varpro import Structure
+from .frf_data import FRFData, refined
 from .starts import delay_grid, grown_starts, starting_points
 
 DEFAULT_ORDERS = range(1, 5)
@@ -31,7 +34,10 @@ MISSING = 0.1
 """Correlated residual over the response at which dynamics are missing, not details: three
 resonances leave 0.35 to 0.9 up to order 5; a motor bench that is slightly nonlinear 0.03."""
 _STEPS_OF_ONE = 8  # order up to which real poles are added too, which takes twice the time
-_KEPT = 2  # fits of every order that are extended: time
+_SETTLED = 10.0
+"""Excess of the criterion up to which a structure is followed to its very minimum: it may be chosen
+or widen the interval."""
+_KEPT = 4  # starts followed to the end, and fits of every order that are extended: time
 
 
 def dead_time_bound(response: ComplexArray, omega: FloatArray, sigma: FloatArray) -> float:
@@ -64,7 +70,7 @@ def fit_structures(
     data: FRFData,
     orders: Sequence[int] | None,
     degrees: Sequence[int] | None,
-) -> dict[tuple[int, int], RationalFit]:
+) -> dict[Structure, Candidate]:
     """Fit every structure, each from its own starts and from its neighbours' solutions.
 
     Parameters
@@ -78,36 +84,50 @@ def fit_structures(
     Returns
     -------
     dict
-        By (order, relative degree), for relative degrees up to the order.
+        For relative degrees up to the order; those that may be chosen are at their minima.
     """
     ladder = _Ladder(data)
-    fits: dict[tuple[int, int], RationalFit] = {}
+    fits: dict[Structure, Candidate] = {}
     for n in orders if orders is not None else DEFAULT_ORDERS:
         for r in degrees if degrees is not None else range(1, n + 1):
             if r <= n:
-                fits[n, r] = _fit_one(data, ladder, fits, n, r)
-    if orders is not None:
-        return fits
+                fits[Structure(n, r)] = _fit_one(data, ladder, fits, Structure(n, r))
+    if orders is None:
+        _with_larger_orders(data, ladder, fits, degrees)
+    criteria = information_criteria(data, fits)
+    least = min(criteria.values())
+    for structure, value in criteria.items():
+        if value < least + _SETTLED:
+            fits[structure] = settled(data.problem, fits[structure], data.scales)
+    return fits
+
+
+def _with_larger_orders(
+    data: FRFData,
+    ladder: _Ladder,
+    fits: dict[Structure, Candidate],
+    degrees: Sequence[int] | None,
+) -> None:
+    """Add larger orders while the largest is the best, or dynamics are missing."""
     # An order is accepted if a larger one was tried and is no better. Where the response is not
     # explained, a single pole may be no better because a resonance is missing.
     points = data.s.size
     while fits:
         criteria = information_criteria(data, fits)
-        n, r = min(criteria, key=lambda key: criteria[key])
-        largest = max(key[0] for key in fits)
+        best = min(criteria, key=lambda key: criteria[key])
+        n, r = best.order, best.relative_degree
+        largest = max(key.order for key in fits)
         closest = min(fits.values(), key=lambda fit: fit.cost)
         missing = unexplained(data, closest) > MISSING and correlation_cost(data, closest) > 1.0
         if (n < largest and not missing) or largest >= _LARGEST_ORDER or 4 * largest > points:
             break
         for near in range(max(r - 1, 0), min(r + 1, largest + 1) + 1):
             if near in (degrees if degrees is not None else range(1, largest + 2)):
-                fits[largest + 1, near] = _fit_one(data, ladder, fits, largest + 1, near)
-    return fits
+                larger = Structure(largest + 1, near)
+                fits[larger] = _fit_one(data, ladder, fits, larger)
 
 
-def information_criteria(
-    data: FRFData, fits: dict[tuple[int, int], RationalFit]
-) -> dict[tuple[int, int], float]:
+def information_criteria(data: FRFData, fits: dict[Structure, Candidate]) -> dict[Structure, float]:
     """Return the Bayesian information criterion of each structure, for unknown noise variance.
 
     The residuals of the best fit may be correlated along frequency, for instance for a slightly
@@ -118,38 +138,39 @@ def information_criteria(
     count = 2 * data.s.size / correlation_cost(data, best)
     # Schwarz (1978), noise variance eliminated: N log(cost) + parameters log N.
     return {
-        (n, r): float(count * np.log(smallest_cost(data, fit)) + (2 * n + 2 - r) * np.log(count))
-        for (n, r), fit in fits.items()
+        key: float(count * np.log(smallest_cost(data, fit)) + parameters(fit) * np.log(count))
+        for key, fit in fits.items()
     }
 
 
-def unexplained(data: FRFData, fit: RationalFit) -> float:
+def parameters(fit: Candidate) -> int:
+    """Return the number of parameters: dead time, poles, numerator."""
+    return fit.structure.order + fit.structure.zeros + 2
+
+
+def unexplained(data: FRFData, fit: Candidate) -> float:
     """Return the rms residual over the rms response, both weighted."""
     power = float(np.sum(np.abs(data.weight * data.response) ** 2))
     return float(np.sqrt(fit.cost / power))
 
 
-def smallest_cost(data: FRFData, fit: RationalFit) -> float:
+def smallest_cost(data: FRFData, fit: Candidate) -> float:
     """Return the misfit, or the rounding error for exact data."""
     largest = float(np.max(np.abs(data.response) * data.weight))
     return max(fit.cost, 2 * data.s.size * (1e-13 * largest) ** 2)
 
 
 def _fit_one(
-    data: FRFData,
-    ladder: _Ladder,
-    fits: dict[tuple[int, int], RationalFit],
-    n: int,
-    r: int,
-) -> RationalFit:
-    tried = list(ladder.starts(n))
-    if (n, r - 1) in fits:
-        tried.append(fits[n, r - 1].theta)
-    if (n - 1, r - 1) in fits:
-        smaller = fits[n - 1, r - 1]
-        poles = np.append(poles_of(smaller.theta, n - 1), -3.0 * np.abs(data.s).max())
-        tried.append(np.append(factor_parameters(poles), smaller.theta[n - 1]))
-    return refine_best(data, n, n + 1 - r, tried, _KEPT)[0]
+    data: FRFData, ladder: _Ladder, fits: dict[Structure, Candidate], structure: Structure
+) -> Candidate:
+    n, r = structure.order, structure.relative_degree
+    tried = list(ladder.starts(structure))
+    if (freer := fits.get(Structure(n, r - 1))) is not None:
+        tried.append(freer.parameters)
+    if (smaller := fits.get(Structure(n - 1, r - 1))) is not None:
+        poles = np.append(smaller.poles, -3.0 * data.omega.max())
+        tried.append(np.append(smaller.dead_time, parameters_from_poles(poles)))
+    return refined(data, structure, tried, _KEPT)[0]
 
 
 class _Ladder:
@@ -157,37 +178,47 @@ class _Ladder:
 
     def __init__(self, data: FRFData) -> None:
         self._data = data
-        self._starts: dict[int, list[FloatArray]] = {}
-        self._fits: dict[int, list[RationalFit]] = {}
+        self._grid: dict[int, list[FloatArray]] = {}
+        self._extended: dict[int, list[FloatArray]] = {}
+        self._fits: dict[int, list[Candidate]] = {}
 
-    def starts(self, order: int) -> list[FloatArray]:
-        """Return the starts for this order, for all relative degrees."""
-        if order not in self._starts:
-            found = []
-            if order <= _LARGEST_FROM_GRID:
-                found = starting_points(self._data, order, delay_grid(self._data, order))
-            else:
-                for below in (order - 1, order - 2):
-                    if order <= _STEPS_OF_ONE or below % 2 == order % 2:
-                        for smaller in self._best(below):
-                            found += grown_starts(self._data, smaller, order)
-            self._starts[order] = found
-        return self._starts[order]
+    def starts(self, structure: Structure) -> list[FloatArray]:
+        """Return the starts for a structure: of low order from a grid of dead times."""
+        n = structure.order
+        if n > _LARGEST_FROM_GRID:
+            return self._from_below(n, max(n - 2, 1))
+        if n not in self._grid:
+            self._grid[n] = starting_points(self._data, n, delay_grid(self._data, n))
+        # Beside a zero that nearly cancels it, one pole more is no other model than one fewer.
+        extended = self._from_below(n, n - 1) if structure.zeros and n > 1 else []
+        return self._grid[n] + extended
 
-    def _best(self, order: int) -> list[RationalFit]:
+    def _from_below(self, order: int, lowest: int) -> list[FloatArray]:
+        if order not in self._extended:
+            self._extended[order] = [
+                start
+                for below in range(lowest, order)
+                if order <= _STEPS_OF_ONE or below % 2 == order % 2
+                for smaller in self._best(below)
+                for start in grown_starts(self._data, smaller, order)
+            ]
+        return self._extended[order]
+
+    def _best(self, order: int) -> list[Candidate]:
         """Fit with a free numerator, the best first, of different dead times."""
         if order not in self._fits:
-            fits = refine_best(self._data, order, order, self.starts(order), 2 * _KEPT)
-            apart = np.pi / (4 * np.abs(self._data.s).max())
-            kept: list[RationalFit] = []
+            free = Structure(order, 1)
+            fits = refined(self._data, free, self.starts(free), 2 * _KEPT)
+            apart = np.pi / (4 * self._data.omega.max())
+            kept: list[Candidate] = []
             for fit in fits:
-                if all(abs(fit.theta[order] - other.theta[order]) > apart for other in kept):
+                if all(abs(fit.dead_time - other.dead_time) > apart for other in kept):
                     kept.append(fit)
             self._fits[order] = kept[:_KEPT]
         return self._fits[order]
 
 
-def residual_variance(data: FRFData, fit: RationalFit, freedom: int, noise_known: bool) -> float:
+def residual_variance(data: FRFData, fit: Candidate, freedom: int, noise_known: bool) -> float:
     """Return the variance of the weighted residual, with the effect of its correlation.
 
     Correlated residuals count for fewer points. Known noise is never scaled down: a lucky fit is
@@ -199,13 +230,9 @@ def residual_variance(data: FRFData, fit: RationalFit, freedom: int, noise_known
     return scale * correlation_cost(data, fit)
 
 
-def correlation_cost(data: FRFData, fit: RationalFit) -> float:
+def correlation_cost(data: FRFData, fit: Candidate) -> float:
     """Return how many neighbouring points count as one, by the correlation of the residuals."""
-    stacked = project(
-        data.s, data.response, data.weight, fit.theta, fit.order, fit.numerator.size
-    ).residual
-    points = data.s.size
-    return points_as_one(stacked[:points] + 1j * stacked[points:])
+    return points_as_one(data.misfit(fit))
 
 
 def points_as_one(residual: ComplexArray) -> float:

@@ -22,8 +22,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import ComplexArray, FloatArray
-from .fit import FRFData, RationalFit, inside_limits
-from .model import factor_parameters, poles_of, project, projected_cost, stacked_parts
+from ..separable.compressed import eliminate
+from ..separable.poles import parameters_from_poles
+from ..separable.structures import Candidate, parameter_bounds
+from ..separable.varpro import Structure
+from ..signals.sines import stacked_parts
+from .frf_data import FRFData
 from .phase import phase_roughness
 
 
@@ -166,72 +170,66 @@ def starting_points(data: FRFData, order: int, delays: FloatArray) -> list[Float
     initial guess. The minima of the misfit over the grid of dead times come first, so the
     maximum-likelihood fit needs no initial guess either.
     """
-    omega = np.abs(data.s)
-    low, high = omega.min(), omega.max()
-    costs, found = [], []
+    low, high = data.omega.min(), data.omega.max()
+    found: list[FloatArray] = []
     for delay in delays:
         turned = data.response * np.exp(data.s * delay)
-        best_cost, best = np.inf, np.zeros(0)
-        for resonant in (False, True):
+        for resonant in (False, True)[:order]:
             poles = trial_poles(low, high, order, resonant=resonant)
             for _ in range(_RELOCATIONS):
                 before, poles = poles, relocate_poles(data.s, turned, data.weight, poles)
                 moved = np.sort_complex(poles) - np.sort_complex(before)
                 if np.max(np.abs(moved) / np.abs(poles)) < 1e-3:
                     break
-            theta = inside_limits(np.append(factor_parameters(poles), delay), data, order)
-            cost = projected_cost(data.s, data.response, data.weight, theta, order, order)
-            if cost < best_cost:
-                best_cost, best = cost, theta
-            if order == 1:
-                break
-        costs.append(best_cost)
-        found.append(best)
-    curve = np.array(costs)
+            found.append(np.append(delay, parameters_from_poles(poles)))
+    starts, cost = _costs(data, order, found)
+    # Two for each dead time, from lags and from resonances; one for a single pole.
+    both = cost.reshape(delays.size, -1)
+    curve = both.min(axis=1)
+    chosen = starts.reshape(*both.shape, -1)[np.arange(delays.size), both.argmin(axis=1)]
     padded = np.concatenate([[np.inf], curve, [np.inf]])
     minima = np.flatnonzero((padded[1:-1] <= padded[:-2]) & (padded[1:-1] <= padded[2:]))
-    ranked = minima[np.argsort(curve[minima])][:_MAX_STARTS]
-    return [found[k] for k in ranked]
+    return [*chosen[minima[np.argsort(curve[minima])][:_MAX_STARTS]]]
 
 
-def grown_starts(data: FRFData, smaller: RationalFit, order: int) -> list[FloatArray]:
+def grown_starts(data: FRFData, smaller: Candidate, order: int) -> list[FloatArray]:
     """Add one or two poles to a fit where they remove most of its misfit.
 
     Parameters
     ----------
     data : FRFData
-    smaller : RationalFit
+    smaller : Candidate
         With one or two poles fewer than `order`.
     order : int
     """
-    omega = np.abs(data.s)
-    left = project(
-        data.s, data.response, data.weight, smaller.theta, smaller.order, smaller.numerator.size
-    ).residual
-    places = np.concatenate([np.geomspace(omega.min(), omega.max(), _GRID), _peaks(omega, left)])
+    omega = data.omega
+    places = np.geomspace(omega.min(), omega.max(), _GRID)
+    places = np.concatenate([places, _peaks(omega, data.misfit(smaller))])
     added: list[list[complex]]
-    if order - smaller.order == 1:
+    if order - smaller.structure.order == 1:
         added = [[-w] for w in places]
     else:
         turned = [w * complex(-z, np.sqrt(1 - z * z)) for w in places for z in _DAMPINGS]
         added = [[p, p.conjugate()] for p in turned]
-    poles = poles_of(smaller.theta, smaller.order)
-    trials = []
-    for more in added:
-        theta = np.append(
-            factor_parameters(np.concatenate([poles, np.array(more, dtype=np.complex128)])),
-            smaller.theta[smaller.order],
-        )
-        trials.append(inside_limits(theta, data, order))
-    costs = [
-        projected_cost(data.s, data.response, data.weight, theta, order, order) for theta in trials
+    trials = [
+        np.append(smaller.dead_time, parameters_from_poles(np.append(smaller.poles, more)))
+        for more in added
     ]
-    return [trials[k] for k in np.argsort(costs, kind="stable")[:_KEPT]]
+    starts, cost = _costs(data, order, trials)
+    return [*starts[np.argsort(cost, kind="stable")[:_KEPT]]]
 
 
-def _peaks(omega: FloatArray, residual: FloatArray) -> FloatArray:
+def _costs(data: FRFData, order: int, starts: list[FloatArray]) -> tuple[FloatArray, FloatArray]:
+    """Starts (B, 1 + n) within bounds, and their misfit with a free numerator (B,)."""
+    free = Structure(order, 1)
+    bounds = parameter_bounds(free, data.scales)
+    inside = np.clip(starts, bounds.low, bounds.high)
+    return inside, eliminate(data.problem, free, inside).cost
+
+
+def _peaks(omega: FloatArray, misfit: ComplexArray) -> FloatArray:
     """Return the frequencies around which most of the misfit remains."""
-    power = residual[: omega.size] ** 2 + residual[omega.size :] ** 2
+    power = np.abs(misfit) ** 2
     width = min(5, omega.size)
     smooth = np.convolve(power, np.ones(width), mode="same")
     rising = np.concatenate([[True], smooth[1:] >= smooth[:-1]])

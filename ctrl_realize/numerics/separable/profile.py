@@ -172,7 +172,7 @@ def within_a_sample(candidate: Candidate, scales: Scales) -> FloatArray:
 
 
 def _jumps(candidate: Candidate, scales: Scales) -> bool:
-    return float(np.abs(candidate.poles).max()) * scales.dt > JUMP
+    return scales.bounds is None and float(np.abs(candidate.poles).max()) * scales.dt > JUMP
 
 
 def _jump_sample(candidate: Candidate, scales: Scales) -> float:

@@ -20,6 +20,9 @@ def cell(
 ) -> tuple[FloatArray, FloatArray]:
     """Bounds of every row; those of its dead time are `beyond` samples from the neighbouring."""
     low, high = (np.tile(bound, (len(at), 1)) for bound in (bounds.low, bounds.high))
+    if bounds.smooth:
+        low[pinned, 0] = high[pinned, 0] = at[pinned, 0]
+        return low, high
     sample = np.ceil(at[:, 0] / dt)
     low[:, 0] = np.maximum(low[:, 0], (sample - 1 - beyond + BESIDE) * dt)
     high[:, 0] = np.minimum(high[:, 0], (sample + beyond - BESIDE) * dt)
@@ -30,6 +33,8 @@ def cell(
 
 def beside_a_sample(dead_time: FloatArray, bounds: Bounds, dt: float) -> FloatArray:
     """Dead times (B,) within their bounds that do not coincide with a sample."""
+    if bounds.smooth:
+        return dead_time
     sample = np.round(dead_time / dt)
     at_one = np.abs(dead_time / dt - sample) < BESIDE
     earlier, later = (sample - BESIDE) * dt, (sample + BESIDE) * dt

@@ -16,7 +16,7 @@ References
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -69,7 +69,8 @@ class Scales:
     `length` the duration of the record after the change of the input, `dt` the sample time.
     `latest` and `earliest` bound the dead time; `ringing` is an angular frequency that stands out
     of the residual of a first-order fit, or 0; `integrating`: the pole of that fit is far slower
-    than the record.
+    than the record. `bounds` are those of the parameters of an order where there are no
+    samples, as for points of a frequency response.
     """
 
     onset: float
@@ -80,6 +81,7 @@ class Scales:
     earliest: float = 0.0
     ringing: float = 0.0
     integrating: bool = False
+    bounds: Callable[[int], Bounds] | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -175,6 +177,8 @@ def parameter_bounds(structure: Structure, scales: Scales) -> Bounds:
     oscillation that was sampled too coarsely.
     """
     order = structure.order
+    if scales.bounds is not None:
+        return scales.bounds(order)
     fast = np.log((SLOWER_WITH_ZEROS if structure.zeros else FASTEST) / scales.dt)
     slow = np.log(SLOWEST / scales.length)
     low, high = [scales.earliest], [scales.latest]

@@ -29,6 +29,7 @@ from typing import Any
 import numpy as np
 
 from ..arrays import ComplexArray, FloatArray
+from ..signals.sines import Sines
 from .local_terms import FixedTerms, LocalTerms, Segments, solve_upper
 from .poles import poles_from_parameters
 from .responses import HeldInput
@@ -114,6 +115,8 @@ class Bounds:
 
     low: FloatArray
     high: FloatArray
+    smooth: bool = False
+    """Without samples there are no kinks of the dead time."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -184,6 +187,8 @@ def evaluate(problem: Problem, structure: Structure, parameters: FloatArray) -> 
     level *= (gain * numerator[:, 0])[:, None]
     derivative[:, :, 1:] += _real_product(slope, stretch)
     derivative[:, :, 1:] += static[:, :, None] * level[:, None]
+    if structure.relative_degree == 0 and isinstance(problem.drive, Sines):
+        derivative[:, :, 0] += problem.drive.direct_slope(parameters[:, 0]) * numerator[:, -1:]
     derivative = problem.weighted(derivative)
     if own is not None:
         rest = whole - np.einsum("bmk,bk->bm", forced, linear)

@@ -5,14 +5,18 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy import signal
 
-from ctrl_realize.numerics.rational.model import (
+from ctrl_realize.numerics.rational.frf_data import FRFData, modal_state_space
+from ctrl_realize.numerics.rational.sines import fit_sines
+from ctrl_realize.numerics.rational.spectra import independent_segments
+from ctrl_realize.numerics.separable.poles import parameters_from_poles
+from ctrl_realize.numerics.separable.structures import Candidate
+from ctrl_realize.numerics.separable.varpro import Structure
+from tests.oracles.partial_products import (
     basis_functions,
     factor_parameters,
     full_jacobian,
     project,
 )
-from ctrl_realize.numerics.rational.sines import fit_sines
-from ctrl_realize.numerics.rational.spectra import independent_segments
 
 S = 1j * np.geomspace(0.05, 20, 60)
 POLES = {
@@ -68,6 +72,30 @@ def test_full_jacobian_is_that_of_the_weighted_model(order, count):
         slope = (model(values + step) - model(values - step)) / 2e-5
         # Central differences: error 1e-10, rounding 1e-11.
         assert_allclose(J[:, i], slope, atol=1e-8 * np.abs(J).max())
+
+
+@structures
+def test_the_engine_eliminates_the_numerator_as_partial_products_do(order, count):
+    rng = np.random.default_rng(order)
+    response = rng.standard_normal(S.size) + 1j * rng.standard_normal(S.size)
+    weight = rng.uniform(0.5, 2, S.size)
+    oracle = project(S, response, weight, np.append(theta_of(order), 0.3), order, count)
+    poles = np.array(POLES[order], dtype=complex)
+    # relative degree 0, with a direct term, is the largest count
+    structure = Structure(order, order + 1 - count)
+    fit = Candidate(structure, np.append(0.3, parameters_from_poles(poles)), 0.0)
+    data = FRFData(S, response, weight, 1.0)
+    state = data.at(fit)
+    assert_allclose(state.residual[0], oracle.residual, atol=1e-11)
+    slope = -state.jacobian[0, :, 0] @ state.residual[0]
+    # the gradient is exact in both, though what they leave out of the Jacobian is not the same
+    expected = oracle.jacobian[:, -1] @ oracle.residual
+    assert slope == pytest.approx(expected, rel=1e-9, abs=1e-9)
+    A, B, C, D = modal_state_space(data, fit)
+    inverse = np.linalg.inv(S[:, None, None] * np.eye(order) - A)
+    model = (C @ inverse @ B)[:, 0, 0] + D[0, 0]
+    left = weight * (response - np.exp(-0.3 * S) * model)
+    assert_allclose(left, data.misfit(fit), atol=1e-11)
 
 
 N, DT = 300, 0.01

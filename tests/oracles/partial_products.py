@@ -30,7 +30,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import ComplexArray, FloatArray
+from ctrl_realize.numerics.arrays import ComplexArray, FloatArray
 
 
 @dataclass(frozen=True, eq=False)

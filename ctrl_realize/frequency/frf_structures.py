@@ -1,0 +1,118 @@
+"""Structures that were fitted to a frequency response, compared, with profiles of the nearest.
+
+Profile likelihoods as in [1]_, structures by their criteria as in [2]_.
+
+References
+----------
+.. [1] D. J. Venzon and S. H. Moolgavkar, A method for computing profile-likelihood-based confidence
+   intervals, Appl. Statist. 37 (1988) 87-94, doi:10.2307/2347496.
+.. [2] K. P. Burnham and D. R. Anderson, Model Selection and Multimodel Inference, 2nd ed., Springer
+   2002, chapter 4, doi:10.1007/b97636.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..numerics.rational.frf_data import FRFData, dead_time_interval
+from ..numerics.rational.search import (
+    information_criteria,
+    parameters,
+    residual_variance,
+    smallest_cost,
+)
+from ..numerics.separable.compared_fits import settled
+from ..numerics.separable.profile import Points, dead_time_error, profile_points
+from ..numerics.separable.structures import Candidate
+from ..numerics.separable.varpro import Structure
+from .frf_fit import FRFStructure
+
+_NEAR_BIC = 8.0
+"""Difference to the best BIC below which a structure widens the interval; beyond, its weight is
+below 2 %."""
+_LOWER, _MOST_ROUNDS = 0.01, 6
+"""Variances by which a profile must lead below a minimum to be followed, and how often; as in
+`output_error.profiles`."""
+
+
+@dataclass(frozen=True, eq=False)
+class ComparedFits:
+    """Fits with rows, best first, residual variances of points, and profiles of the nearest."""
+
+    fits: dict[Structure, Candidate]
+    rows: list[FRFStructure]
+    scales: dict[Structure, float]
+    points: dict[Structure, Points]
+
+    @property
+    def near(self) -> list[FRFStructure]:
+        """Rows that come close to the best, the best first."""
+        return [row for row in self.rows if row.bic - self.rows[0].bic < _NEAR_BIC]
+
+    def interval(self, data: FRFData, key: Structure, *, solved: bool) -> tuple[float, float]:
+        """95 % interval of one structure, in units of the data."""
+        fit, variance = self.fits[key], _row_variance(data, self.fits[key], self.scales[key])
+        points = self.points.get(key) or profile_points(data.problem, fit, variance, data.scales)
+        return dead_time_interval(data, fit, points, variance, solved=solved)
+
+
+def compared_fits(
+    data: FRFData, fits: dict[Structure, Candidate], unit: float, noise_known: bool
+) -> ComparedFits:
+    """Compare structures, and again where the profile of one leads below its minimum."""
+    points: dict[Structure, Points] = {}
+    for _ in range(_MOST_ROUNDS):
+        rows, scales = _structures(data, fits, unit, noise_known)
+        near = [key_of(row) for row in rows if row.bic - rows[0].bic < _NEAR_BIC]
+        lower = {}
+        for key in near:
+            variance = _row_variance(data, fits[key], scales[key])
+            if key not in points:
+                points[key] = profile_points(data.problem, fits[key], variance, data.scales)
+            best = min(points[key].values(), key=lambda point: point.cost)
+            if fits[key].cost - best.cost > _LOWER * variance:
+                lower[key] = settled(data.problem, best, data.scales)
+        if not lower:
+            break
+        fits = fits | lower
+        points = {key: found for key, found in points.items() if key not in lower}
+    return ComparedFits(fits, rows, scales, points)
+
+
+def _row_variance(data: FRFData, fit: Candidate, scale: float) -> float:
+    # Exact data have no noise; a level that rounding can reach is needed all the same.
+    return max(0.5 * scale, smallest_cost(data, fit) / data.problem.data.size)
+
+
+def _structures(
+    data: FRFData, fits: dict[Structure, Candidate], unit: float, noise_known: bool
+) -> tuple[list[FRFStructure], dict[Structure, float]]:
+    """List what was tried, best first, and the residual variance of each."""
+    rows, scales = [], {}
+    criteria = information_criteria(data, fits)
+    for key, fit in fits.items():
+        freedom = 2 * data.s.size - parameters(fit)
+        scales[key] = residual_variance(data, fit, freedom, noise_known)
+        rows.append(
+            FRFStructure(
+                order=key.order,
+                relative_degree=key.relative_degree,
+                dead_time=fit.dead_time / unit,
+                std=dead_time_error(data.problem, fit, 0.5 * scales[key]) / unit,
+                cost=smallest_cost(data, fit),
+                bic=criteria[key],
+            )
+        )
+    return sorted(rows, key=lambda row: row.bic), scales
+
+
+def residual_ratio(data: FRFData, fit: Candidate) -> float:
+    """Weighted rms residual, over the degrees of freedom."""
+    return float(np.sqrt(fit.cost / (data.s.size - 0.5 * parameters(fit))))
+
+
+def key_of(row: FRFStructure) -> Structure:
+    """Order and relative degree of a row."""
+    return Structure(row.order, row.relative_degree)
