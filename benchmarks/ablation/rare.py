@@ -252,6 +252,7 @@ MADE_FOR = {
     "exponential before the step": settling_in_a_long_rest,
     "bend before the step": pulse_before,
     "hum": humming,
+    "load during the test": steps.load_moves,
     "coarse converter": steps_of_a_converter,
     "coloured noise of any input": slow_disturbance,
     "integrator beside a lag of any ratio": long_ramp,

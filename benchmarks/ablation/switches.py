@@ -327,6 +327,7 @@ SWITCHES = (
         {f"{FITS}.step_data:rest_noise": _constant_rest},
     ),
     Switch("drift", {f"{PUBLIC}.fit:step_data": _without_drift}),
+    Switch("load during the test", {f"{STEP}:load_of": giving(None)}),
     Switch("hum", {f"{FITS}.step_data:hum_frequencies": giving([])}),
     Switch("colour of the noise at rest", {f"{FITS}.step_data:colouring": giving(1.0)}),
     Switch(

@@ -120,6 +120,15 @@ def humming(seed: int) -> Codes:
     return fit(changed(record, np.ravel(record.output) + line))
 
 
+def loaded(seed: int) -> Codes:
+    """A load of 30 % of the step moves long after it, through a lag of 0.1 s."""
+    record = plain(seed)
+    time = np.asarray(record.time)
+    since = np.maximum(time - time[0] - 0.75 * np.ptp(time), 0.0)
+    other = -0.3 * _span(record) * np.expm1(-since / 0.1)
+    return fit(changed(record, np.ravel(record.output) + other))
+
+
 def coarse(seed: int) -> Codes:
     """Rounded to steps of five standard deviations of the noise."""
     record = plain(seed)
@@ -381,6 +390,9 @@ CASES: list[FlagCase] = [
     _fit("hum", "50 Hz, three noise std high", humming,
          not_due="R1 to R4, coloured noise 0.1 to 2 %",
          quiet=coloured),
+    _fit("load_disturbance", "a load of 30 % long after the step", loaded),
+    _fit("load_disturbance", "a load of 30 % long after the step", loaded,
+         not_due="R1 to R4, coloured noise 0.1 to 2 %", quiet=coloured),
     _fit("coarse_quantisation", "rounded to five noise std", coarse,
          not_due="rounded to half a noise std", quiet=fine),
     _fit("outliers", "2 % of the samples off by ten noise std", spiked),

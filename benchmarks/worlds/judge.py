@@ -44,7 +44,7 @@ DELAY = MODEL | {
     "held_output",
 }
 """Flags that doubt the dead time."""
-GAIN = MODEL | {"not_settled", "integrating", "gain_not_resolved"}
+GAIN = MODEL | {"not_settled", "integrating", "gain_not_resolved", "load_disturbance"}
 """Flags that doubt gain and total delay."""
 
 

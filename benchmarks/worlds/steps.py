@@ -239,6 +239,15 @@ def split_range(rng: Rng) -> Case:
     return Case(record(u, noisy(rng, y)), plant.dead_time + opens, plant.gain * (1 - zone))
 
 
+def load_moves(rng: Rng) -> Case:
+    """A load of 10 to 80 % of the response moves during the test, through a lag of its own."""
+    plant, u = drawn(rng), step()
+    load = float(rng.choice([-1, 1]) * rng.choice([0.1, 0.3, 0.8])) * plant.gain
+    moved = np.where(np.arange(u.size) < rng.integers(200, 500), 0.0, load)
+    other = sampled(through(held(moved), float(rng.uniform(0.1, 0.6))))
+    return plant.case(record(u, noisy(rng, stepped(rng, plant, u)) + other))
+
+
 WORLDS = (
     ends_while_rising,
     slow_tail,
@@ -258,4 +267,5 @@ WORLDS = (
     fouling,
     ringing,
     split_range,
+    load_moves,
 )

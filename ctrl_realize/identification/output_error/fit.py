@@ -149,6 +149,11 @@ def fit_output_error(
     with or without a lag in series) is fitted as well: it widens the interval if it is not ruled
     out, and if it is clearly better than all lags, its dead time is used.
 
+    One step of a load that moves the output during the test is looked for. Where the evidence for
+    it is very strong, its response, through a lag of its own or through the plant, is part of the
+    model, and a flag tells its time and size. Before 2.5 times the time to 63 % of the response
+    it cannot be told from the response, and is not found.
+
     A slope before the step is modelled as a drift, the free response of the plant, or not at all,
     as chosen by the information criterion.
 
@@ -305,7 +310,7 @@ def _fit_one(
         return any_input((record,), limit, settings)
     latest = None if limit is None else limit * record.dt
     data, fit = fit_step_record(data, latest=latest, **settings)
-    flags = fit_flags(data, fit, limit)
+    flags = fit_flags(data, fit, limit, float(record.time[0]))
     return summarise(fit, data, record.time[data.rows], (record,), flags), fit
 
 
@@ -339,6 +344,7 @@ def _fit_mean(
             break
         skip = apart
     fit = widened(fit, repeats, mean.used)
-    flags = fit_flags(data, fit, limit) + repeat_flags(repeats, fit.dead_time, mean.dt)
     time = mean.dt * np.arange(-mean.edge, mean.output.size - mean.edge, dtype=np.float64)
+    flags = fit_flags(data, fit, limit, float(time[0]))
+    flags += repeat_flags(repeats, fit.dead_time, mean.dt)
     return summarise(fit, data, time, records, flags, repeatability=repeats), fit

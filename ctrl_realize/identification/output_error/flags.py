@@ -21,12 +21,13 @@ _FAR_APART = 0.5  # width of an interval, in dead times, from which structures d
 
 
 def fit_flags(
-    data: StepData, fit: OutputErrorEstimate, max_delay: float | None
+    data: StepData, fit: OutputErrorEstimate, max_delay: float | None, start: float
 ) -> tuple[Flag, ...]:
-    """List the flags of a fit of one (mean) step record."""
+    """List the flags of a fit of one (mean) step record whose first sample is at `start` s."""
     found = [
         *model_flags(fit, data.dt, data.length, max_delay),
         _misfit(fit),
+        _load(fit, start),
         *_disturbances(data, fit),
     ]
     return tuple(flag for flag in found if flag is not None)
@@ -172,6 +173,19 @@ def _misfit(fit: OutputErrorEstimate) -> Flag | None:
             else "the interval is valid only if a given structure is that of the plant"
         )
         + "; actuator='auto' also fits what a valve or drive does before or behind the lags",
+    )
+
+
+def _load(fit: OutputErrorEstimate, start: float) -> Flag | None:
+    """Report that something else moved the output, and what to do."""
+    if fit.load is None:
+        return None
+    when = in_time(start + fit.load.time, 4)
+    return Flag(
+        "load_disturbance",
+        f"a load moved the output by {fit.load.size:.3g} from {when} on: its response was "
+        f"estimated together with the model; cut the record before {when} for a model without it. "
+        "If another signal of the record moves then, name it as a second input",
     )
 
 

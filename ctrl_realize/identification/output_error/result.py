@@ -289,7 +289,7 @@ class OutputErrorFit(FractionalDelayFit):
     def fit_percent(self) -> float:
         """``100 (1 - |y - fitted| / |y - mean y|)``: 100 is perfect, 0 a mean.
 
-        A drift, hum or free response that was estimated together with the model is included.
+        A drift, hum, load or free response that was estimated together with the model is included.
         """
         return float(fit_percent(self.measured[None], self.fitted[None])[0])
 
@@ -366,6 +366,7 @@ class OutputErrorFit(FractionalDelayFit):
         if not np.isfinite(self.onset):
             return "the level, drift and initial state of the record"
         parts = ["the free response to an earlier input"] * self.data.relaxing
+        parts += ["the load"] * (self.data.load is not None)
         parts += ["the drift"] * bool(self.data.drift) + ["the hum"] * bool(self.data.hum)
         return " and ".join(parts) or "its level"
 

@@ -107,6 +107,8 @@ def _choices(fit: OutputErrorEstimate) -> tuple[str, ...]:
         reasons.append(f"dead time: median of five delay estimates, since {why}")
     if not fit.robust:
         reasons.append(_interval_of(fit))
+    if fit.load is not None:
+        reasons.append("a step of a load is part of the model: the output tells it beyond doubt")
     if fit.open_start:
         reasons.append(
             "interval widened towards the visible onset: with a zero in the model, the onset "

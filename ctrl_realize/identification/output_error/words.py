@@ -37,6 +37,7 @@ _TOTAL_IN_DOUBT = frozenset(
         "time_varying",
         "output_at_limit",
         "earlier_input",
+        "load_disturbance",
         "noncausal",
     }
 )

@@ -27,6 +27,7 @@ from ..separable.structures import Candidate, Scales, needless_parameters
 from ..separable.varpro import Structure, evaluate, respond
 from ..separable.window import WindowFit
 from ..signals.correlation import fit_percent
+from ..signals.load_step import LoadStep
 from .margins import CloseDecision
 from .profiles import Profile
 
@@ -203,7 +204,8 @@ class OutputErrorEstimate:
     gain of the model, `alike` those of the other structures that are not ruled out and resolve one,
     each with its evidence over the model's. `others` is None if no structures were requested;
     `close` are decisions that rounding errors may reverse. `unweighted` is the model of
-    plain least squares, if the residual was whitened.
+    plain least squares, if the residual was whitened. `load` is a step of a load that is part of
+    the model.
     """
 
     dead_time: float
@@ -229,6 +231,7 @@ class OutputErrorEstimate:
     others: OtherStructures | None = None
     close: tuple[CloseDecision, ...] = ()
     unweighted: UnweightedModel | None = None
+    load: LoadStep | None = None
 
     @property
     def robust(self) -> bool:

@@ -23,6 +23,7 @@ from ..separable.window import Window
 from ..signals.baseline import noise_about_a_motion, relaxation
 from ..signals.bins import Bins, response_bins
 from ..signals.filters import moving_mean
+from ..signals.load_step import LoadStep
 from ..signals.noise import (
     colouring,
     hum_frequencies,
@@ -74,6 +75,8 @@ class StepData:
         Noise about a baseline that bends or swings; 0 if it does neither.
     every : int
         Samples of a record for each output of a record without a step.
+    load : LoadStep or None
+        Step of a load that moved the output as well.
     """
 
     output: FloatArray
@@ -92,6 +95,12 @@ class StepData:
     span: float | None = None
     bend: float = 0.0
     every: int = 1
+    load: LoadStep | None = None
+
+    @property
+    def clock(self) -> FloatArray:
+        """Times (N,) of the outputs since the first sample, in s."""
+        return _at(self.rows, self.dt)
 
     @property
     def edge(self) -> int:
@@ -121,6 +130,13 @@ class StepData:
         # dither, which needs more levels (95 % of its samples are within two, half a step high).
         two_levels = rest.size >= _MANY and np.ptp(rest) < 1.5 * self.quantum
         return bool(is_coarse(self.sigma, self.quantum) or two_levels)
+
+    def with_load(self, load: LoadStep, response: FloatArray) -> StepData:
+        """Add a load, with its part (N,) of the output, without which the response is seen."""
+        quiet = self.quiet - response
+        gaps = None if self.rows.size == self.input.size else self.since
+        motion = first_motion(quiet, self.edge, self.sigma, self.quantum, self.drift, gaps)
+        return replace(self, load=load, quiet=quiet, motion=motion)
 
     def explanations(self) -> list[StepData]:
         """Models of a motion before the step: drift, hum, free response of the plant, or none.
@@ -287,13 +303,15 @@ def step_scales(data: StepData, stop: int, latest: float | None) -> Scales:
 def fixed_regressors(data: StepData) -> FloatArray:
     """Offset, drift if there is one, and hum, shape (N, q)."""
     n = data.output.size
-    if not data.drift and not data.hum:
+    if not data.drift and not data.hum and data.load is None:
         return np.broadcast_to(1.0, (n, 1))  # no memory for ones
     columns = [np.ones((n, 1))]
     if data.drift:
         columns.append((data.since / data.input.size)[:, None])
     if data.hum:
         columns.append(_hum_columns(data.rows, data.hum))
+    if data.load is not None:
+        columns.append(data.load.columns(data.clock))
     return np.concatenate(columns, axis=1)
 
 

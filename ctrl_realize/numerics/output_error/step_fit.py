@@ -81,6 +81,7 @@ from .coloured import in_coloured_noise
 from .extrapolation import least_extrapolating
 from .flat_likelihood import closer, later, moved, pinned, with_close_decision
 from .interval import likelihood_fit
+from .load import load_of
 from .margins import CloseDecision, close_to
 from .other_structures import other_structures
 from .process_models import process_fit
@@ -143,9 +144,22 @@ def fit_step_record(
         Prewhiten the data if the baseline noise is coloured.
     """
     fit = partial(_fit_until, latest=latest, known=known or KnownFactor(), huber=huber)
+    given = data
     data, fits = fitted_from_rest(
         data, fit, ALL_STRUCTURES if structures is None else tuple(structures)
     )
+    loaded = None if data.load is not None else load_of(data, fits, fit, _is_noise)
+    if loaded is not None:
+        data, found = fit_step_record(
+            given.with_load(*loaded),
+            structures=structures,
+            forms=forms,
+            latest=latest,
+            known=known,
+            huber=huber,
+            whiten=whiten,
+        )
+        return data, replace(found, load=loaded[0])
     if structures is None:
         return data, _free_choice(data, fits, fit, whiten)
     return data, _given_structures(data, fits, fit, forms, whiten)

@@ -15,6 +15,7 @@ _OF_THE_RECORD = frozenset(
     {
         "hum",
         "drift",
+        "load_disturbance",
         "no_rest",
         "not_at_rest",
         "coarse_quantisation",

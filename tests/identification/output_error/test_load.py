@@ -1,0 +1,92 @@
+"""A load that moves the output during a step test is told and taken out of the gain (simulated)."""
+
+import numpy as np
+import pytest
+from scipy.signal import lfilter
+
+import ctrl_realize as cr
+from ctrl_realize.numerics.signals.load_step import LoadStep
+
+GAIN, LAGS, DEAD_TIME, DT, SAMPLES, STEP = 1.1, (70.0, 20.0), 24.0, 2.0, 600, 200.0
+TIME = DT * np.arange(SAMPLES)
+RISE = 118.0
+"""Time to 63 % of the response, dead time included."""
+
+
+def lagged(signal, *constants):
+    for constant in constants:
+        pole = np.exp(-DT / constant)
+        signal = np.append(0.0, lfilter([1 - pole], [1, -pole], signal)[:-1])
+    return signal
+
+
+def record(seed, moved=None, size=0.0, lags=(120.0,), pole=0.0):
+    """A step of 6 % at 200 s; a load of `size` times the response at `moved` s, through `lags`."""
+    noise = np.random.default_rng(seed).standard_normal(SAMPLES + 100)
+    noise = lfilter([np.sqrt(1 - pole**2)], [1, -pole], noise)[100:]
+    response = 6 * GAIN * lagged(np.where(TIME - DEAD_TIME < STEP, 0.0, 1.0), *LAGS)
+    load = 0.0
+    if moved is not None:
+        load = 6 * GAIN * size * lagged(np.where(moved > TIME, 0.0, 1.0), *lags)
+    u = np.where(TIME < STEP, 40.0, 46.0)
+    return cr.Record(TIME, u, 60 + response + load + 0.05 * noise)
+
+
+def told(fit):
+    return [flag for flag in fit.flags if flag.code == "load_disturbance"]
+
+
+@pytest.mark.parametrize(
+    ("size", "lags"), [(0.1, (120.0,)), (-0.3, (40.0,)), (0.8, (120.0,)), (-0.8, LAGS)]
+)
+def test_a_late_load_is_told_and_taken_out_of_the_gain(size, lags):
+    moved = STEP + 3.5 * RISE
+    fit = cr.identify(record(11, moved, size, lags)).fit
+    assert len(told(fit)) == 1
+    load = fit.estimate.load
+    assert abs(load.time - moved) < 0.05 * TIME[-1]
+    # what it has added to the last output
+    added = 6 * GAIN * size * lagged(np.where(moved > TIME, 0.0, 1.0), *lags)[-1]
+    assert load.size == pytest.approx(added, rel=0.05)
+    low, high = fit.gain_interval
+    assert low <= GAIN <= high
+    assert fit.gain == pytest.approx(GAIN, rel=0.01)
+    assert fit.interval[0] <= DEAD_TIME <= fit.interval[1]
+
+
+@pytest.mark.parametrize(("seed", "pole"), [(1, 0.0), (2, 0.0), (3, 0.9), (4, 0.9)])
+def test_noise_alone_is_no_load(seed, pole):
+    assert not told(cr.identify(record(seed, pole=pole)).fit)
+
+
+def test_a_structure_with_too_few_lags_is_no_load():
+    assert not told(cr.fit_output_error(record(1), structures="P1D").fit)
+    fit = cr.fit_output_error(record(1, STEP + 3.5 * RISE, 0.3), structures="P2D").fit
+    assert len(told(fit)) == 1
+    assert fit.gain == pytest.approx(GAIN, rel=0.01)
+
+
+def test_the_flag_names_the_time_on_the_clock_of_the_record():
+    moved = record(5, 600.0, 0.3)
+    later = cr.Record(1000 + TIME, moved.input, moved.output)
+    for one, start in ((moved, 0.0), (later, 1000.0)):
+        fit = cr.identify(one).fit
+        (flag,) = told(fit)
+        assert abs(fit.estimate.load.time - 600.0) < 0.02 * TIME[-1]
+        assert f"cut the record before {start + fit.estimate.load.time:.4g} s" in str(flag)
+
+
+def test_columns_of_a_load_are_the_derivatives_of_its_response():
+    poles = np.array([-1.0 + 2.0j, -1.0 - 2.0j])
+    residues = np.array([0.5 - 0.3j, 0.5 + 0.3j])
+    load, clock, step = LoadStep(3.0, 2.0, poles, residues), np.linspace(0, 20, 400), 1e-6
+    response, slope, stretch = load.columns(clock).T
+
+    def moved(time, lag):
+        return LoadStep(time, lag, poles, residues).columns(clock)[:, 0]
+
+    later = (moved(3.0 + step, 2.0) - moved(3.0 - step, 2.0)) / (2 * step)
+    longer = (moved(3.0, 2.0 + step) - moved(3.0, 2.0 - step)) / (2 * step)
+    np.testing.assert_allclose(-slope / 2.0, later, atol=1e-7)
+    np.testing.assert_allclose(-stretch / 2.0, longer, atol=1e-7)
+    assert not response[clock <= 3.0].any()
