@@ -88,6 +88,8 @@ class FRFFit(FractionalDelayFit):
         Sample time in s of the hold that was divided out of `measured`; None if there was none.
     flags : tuple of Flag
     choices : tuple of str
+    stated : bool
+        Whether order or relative degree were given.
 
     Examples
     --------
@@ -121,12 +123,13 @@ class FRFFit(FractionalDelayFit):
     hold_time: float | None = None
     flags: tuple[Flag, ...] = ()
     choices: tuple[str, ...] = ()
+    stated: bool = False
     records = ()
 
     @property
     def interval_kind(self) -> IntervalKind:
-        """``"confidence"``: a 95 % interval."""
-        return "confidence"
+        """``"confidence"``, or ``"conditional"`` if order or relative degree were given."""
+        return "conditional" if self.stated else "confidence"
 
     @property
     def core(self) -> ct.StateSpace:

@@ -183,7 +183,7 @@ def headline_of(system: DelayedStateSpace) -> str:
     if interval is not None:
         said = time_within(wait, *interval)
         samples = number_within(*(bound / system.dt for bound in (wait, *interval)))
-    apparent = system.fit is not None and system.fit.interval_kind == "conditional"
+    apparent = any(_code(flag) == "apparent_dead_time" for flag in _flags_of(system))
     kind = "Apparent dead time" if apparent else "Dead time"
     sentence = f"{kind} {said} ({samples} samples of {in_time(system.dt, 6)})"
     if interval is not None:

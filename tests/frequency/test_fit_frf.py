@@ -403,3 +403,12 @@ def test_two_repeats_of_an_undulator_have_dead_times_in_common(shared_data):
         assert "systematic_error" in {flag.code for flag in fit.flags}
         ends.append(fit.interval)
     assert max(low for low, _ in ends) < min(high for _, high in ends)
+
+
+def test_an_interval_of_a_stated_order_holds_if_the_order_is_right():
+    f = np.geomspace(0.1, 20, 40)
+    s = 2j * np.pi * f
+    noise = 0.01 * np.random.default_rng(0).standard_normal((40, 2)) @ [1, 1j]
+    frf = cr.MeasuredFRF(2 * np.exp(-0.03 * s) / (0.08 * s + 1) + noise, f)
+    assert cr.fit_frf(frf).fit.interval_kind == "confidence"
+    assert cr.fit_frf(frf, 1).fit.interval_kind == "conditional"

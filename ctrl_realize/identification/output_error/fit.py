@@ -152,7 +152,7 @@ def fit_output_error(
     One step of a load that moves the output during the test is looked for. Where the evidence for
     it is very strong, its response, through a lag of its own or through the plant, is part of the
     model, and a flag tells its time and size. Before 2.5 times the time to 63 % of the response
-    it cannot be told from the response, and is not found.
+    it cannot be told from the response: the model is left as it is, and the gain is open.
 
     A slope before the step is modelled as a drift, the free response of the plant, or not at all,
     as chosen by the information criterion.

@@ -181,11 +181,17 @@ def _load(fit: OutputErrorEstimate, start: float) -> Flag | None:
     if fit.load is None:
         return None
     when = in_time(start + fit.load.time, 4)
+    known = (
+        "so soon after a step of the input that its response cannot be told from that of the "
+        "input: gain and total delay are not determined; repeat the test"
+        if fit.load.early
+        else "its response was estimated together with the model; cut the record before "
+        f"{when} for a model without it"
+    )
     return Flag(
         "load_disturbance",
-        f"a load moved the output by {fit.load.size:.3g} from {when} on: its response was "
-        f"estimated together with the model; cut the record before {when} for a model without it. "
-        "If another signal of the record moves then, name it as a second input",
+        f"a load moved the output by {fit.load.size:.3g} from {when} on: {known}. If another "
+        "signal of the record moves then, name it as a second input",
     )
 
 

@@ -69,7 +69,9 @@ def unresolved_gain(fit: OutputErrorEstimate, length: float) -> Flag | None:
 
 def _no_sign(fit: OutputErrorEstimate, static: StaticGain, length: float) -> str:
     low, high = fit.gain_ends
-    if static.resolved:
+    if fit.load is not None and fit.load.early:
+        why = "a load moved the output soon after the step, and may have any part of the response"
+    elif static.resolved:
         why = f"its 95 % interval is {low:.3g} to {high:.3g}"
     else:
         why = (

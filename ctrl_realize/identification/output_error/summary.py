@@ -107,7 +107,7 @@ def _choices(fit: OutputErrorEstimate) -> tuple[str, ...]:
         reasons.append(f"dead time: median of five delay estimates, since {why}")
     if not fit.robust:
         reasons.append(_interval_of(fit))
-    if fit.load is not None:
+    if fit.load is not None and not fit.load.early:
         reasons.append("a step of a load is part of the model: the output tells it beyond doubt")
     if fit.open_start:
         reasons.append(

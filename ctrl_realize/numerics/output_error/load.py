@@ -59,13 +59,15 @@ _IN_SLOW_NOISE, _MOST_LEFT = 2.5 * PLAUSIBLE, 0.75
 may be left (0.92 beside friction, 0.1 to 0.72 beside a load): AR(1) noise with a pole at 0.9
 reached 20 in 1 of 60 simulated records, and friction 22 in 1 of 46 measured ones; white noise
 stayed below -3. Loads of 10 to 80 % mostly reached 30 to 900."""
-_TOLD_APART = 2.5
-"""Time between step and load, over the time to 63 % of the response, from which on they are told
-apart: of 78 simulated records gains were off by up to 20 % before, and by up to 3 % later. An
-output that clips, and too few poles, are taken for an earlier load."""
+_SOONEST, _TOLD_APART = 0.5, 2.5
+"""Time between step and load, over the time to 63 % of the response, from which on one is looked
+for, and from which on they are told apart: of 78 simulated records gains were off by up to 20 %
+before, and by up to 3 % later. An output that clips, and too few poles, may look like an earlier
+load: it leaves the model as it is, and the gain open."""
 _FIRST, _LAST = 0.25, 0.02  # of the rise, and of the record, in which a load is not looked for
 _TIMES, _LAGS = 60, np.geomspace(0.05, 10.0, 8)
 """Times of a load that are tried, at most about that many, and its lags over the rise."""
+_FEWEST_TIMES = 3  # between which a load is placed
 _SUSPECTED, _RICH = -8.0, 4
 """Decrease of the criterion in the score test above which a load is followed: white noise alone
 reached -8 in 1 of 60 simulated records, loads of 10 to 80 % fell below it in 3 of 48, whose best
@@ -120,17 +122,18 @@ def load_of(
     edges = data.dt * np.array([index for index, _ in data.edges])
     rise = float(data.clock[min(stop_at(loaded, 0.63), data.rows.size - 1)] - edges[0])
     since = load.time - float(edges[edges <= load.time].max())
-    if since < _TOLD_APART * rise or load.lag > _MOST_LAG * (data.clock[-1] - load.time):
+    early = since < _TOLD_APART * rise
+    if since < _SOONEST * rise or load.lag > _MOST_LAG * (data.clock[-1] - load.time):
         return None
     also = refit(loaded, data.output.size, few)
     error = also.window.output - also.window.predict(also.problem, also.best)
     white = also.correlation == 1.0
-    least = PLAUSIBLE if white else _IN_SLOW_NOISE
+    least = PLAUSIBLE if white and not early else _IN_SLOW_NOISE
     left = (also.normalized_rms / fits.normalized_rms) ** 2
     better = left < (1.0 if white else _MOST_LEFT) and is_noise(loaded, also, also.best)
     if not better or _evidence(fits, error, also.best.structure) <= least:
         return None
-    return load, found.part
+    return replace(load, early=early), found.part
 
 
 @dataclass(frozen=True, eq=False)
@@ -146,7 +149,7 @@ def _found(data: StepData, fits: WindowFit) -> _Found | None:
     """LoadStep that explains a record best; None if the score test finds nothing."""
     start = data.edges[0][0] * data.dt + fits.scales.onset + _FIRST * fits.scales.rise
     ends = start, float(data.clock[-1]) - _LAST * data.length
-    if fits.problem.segments is not None or ends[0] >= ends[1]:
+    if fits.problem.segments is not None or _grid(fits, data.clock, ends)[0].size < _FEWEST_TIMES:
         return None
     suspects = _suspects(fits, data.clock, ends, data.sigma * data.colour)
     found = [_followed(fits, one, data.clock, ends) for one in suspects]

@@ -47,7 +47,8 @@ def other_structures(fits: WindowFit, refit: Callable[[], WindowFit]) -> OtherSt
         Fit of the default structures.
     """
     given = fits.best
-    if given.structure.order >= _MOST_ORDER:
+    # Beside an exact fit no other structure tells anything.
+    if given.structure.order >= _MOST_ORDER or not fits.variance > 0:
         return OtherStructures()
     better = _better(refit(), given) if _lacks_a_pole(fits, given) else None
     return OtherStructures(better, () if better is not None else _not_ruled_out(fits, given))

@@ -204,8 +204,8 @@ class OutputErrorEstimate:
     gain of the model, `alike` those of the other structures that are not ruled out and resolve one,
     each with its evidence over the model's. `others` is None if no structures were requested;
     `close` are decisions that rounding errors may reverse. `unweighted` is the model of
-    plain least squares, if the residual was whitened. `load` is a step of a load that is part of
-    the model.
+    plain least squares, if the residual was whitened. `load` is a step of a load; it is part
+    of the model unless it is early.
     """
 
     dead_time: float
@@ -247,10 +247,12 @@ class OutputErrorEstimate:
     def gain_ends(self) -> tuple[float, float]:
         """95 % interval of the gain: of what was chosen and of structures that are not ruled out.
 
-        Without end where the record does not resolve it.
+        Without end where the record does not resolve it, or not beside an early load.
         """
-        if self.static is None or not self.static.resolved:
-            return (-np.inf, np.inf) if self.static is None else self.static.ends
+        if self.static is None or (self.load is not None and self.load.early):
+            return -np.inf, np.inf
+        if not self.static.resolved:
+            return self.static.ends
         return averaged_ends(
             [(one.gain, one.gain_std, weight) for one, weight in ((self.static, 1.0), *self.alike)]
         )

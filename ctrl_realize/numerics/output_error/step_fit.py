@@ -149,7 +149,7 @@ def fit_step_record(
         data, fit, ALL_STRUCTURES if structures is None else tuple(structures)
     )
     loaded = None if data.load is not None else load_of(data, fits, fit, _is_noise)
-    if loaded is not None:
+    if loaded is not None and not loaded[0].early:
         data, found = fit_step_record(
             given.with_load(*loaded),
             structures=structures,
@@ -161,8 +161,10 @@ def fit_step_record(
         )
         return data, replace(found, load=loaded[0])
     if structures is None:
-        return data, _free_choice(data, fits, fit, whiten)
-    return data, _given_structures(data, fits, fit, forms, whiten)
+        found = _free_choice(data, fits, fit, whiten)
+    else:
+        found = _given_structures(data, fits, fit, forms, whiten)
+    return data, found if loaded is None else replace(found, load=loaded[0])
 
 
 def _given_structures(

@@ -18,7 +18,8 @@ class LoadStep:
     """Step of a load: its time on the clock of the record, and the response of the output to it.
 
     The response to a unit step is the sum of ``residues / poles (exp(poles s) - 1)``, s the time
-    since the step over `lag`; times in s. `size` is what the load adds to the last output.
+    since the step over `lag`; times in s. `size` is what the load adds to the last output. `early`:
+    so soon after a step of the input that it cannot be told from the response to that.
     """
 
     time: float
@@ -26,6 +27,7 @@ class LoadStep:
     poles: ComplexArray = field(default_factory=lambda: -np.ones(1, dtype=np.complex128))
     residues: ComplexArray = field(default_factory=lambda: np.ones(1, dtype=np.complex128))
     size: float = 0.0
+    early: bool = False
 
     def columns(self, clock: FloatArray) -> FloatArray:
         """Response to a unit step (N, 3), and its changes for a later step and a longer lag."""

@@ -5,6 +5,7 @@ import pytest
 from scipy.signal import lfilter
 
 import ctrl_realize as cr
+from ctrl_realize.errors import UnsuitableSystemError
 from ctrl_realize.numerics.signals.load_step import LoadStep
 
 GAIN, LAGS, DEAD_TIME, DT, SAMPLES, STEP = 1.1, (70.0, 20.0), 24.0, 2.0, 600, 200.0
@@ -52,6 +53,14 @@ def test_a_late_load_is_told_and_taken_out_of_the_gain(size, lags):
     assert low <= GAIN <= high
     assert fit.gain == pytest.approx(GAIN, rel=0.01)
     assert fit.interval[0] <= DEAD_TIME <= fit.interval[1]
+
+
+def test_a_load_soon_after_the_step_leaves_the_gain_open():
+    system = cr.identify(record(11, STEP + 1.6 * RISE, 0.3))
+    assert len(told(system.fit)) == 1
+    assert system.fit.gain_interval == (-np.inf, np.inf)
+    with pytest.raises(UnsuitableSystemError, match="sign of the gain"):
+        cr.design.pid(system)
 
 
 @pytest.mark.parametrize(("seed", "pole"), [(1, 0.0), (2, 0.0), (3, 0.9), (4, 0.9)])
