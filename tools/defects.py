@@ -137,7 +137,8 @@ DEFECTS = (
        "if repeats.p_value >= 0.01:", "if True:", "several decisions", FITS),
     # --- choices of the fit
     _d("coloured noise ignored", "noise is never made white",
-       "in_coloured_noise(noisy, data) if whiten", "in_coloured_noise(noisy, data) if False", "step_data lags_flow decisions", FITS),
+       "in_coloured_noise(noisy, data) if whiten", "in_coloured_noise(noisy, data) if False",
+       "step_data lags_flow decisions", FITS),
     _d("every model adequate", "a residual with structure passes for noise",
        "if rms <= ADEQUATE * data.colour:", "if True:",
        "step_data step_fit decisions", FITS),
