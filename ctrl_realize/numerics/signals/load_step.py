@@ -1,7 +1,7 @@
 """Response of an output to a step of a load at some time, and its derivatives.
 
 A load is a change at the input of a process, or at its output, that nobody recorded. Its response
-is a sum of modes, so that times and lags far from it cost no simulation.
+is a sum of modes, so that times and lags far from it cost no simulation. Our own form.
 """
 
 from __future__ import annotations
