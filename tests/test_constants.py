@@ -10,7 +10,8 @@ from benchmarks.ablation.switches import SWITCHES
 
 PACKAGE = Path(__file__).parents[1] / "ctrl_realize"
 NUMERICS = [
-    "output_error", "joint", "separable", "signals", "validation", "hankel", "internal_delays",
+    "engine", "families", "output_error", "joint", "signals", "validation", "hankel",
+    "internal_delays",
     "loops", "rational", "regression", "state_space",
 ]  # fmt: skip
 FITS = [".", "output_error", "joint", "state_space_fit", "step"]

@@ -25,8 +25,8 @@ ROOT = Path(__file__).resolve().parents[1]
 PACKAGE = ROOT / "ctrl_realize"
 STORED = Path(__file__).with_name("house.json")
 WINGS = (
-    "numerics/separable", "numerics/output_error", "numerics/actuated", "numerics/rational",
-    "numerics/joint", "numerics/parameters", "identification/output_error", "identification/joint",
+    "numerics/engine", "numerics/output_error", "numerics/actuated", "numerics/rational",
+    "numerics/joint", "numerics/families", "identification/output_error", "identification/joint",
     "frequency/frf_fit.py", "frequency/frf_selection.py",
 )  # fmt: skip
 """Folders and files of the estimates that have one engine in common, or will have."""

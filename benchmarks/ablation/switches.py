@@ -15,9 +15,9 @@ from unittest import mock
 
 import numpy as np
 
+from ctrl_realize.numerics.engine.structures import PLAUSIBLE, choose, needless_parameters
 from ctrl_realize.numerics.output_error.before_the_step import _STRONG, _dies_away
 from ctrl_realize.numerics.output_error.selection import flows_of
-from ctrl_realize.numerics.separable.structures import PLAUSIBLE, choose, needless_parameters
 
 Change = Callable[[Any], Any]
 """Of what stands in a module: what stands there while the rule is off."""
@@ -26,7 +26,8 @@ NUMERICS = "ctrl_realize.numerics"
 FITS = f"{NUMERICS}.output_error"
 STEP = f"{FITS}.step_fit"
 BEFORE = f"{FITS}.before_the_step"
-SEPARABLE = f"{NUMERICS}.separable"
+ENGINE = f"{NUMERICS}.engine"
+FAMILIES = f"{NUMERICS}.families"
 PUBLIC = "ctrl_realize.identification.output_error"
 
 
@@ -192,7 +193,7 @@ SWITCHES = (
     Switch(
         "needless parameters",
         {
-            f"{SEPARABLE}.structures:needless_parameters": giving(0.0),
+            f"{ENGINE}.structures:needless_parameters": giving(0.0),
             f"{FITS}.selection:needless_parameters": giving(0.0),
             f"{BEFORE}:needless_parameters": giving(0.0),
         },
@@ -202,36 +203,36 @@ SWITCHES = (
     Switch(
         "least charge",
         {
-            f"{SEPARABLE}.structures:LEAST_CHARGE": value(0.0),
+            f"{ENGINE}.structures:LEAST_CHARGE": value(0.0),
             f"{FITS}.interval:LEAST_CHARGE": value(0.0),
             f"{FITS}.friction:LEAST_CHARGE": value(0.0),
         },
-        (f"{SEPARABLE}.structures:charged", f"{FITS}.interval:charged"),
+        (f"{ENGINE}.structures:charged", f"{FITS}.interval:charged"),
     ),
     Switch(
         "resolved gain first",
         {
-            f"{SEPARABLE}.window:WindowFit.best_of": lambda _: (
+            f"{ENGINE}.window:WindowFit.best_of": lambda _: (
                 lambda self, criterion: self.candidates[choose(criterion)]
             )
         },
     ),
     Switch(
         "slower poles beside zeros",
-        {f"{SEPARABLE}.structures:SLOWER_WITH_ZEROS": value(40.0)},
+        {f"{ENGINE}.structures:SLOWER_WITH_ZEROS": value(40.0)},
         (f"{STEP}:fit_window", f"{FITS}.any_input.window:fit_window"),
         called=True,
     ),
     Switch(
         "integrator beside a lag of any ratio",
-        {f"{SEPARABLE}.window:_RAMP": value(0.0)},
+        {f"{ENGINE}.window:_RAMP": value(0.0)},
         (f"{STEP}:fit_window", f"{FITS}.any_input.window:fit_window"),
         called=True,
     ),
     Switch(
         "faster pairs in a ramp",
-        {f"{SEPARABLE}.structures:_NO_INTEGRATOR": value(1e-9)},
-        (f"{SEPARABLE}.structures:parameter_bounds",),
+        {f"{ENGINE}.structures:_NO_INTEGRATOR": value(1e-9)},
+        (f"{ENGINE}.structures:parameter_bounds",),
         called=True,
     ),
     Switch("chains of equal lags", {f"{FITS}.selection:fit_chains": giving([])}),
@@ -239,13 +240,13 @@ SWITCHES = (
     Switch("modes of diffusion", {f"{FITS}.selection:fit_diffusion": giving([])}),
     Switch(
         "charge for diffusion",
-        {f"{SEPARABLE}.lag_chains:_DIFFUSION_CHARGE": value(0.0)},
+        {f"{FAMILIES}.equal_lags:_DIFFUSION_CHARGE": value(0.0)},
         (f"{FITS}.selection:fit_diffusion",),
     ),
     Switch("flows that disperse", {f"{FITS}.selection:fit_flows": giving([])}),
     Switch(
         "charge for a flow",
-        {f"{SEPARABLE}.dispersion.fit:_CHARGE": value(0.0)},
+        {f"{FAMILIES}.flow:_CHARGE": value(0.0)},
         (f"{FITS}.selection:fit_flows",),
     ),
     Switch(
@@ -336,7 +337,7 @@ SWITCHES = (
     ),
     Switch(
         "correlation in units of weight",
-        {f"{SEPARABLE}.window:weighted_correlation": lambda _: lambda time, _counted: time},
+        {f"{ENGINE}.window:weighted_correlation": lambda _: lambda time, _counted: time},
     ),
     Switch(
         "first motion in means",
@@ -345,21 +346,21 @@ SWITCHES = (
     ),
     Switch(
         "start at the ringing",
-        {f"{SEPARABLE}.window:_ringing": giving(0.0)},
+        {f"{ENGINE}.window:_ringing": giving(0.0)},
         called=True,
     ),
     Switch(
         "hopeless searches skipped",
-        {f"{SEPARABLE}.structures:_worth_a_search": giving(True)},
+        {f"{ENGINE}.structures:_worth_a_search": giving(True)},
     ),
     Switch(
         "pole tried anywhere",
-        {f"{SEPARABLE}.compared_fits:_with_a_pole_more": giving([])},
+        {f"{ENGINE}.compared_fits:_with_a_pole_more": giving([])},
     ),
     Switch(
         "profiles swept",
-        {f"{SEPARABLE}.profile:_SWEEPS": value(0)},
-        (f"{SEPARABLE}.profile:polish",),
+        {f"{ENGINE}.profile:_SWEEPS": value(0)},
+        (f"{ENGINE}.profile:polish",),
         called=True,
     ),
     Switch(

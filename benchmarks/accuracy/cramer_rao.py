@@ -17,11 +17,11 @@ from __future__ import annotations
 import numpy as np
 
 from ctrl_realize.numerics.arrays import ComplexArray, FloatArray
-from ctrl_realize.numerics.separable.poles import parameters_from_poles
-from ctrl_realize.numerics.separable.profile import dead_time_error
-from ctrl_realize.numerics.separable.responses import StepSequence
-from ctrl_realize.numerics.separable.structures import Candidate
-from ctrl_realize.numerics.separable.varpro import KnownFactor, Problem, Structure, respond
+from ctrl_realize.numerics.engine.poles import parameters_from_poles
+from ctrl_realize.numerics.engine.profile import dead_time_error
+from ctrl_realize.numerics.engine.responses import StepSequence
+from ctrl_realize.numerics.engine.structures import Candidate
+from ctrl_realize.numerics.engine.varpro import KnownFactor, Problem, Structure, respond
 
 
 def dead_time_bound(

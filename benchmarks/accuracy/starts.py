@@ -8,11 +8,11 @@ from dataclasses import replace
 import numpy as np
 from joblib import Parallel, delayed
 
+from ctrl_realize.numerics.engine.batch_search import fit_batch
+from ctrl_realize.numerics.engine.poles import parameters_from_poles
+from ctrl_realize.numerics.engine.structures import parameter_bounds, search
+from ctrl_realize.numerics.engine.varpro import KnownFactor, Structure
 from ctrl_realize.numerics.output_error.step_data import step_data, step_scales, window
-from ctrl_realize.numerics.separable.batch_search import fit_batch
-from ctrl_realize.numerics.separable.poles import parameters_from_poles
-from ctrl_realize.numerics.separable.structures import parameter_bounds, search
-from ctrl_realize.numerics.separable.varpro import KnownFactor, Structure
 
 from . import plants
 

@@ -11,6 +11,8 @@ from .._wording import plainly
 from ..delayed import DelayedStateSpace, delayed_ss
 from ..numerics.arrays import locked, read_only
 from ..numerics.constants import Z_95
+from ..numerics.engine.structures import Candidate
+from ..numerics.engine.varpro import Structure
 from ..numerics.rational.frf_data import (
     FRFData,
     modal_state_space,
@@ -21,8 +23,6 @@ from ..numerics.rational.search import (
     dead_time_bound,
     fit_structures,
 )
-from ..numerics.separable.structures import Candidate
-from ..numerics.separable.varpro import Structure
 from ..numerics.statistics import mixture_quantile
 from ..results import Flag
 from .frf_fit import FRFFit, FRFStructure

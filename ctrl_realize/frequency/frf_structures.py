@@ -16,6 +16,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..numerics.engine.compared_fits import settled
+from ..numerics.engine.profile import Points, dead_time_error, profile_points
+from ..numerics.engine.structures import Candidate
+from ..numerics.engine.varpro import Structure
 from ..numerics.rational.frf_data import FRFData, dead_time_interval
 from ..numerics.rational.search import (
     information_criteria,
@@ -23,10 +27,6 @@ from ..numerics.rational.search import (
     residual_variance,
     smallest_cost,
 )
-from ..numerics.separable.compared_fits import settled
-from ..numerics.separable.profile import Points, dead_time_error, profile_points
-from ..numerics.separable.structures import Candidate
-from ..numerics.separable.varpro import Structure
 from .frf_fit import FRFStructure
 
 _NEAR_BIC = 8.0

@@ -10,9 +10,9 @@ from .._parameters import Parameter, slope_unit
 from .._wording import in_time
 from ..numerics.arrays import ComplexArray, FloatArray
 from ..numerics.constants import Z_95
-from ..numerics.parameters.physical import ProcessParameter
-from ..numerics.separable.lag_chains import lag_sum
-from ..numerics.separable.profile import JUMP
+from ..numerics.engine.poles import lag_sum
+from ..numerics.engine.profile import JUMP
+from ..numerics.families.physical import ProcessParameter
 
 Interval = tuple[float, float]
 

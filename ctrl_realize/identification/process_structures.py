@@ -9,8 +9,8 @@ from typing import Any, TypeAlias
 
 from .._checks import band, real
 from ..errors import OptionError, OrderError
-from ..numerics.parameters.process_form import ProcessForm
-from ..numerics.separable.varpro import Structure
+from ..numerics.engine.varpro import Structure
+from ..numerics.families.process_form import ProcessForm
 
 MOST_ORDER = 8  # higher orders suffer from rounding in the partial fractions
 MOST_LAGS = 3

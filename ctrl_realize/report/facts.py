@@ -22,8 +22,8 @@ from ..identification.output_error.result import OutputErrorFit
 from ..identification.output_error.words import gain_in_words
 from ..numerics.arrays import FloatArray
 from ..numerics.constants import SMALLEST
-from ..numerics.parameters.physical import process_parameters
-from ..numerics.separable.static_gain import INTEGRATOR
+from ..numerics.engine.static_gain import INTEGRATOR
+from ..numerics.families.physical import process_parameters
 from ..results import INTERVAL_LABELS, ModelFit
 
 INTEGRATING = "none: the model integrates"

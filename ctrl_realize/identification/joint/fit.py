@@ -19,6 +19,7 @@ from ...frequency.frf_fit import FRFFit
 from ...numerics.arrays import ComplexArray, FloatArray
 from ...numerics.blas_threads import single_threaded
 from ...numerics.constants import SMALLEST
+from ...numerics.engine.varpro import Structure
 from ...numerics.joint.fit import joint_fit
 from ...numerics.joint.frf_rows import MeasuredPoints
 from ...numerics.joint.own_effects import EffectKey, with_random_effects
@@ -26,7 +27,6 @@ from ...numerics.joint.record_part import RecordPart, sampled_data, sampled_part
 from ...numerics.output_error.result import OutputErrorEstimate
 from ...numerics.output_error.step_data import StepData, bare_data
 from ...numerics.rational.search import points_as_one
-from ...numerics.separable.varpro import Structure
 from ..output_error.any_input import joined_signals
 from ..output_error.fit import fit_output_error
 from ..output_error.repeat_flags import BY_CHANCE

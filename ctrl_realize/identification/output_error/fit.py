@@ -18,11 +18,11 @@ from ...delayed import DelayedStateSpace
 from ...errors import DataError, OptionError
 from ...numerics.arrays import FloatArray
 from ...numerics.blas_threads import single_threaded
+from ...numerics.engine.varpro import KnownFactor, Structure
+from ...numerics.families.process_form import ProcessForm
 from ...numerics.output_error.result import OutputErrorEstimate
 from ...numerics.output_error.step_data import own_regressors, step_data
 from ...numerics.output_error.step_fit import fit_step_record
-from ...numerics.parameters.process_form import ProcessForm
-from ...numerics.separable.varpro import KnownFactor, Structure
 from ...results import Flag
 from ..process_structures import Structures, requested
 from .actuated.alternatives import ASKED, Asked

@@ -6,10 +6,10 @@ import numpy as np
 
 from ..._wording import in_time, interval_in_time, plainly, rate_in_time, time_within
 from ...numerics.arrays import ComplexArray
+from ...numerics.engine.profile_ends import profile_limits
 from ...numerics.output_error.margins import CLOSE, DecisionKey
 from ...numerics.output_error.result import OutputErrorEstimate
 from ...numerics.output_error.step_data import StepData
-from ...numerics.separable.profile_ends import profile_limits
 from ...results import Flag
 from .model_flags import AS_GOOD, cancelled_pair, slow_modes, unresolved_gain
 from .sensor_flags import outliers

@@ -6,9 +6,9 @@ import numpy as np
 
 from ..._wording import in_time, interval_in_time
 from ...numerics.arrays import ComplexArray, FloatArray
+from ...numerics.engine.poles import lag_sum
+from ...numerics.engine.static_gain import INTEGRATOR, StaticGain
 from ...numerics.output_error.result import OutputErrorEstimate
-from ...numerics.separable.lag_chains import lag_sum
-from ...numerics.separable.static_gain import INTEGRATOR, StaticGain
 from ...results import Flag
 from .words import sign_is_told
 

@@ -17,10 +17,10 @@ from ..._wording import (
 )
 from ...data import Record
 from ...numerics.arrays import ComplexArray, FloatArray, locked
+from ...numerics.engine.poles import lag_sum
+from ...numerics.engine.static_gain import INTEGRATOR
 from ...numerics.output_error.result import OutputErrorEstimate, StructureFit
 from ...numerics.output_error.step_data import StepData
-from ...numerics.separable.lag_chains import lag_sum
-from ...numerics.separable.static_gain import INTEGRATOR
 from ...numerics.signals.correlation import fit_percent
 from ...results import Flag, FractionalDelayFit, IntervalKind
 from ..process_parameters import jump, not_seen_in_words, told, with_intervals

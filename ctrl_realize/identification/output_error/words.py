@@ -7,10 +7,10 @@ from collections.abc import Iterable
 import numpy as np
 
 from ..._wording import in_time, interval_in_time, numbers_alike, time_within
+from ...numerics.families.equal_lags import LagChain
+from ...numerics.families.flow import DispersedFlow
+from ...numerics.families.process_form import ProcessForm
 from ...numerics.output_error.result import OutputErrorEstimate, RobustKey
-from ...numerics.parameters.process_form import ProcessForm
-from ...numerics.separable.dispersion.fit import DispersedFlow
-from ...numerics.separable.lag_chains import LagChain
 from ...results import Flag
 
 ESTIMATE_WORDS: dict[RobustKey, str] = {

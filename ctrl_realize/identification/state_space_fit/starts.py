@@ -13,8 +13,8 @@ from ...data import Record
 from ...delayed import DelayedStateSpace, fit_of
 from ...errors import DataError, DataWarning
 from ...numerics.arrays import IntArray
+from ...numerics.engine.structures import PLAUSIBLE
 from ...numerics.output_error.margins import CLOSE
-from ...numerics.separable.structures import PLAUSIBLE
 from ...numerics.state_space.delay_split import split_delays
 from ...results import Flag
 from ..impulse.from_io import Method, Start, impulse_from_io

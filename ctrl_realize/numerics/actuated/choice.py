@@ -21,15 +21,15 @@ import numpy as np
 
 from ..arrays import BoolArray, ComplexArray, FloatArray
 from ..constants import Z_95
-from ..separable.poles import poles_from_parameters
-from ..separable.structures import (
+from ..engine.poles import poles_from_parameters
+from ..engine.structures import (
     LEAST_CHARGE,
     PLAUSIBLE,
     Scales,
     needless_parameters,
     parameter_charge,
 )
-from ..separable.varpro import Structure
+from ..engine.varpro import Structure
 from ..signals.noise import correlation_time, mad_sigma
 from .commands import knots
 from .family import Family, Member, Records, Task

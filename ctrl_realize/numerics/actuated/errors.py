@@ -15,10 +15,9 @@ from typing import NamedTuple
 import numpy as np
 
 from ..arrays import FloatArray
-from ..parameters.physical import ProcessParameter, process_parameters
-from ..separable.lag_chains import lag_sum
-from ..separable.poles import poles_from_parameters
-from ..separable.static_gain import StaticGain
+from ..engine.poles import lag_sum, poles_from_parameters
+from ..engine.static_gain import StaticGain
+from ..families.physical import ProcessParameter, process_parameters
 from .family import Member, Task
 
 _STEP = 1e-4  # part of a coefficient, for a difference

@@ -18,9 +18,9 @@ from functools import cached_property
 import numpy as np
 
 from ..arrays import BoolArray, FloatArray
+from ..engine.structures import Scales, parameter_bounds
+from ..engine.varpro import Structure
 from ..regression.marquardt import Damping, damped_step, descend
-from ..separable.structures import Scales, parameter_bounds
-from ..separable.varpro import Structure
 from .kinds import FORMS, Acting, Form, Kind, Place, Size
 from .motions import forced_responses
 from .records import ActuatedRecord

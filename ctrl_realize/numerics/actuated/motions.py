@@ -22,8 +22,8 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from ..arrays import ComplexArray, FloatArray, IntArray
-from ..separable.poles import poles_from_parameters
-from ..separable.responses import SampledInput
+from ..engine.poles import poles_from_parameters
+from ..engine.responses import SampledInput
 from .kinds import Acting
 from .records import ActuatedRecord
 

@@ -17,9 +17,9 @@ import numpy as np
 from scipy.optimize import minimize_scalar
 
 from ..arrays import FloatArray
-from ..separable.poles import parameters_from_poles, poles_from_parameters
-from ..separable.structures import Candidate, Scales, neighbour_starts, pattern_starts
-from ..separable.varpro import Structure
+from ..engine.poles import parameters_from_poles, poles_from_parameters
+from ..engine.structures import Candidate, Scales, neighbour_starts, pattern_starts
+from ..engine.varpro import Structure
 from .family import Family, Member, Records, Task
 
 _MOST_STARTS = 16

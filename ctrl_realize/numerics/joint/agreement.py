@@ -20,9 +20,9 @@ import numpy as np
 from scipy.stats import chi2
 
 from ..arrays import BoolArray, FloatArray
-from ..separable.compared_fits import settled
-from ..separable.structures import Candidate
-from ..separable.varpro import Problem, Structure, evaluate
+from ..engine.compared_fits import settled
+from ..engine.structures import Candidate
+from ..engine.varpro import Problem, Structure, evaluate
 from .frf_rows import MeasuredPoints
 from .own_effects import OwnKey, chance_of, freed
 from .record_part import RecordPart

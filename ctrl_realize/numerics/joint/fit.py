@@ -18,14 +18,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..arrays import ComplexArray, FloatArray
+from ..engine.batch_search import fit_batch
+from ..engine.compared_fits import converged
+from ..engine.poles import parameters_from_poles
+from ..engine.structures import Candidate, Scales, neighbour_starts, parameter_bounds, search
+from ..engine.varpro import KnownFactor, Problem, Structure, respond
+from ..engine.window import Window, WindowFit
 from ..output_error.interval import likelihood_fit
 from ..output_error.result import Followed, OutputErrorEstimate
-from ..separable.batch_search import fit_batch
-from ..separable.compared_fits import converged
-from ..separable.poles import parameters_from_poles
-from ..separable.structures import Candidate, Scales, neighbour_starts, parameter_bounds, search
-from ..separable.varpro import KnownFactor, Problem, Structure, respond
-from ..separable.window import Window, WindowFit
 from ..signals.correlation import fit_percent
 from .agreement import Agreement, agreement
 from .frf_rows import MeasuredPoints, both_together

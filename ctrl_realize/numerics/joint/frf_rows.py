@@ -17,9 +17,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..arrays import ComplexArray, FloatArray
-from ..separable.local_terms import Segments
-from ..separable.responses import HeldInput, Modes
-from ..separable.varpro import KnownFactor, Problem
+from ..engine.local_terms import Segments
+from ..engine.responses import HeldInput, Modes
+from ..engine.varpro import KnownFactor, Problem
 from ..signals.sines import Sines, stacked_parts
 
 _LATE = 1e200

@@ -26,12 +26,12 @@ from scipy.stats import chi2
 from scipy.stats import f as f_distribution
 
 from ..arrays import ComplexArray, FloatArray
+from ..engine.compared_fits import settled
+from ..engine.poles import parameters_from_poles
+from ..engine.responses import HeldInput, Modes
+from ..engine.structures import Candidate, Scales
+from ..engine.varpro import KnownFactor, Problem, evaluate, respond
 from ..output_error.result import OutputErrorEstimate
-from ..separable.compared_fits import settled
-from ..separable.poles import parameters_from_poles
-from ..separable.responses import HeldInput, Modes
-from ..separable.structures import Candidate, Scales
-from ..separable.varpro import KnownFactor, Problem, evaluate, respond
 from ..signals.sines import stacked_parts
 from .frf_rows import MeasuredPoints, both_together, with_rows
 from .record_part import RecordPart

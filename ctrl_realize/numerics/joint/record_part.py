@@ -19,15 +19,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..arrays import FloatArray
+from ..engine.local_terms import Segments
+from ..engine.poles import parameters_from_poles, poles_from_parameters
+from ..engine.responses import HeldInput
+from ..engine.structures import Scales
+from ..engine.varpro import KnownFactor, Problem, evaluate, respond
+from ..engine.window import weighted_correlation
 from ..output_error.any_input.data import SampledData, cut
 from ..output_error.result import OutputErrorEstimate
 from ..output_error.step_data import StepData, step_scales, window
-from ..separable.local_terms import Segments
-from ..separable.poles import parameters_from_poles, poles_from_parameters
-from ..separable.responses import HeldInput
-from ..separable.structures import Scales
-from ..separable.varpro import KnownFactor, Problem, evaluate, respond
-from ..separable.window import weighted_correlation
 from ..signals.noise import correlation_time, is_coarse, mad_sigma
 
 _WILD = 5.0  # standard deviations, beyond which Gaussian noise has none of a million samples: cut

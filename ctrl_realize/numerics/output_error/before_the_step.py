@@ -18,9 +18,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..separable.structures import PLAUSIBLE, SIMPLE_STRUCTURES, needless_parameters
-from ..separable.varpro import Structure, evaluate, respond
-from ..separable.window import WindowFit
+from ..engine.structures import PLAUSIBLE, SIMPLE_STRUCTURES, needless_parameters
+from ..engine.varpro import Structure, evaluate, respond
+from ..engine.window import WindowFit
 from .step_data import StepData
 
 _OUTLIER = 3.0  # standard deviations at which residuals are cut where explanations are compared

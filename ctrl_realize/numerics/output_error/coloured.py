@@ -18,12 +18,12 @@ from dataclasses import replace
 import numpy as np
 
 from ..arrays import FloatArray
-from ..separable.batch_search import fit_batch
-from ..separable.compared_fits import converged
-from ..separable.compressed import eliminate
-from ..separable.structures import Candidate, Scales, choose, neighbour_starts, parameter_bounds
-from ..separable.varpro import Problem, Structure
-from ..separable.window import WindowFit
+from ..engine.batch_search import fit_batch
+from ..engine.compared_fits import converged
+from ..engine.compressed import eliminate
+from ..engine.structures import Candidate, Scales, choose, neighbour_starts, parameter_bounds
+from ..engine.varpro import Problem, Structure
+from ..engine.window import WindowFit
 from ..signals.noise import correlation_time, mad_sigma
 from ..signals.noise_model import noise_covariance, whitener
 from .step_data import StepData, settled_at

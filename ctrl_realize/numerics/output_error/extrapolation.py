@@ -21,13 +21,13 @@ from dataclasses import replace
 import numpy as np
 
 from ..constants import CHI2_95
-from ..separable.newton import settle
-from ..separable.poles import parameters_from_poles, poles_from_parameters
-from ..separable.polish import polish
-from ..separable.static_gain import StaticGain
-from ..separable.structures import Candidate, parameter_bounds
-from ..separable.varpro import KnownFactor, Structure
-from ..separable.window import WindowFit
+from ..engine.newton import settle
+from ..engine.poles import parameters_from_poles, poles_from_parameters
+from ..engine.polish import polish
+from ..engine.static_gain import StaticGain
+from ..engine.structures import Candidate, parameter_bounds
+from ..engine.varpro import KnownFactor, Structure
+from ..engine.window import WindowFit
 
 _FASTEST = 4.0  # over the length of the record: 2 % of such a mode are left at its end
 _RATIO = 2.0  # of the rates that are tried: time

@@ -19,11 +19,11 @@ from dataclasses import replace
 import numpy as np
 
 from ..constants import SMALLEST, Z_95
-from ..parameters.physical import process_parameters
-from ..separable.compared_fits import at_dead_time
-from ..separable.profile import dead_time_error
-from ..separable.varpro import Structure, evaluate
-from ..separable.window import WindowFit
+from ..engine.compared_fits import at_dead_time
+from ..engine.profile import dead_time_error
+from ..engine.varpro import Structure, evaluate
+from ..engine.window import WindowFit
+from ..families.physical import process_parameters
 from .extrapolation import least_extrapolating
 from .margins import close_to
 from .result import OutputErrorEstimate, RobustKey, followed_by

@@ -23,11 +23,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..separable.polish import polish
-from ..separable.profile_ends import profile_limits
-from ..separable.structures import LEAST_CHARGE, PLAUSIBLE, Candidate, parameter_bounds
-from ..separable.varpro import Structure
-from ..separable.window import WindowFit
+from ..engine.polish import polish
+from ..engine.profile_ends import profile_limits
+from ..engine.structures import LEAST_CHARGE, PLAUSIBLE, Candidate, parameter_bounds
+from ..engine.varpro import Structure
+from ..engine.window import WindowFit
 
 _S_AND_J = 2  # parameters of friction; behind a single lag the dead time takes the place of one
 _POINTS = 16  # dead times at which the friction is tried: time

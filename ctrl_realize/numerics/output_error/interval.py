@@ -22,20 +22,20 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from ..constants import Z_95
-from ..parameters.physical import without_errors
-from ..separable.dispersion.fit import DispersedFlow, flow_profile
-from ..separable.lag_chains import (
+from ..engine.profile import Points
+from ..engine.profile_ends import profile_limits
+from ..engine.structures import LEAST_CHARGE, PLAUSIBLE, Scales, charged, plausible
+from ..engine.varpro import Structure
+from ..engine.window import WindowFit
+from ..families.equal_lags import (
     FREE_IN_A_CHAIN,
     LagChain,
     chain_limits,
     chain_profile,
     still_improving,
 )
-from ..separable.profile import Points
-from ..separable.profile_ends import profile_limits
-from ..separable.structures import LEAST_CHARGE, PLAUSIBLE, Scales, charged, plausible
-from ..separable.varpro import Structure
-from ..separable.window import WindowFit
+from ..families.flow import DispersedFlow, flow_profile
+from ..families.physical import without_errors
 from .extrapolation import least_extrapolating
 from .friction import latest_slip
 from .margins import CloseDecision, close_choices, close_exclusions

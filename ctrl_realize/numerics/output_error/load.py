@@ -32,10 +32,10 @@ import numpy as np
 
 from ..arrays import FloatArray
 from ..constants import SMALLEST
-from ..separable.compressed import eliminate
-from ..separable.polish import polish
-from ..separable.static_gain import local_errors
-from ..separable.structures import (
+from ..engine.compressed import eliminate
+from ..engine.polish import polish
+from ..engine.static_gain import local_errors
+from ..engine.structures import (
     ALL_STRUCTURES,
     PLAUSIBLE,
     SIMPLE_STRUCTURES,
@@ -44,8 +44,8 @@ from ..separable.structures import (
     parameter_bounds,
     pattern_starts,
 )
-from ..separable.varpro import Problem, Structure, evaluate, partial_fractions
-from ..separable.window import WindowFit
+from ..engine.varpro import Problem, Structure, evaluate, partial_fractions
+from ..engine.window import WindowFit
 from ..signals.load_step import LoadStep
 from ..signals.noise import correlation_time, mad_sigma
 from .step_data import StepData, stop_at

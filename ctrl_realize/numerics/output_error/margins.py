@@ -10,9 +10,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal, TypeAlias
 
-from ..separable.structures import PLAUSIBLE, charged, needless_parameters, plausible
-from ..separable.varpro import Structure
-from ..separable.window import WindowFit
+from ..engine.structures import PLAUSIBLE, charged, needless_parameters, plausible
+from ..engine.varpro import Structure
+from ..engine.window import WindowFit
 
 CLOSE = 1e-3
 """Distance from a threshold, as a part of it, within which a decision is called close. Structures

@@ -14,8 +14,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-from ..separable.profile_ends import profile_limits
-from ..separable.structures import (
+from ..engine.profile_ends import profile_limits
+from ..engine.structures import (
     ALL_STRUCTURES,
     LEAST_CHARGE,
     PLAUSIBLE,
@@ -25,8 +25,8 @@ from ..separable.structures import (
     plausible,
     search,
 )
-from ..separable.varpro import Structure, evaluate
-from ..separable.window import WindowFit, extended
+from ..engine.varpro import Structure, evaluate
+from ..engine.window import WindowFit, extended
 from .profiles import profile_of
 from .result import OtherStructures, StructureFit
 

@@ -18,15 +18,15 @@ import numpy as np
 
 from ..arrays import FloatArray
 from ..constants import Z_95
-from ..parameters.form_fit import FormFit, fit_form
-from ..parameters.lag_profiles import with_profiled_lags
-from ..parameters.process_form import ProcessForm
-from ..separable.lag_chains import lag_sum
-from ..separable.profile_ends import profile_limits
-from ..separable.static_gain import INTEGRATOR, StaticGain, reached_after
-from ..separable.structures import PLAUSIBLE
-from ..separable.varpro import evaluate, respond
-from ..separable.window import WindowFit
+from ..engine.poles import lag_sum
+from ..engine.profile_ends import profile_limits
+from ..engine.static_gain import INTEGRATOR, StaticGain, reached_after
+from ..engine.structures import PLAUSIBLE
+from ..engine.varpro import evaluate, respond
+from ..engine.window import WindowFit
+from ..families.form_fit import FormFit, fit_form
+from ..families.lag_profiles import with_profiled_lags
+from ..families.process_form import ProcessForm
 from ..signals.correlation import fit_percent
 from ..signals.noise import correlation_time
 from .interval import likelihood_fit

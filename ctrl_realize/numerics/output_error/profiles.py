@@ -17,12 +17,12 @@ from typing import TypeAlias
 import numpy as np
 
 from ..arrays import FloatArray
-from ..separable.compared_fits import settled
-from ..separable.profile import Points, dead_time_profile, profile_curve, profile_points, with_ends
-from ..separable.profile_ends import bracket_ends, profile_limits
-from ..separable.structures import Candidate
-from ..separable.varpro import Structure
-from ..separable.window import WindowFit
+from ..engine.compared_fits import settled
+from ..engine.profile import Points, dead_time_profile, profile_curve, profile_points, with_ends
+from ..engine.profile_ends import bracket_ends, profile_limits
+from ..engine.structures import Candidate
+from ..engine.varpro import Structure
+from ..engine.window import WindowFit
 
 _LOWER = 0.01
 """Variances by which a profile must lead below a minimum to be followed.

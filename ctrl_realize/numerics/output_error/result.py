@@ -16,16 +16,17 @@ from typing import Literal, NamedTuple, TypeAlias
 import numpy as np
 
 from ..arrays import ComplexArray, FloatArray
-from ..parameters.physical import ProcessParameter, fitted_parameters
-from ..parameters.process_form import ProcessForm
-from ..separable.compressed import eliminate
-from ..separable.dispersion.fit import DispersedFlow
-from ..separable.lag_chains import LagChain, lag_sum
-from ..separable.profile_ends import profile_limits
-from ..separable.static_gain import StaticGain, averaged_ends
-from ..separable.structures import Candidate, Scales, needless_parameters
-from ..separable.varpro import Structure, evaluate, respond
-from ..separable.window import WindowFit
+from ..engine.compressed import eliminate
+from ..engine.poles import lag_sum
+from ..engine.profile_ends import profile_limits
+from ..engine.static_gain import StaticGain, averaged_ends
+from ..engine.structures import Candidate, Scales, needless_parameters
+from ..engine.varpro import Structure, evaluate, respond
+from ..engine.window import WindowFit
+from ..families.equal_lags import LagChain
+from ..families.flow import DispersedFlow
+from ..families.physical import ProcessParameter, fitted_parameters
+from ..families.process_form import ProcessForm
 from ..signals.correlation import fit_percent
 from ..signals.load_step import LoadStep
 from .margins import CloseDecision

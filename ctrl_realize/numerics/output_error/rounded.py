@@ -22,10 +22,10 @@ from scipy.special import log_ndtr
 
 from ..arrays import FloatArray
 from ..constants import Z_95
-from ..parameters.physical import fitted_parameters
-from ..separable.structures import Candidate, parameter_bounds
-from ..separable.varpro import Structure, evaluate, respond
-from ..separable.window import WindowFit
+from ..engine.structures import Candidate, parameter_bounds
+from ..engine.varpro import Structure, evaluate, respond
+from ..engine.window import WindowFit
+from ..families.physical import fitted_parameters
 from ..signals.noise import correlation_time
 from .result import OutputErrorEstimate, followed_by
 

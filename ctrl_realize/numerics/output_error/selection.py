@@ -22,11 +22,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from ..separable.dispersion.fit import DispersedFlow, fit_flows
-from ..separable.lag_chains import FREE_IN_A_CHAIN, LagChain, fit_chains, fit_diffusion
-from ..separable.structures import PLAUSIBLE, Candidate, choose, needless_parameters, search
-from ..separable.varpro import Structure
-from ..separable.window import WindowFit
+from ..engine.structures import PLAUSIBLE, Candidate, choose, needless_parameters, search
+from ..engine.varpro import Structure
+from ..engine.window import WindowFit
+from ..families.equal_lags import FREE_IN_A_CHAIN, LagChain, fit_chains, fit_diffusion
+from ..families.flow import DispersedFlow, fit_flows
 
 _LAGS_OF_TANKS, _LAGS_OF_DIFFUSION = 3, 2
 """Poles from which on there may be more lags than show; the second mode of diffusion is fast: of

@@ -15,11 +15,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..arrays import ComplexArray, FloatArray, IntArray
-from ..separable.local_terms import Segments, local_columns
-from ..separable.responses import StepSequence
-from ..separable.structures import Scales
-from ..separable.varpro import KnownFactor, Problem
-from ..separable.window import Window
+from ..engine.local_terms import Segments, local_columns
+from ..engine.responses import StepSequence
+from ..engine.structures import Scales
+from ..engine.varpro import KnownFactor, Problem
+from ..engine.window import Window
 from ..signals.baseline import noise_about_a_motion, relaxation
 from ..signals.bins import Bins, response_bins
 from ..signals.filters import moving_mean

@@ -63,19 +63,19 @@ from functools import partial
 import numpy as np
 
 from ..constants import Z_95
-from ..parameters.physical import without_errors
-from ..parameters.process_form import ProcessForm
-from ..separable.compared_fits import at_dead_time
-from ..separable.dispersion.fit import DispersedFlow
-from ..separable.lag_chains import LagChain
-from ..separable.structures import (
+from ..engine.compared_fits import at_dead_time
+from ..engine.structures import (
     ALL_STRUCTURES,
     SIMPLE_STRUCTURES,
     Candidate,
     choose,
 )
-from ..separable.varpro import KnownFactor, Structure, evaluate, respond
-from ..separable.window import WindowFit, among, fit_window
+from ..engine.varpro import KnownFactor, Structure, evaluate, respond
+from ..engine.window import WindowFit, among, fit_window
+from ..families.equal_lags import LagChain
+from ..families.flow import DispersedFlow
+from ..families.physical import without_errors
+from ..families.process_form import ProcessForm
 from .before_the_step import fitted_from_rest
 from .coloured import in_coloured_noise
 from .extrapolation import least_extrapolating

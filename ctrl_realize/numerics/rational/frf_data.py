@@ -1,4 +1,4 @@
-"""Points of a frequency response as a problem of the separable engine, and its fits.
+"""Points of a frequency response as a problem of the engine, and its fits.
 
 The model is a stable transfer function behind a dead time; the likelihood is that of [1]_, [2]_.
 See `signals.sines` for the rows.
@@ -23,13 +23,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import ComplexArray, FloatArray
-from ..separable.batch_search import fit_batch
-from ..separable.poles import poles_from_parameters
-from ..separable.polish import polish
-from ..separable.profile import Points, profile_curve, with_ends
-from ..separable.profile_ends import bracket_ends, profile_limits
-from ..separable.structures import Candidate, Scales, parameter_bounds
-from ..separable.varpro import (
+from ..engine.batch_search import fit_batch
+from ..engine.poles import poles_from_parameters
+from ..engine.polish import polish
+from ..engine.profile import Points, profile_curve, with_ends
+from ..engine.profile_ends import bracket_ends, profile_limits
+from ..engine.structures import Candidate, Scales, parameter_bounds
+from ..engine.varpro import (
     Bounds,
     Evaluation,
     KnownFactor,

@@ -19,10 +19,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..arrays import ComplexArray, FloatArray
-from ..separable.compared_fits import settled
-from ..separable.poles import parameters_from_poles
-from ..separable.structures import Candidate
-from ..separable.varpro import Structure
+from ..engine.compared_fits import settled
+from ..engine.poles import parameters_from_poles
+from ..engine.structures import Candidate
+from ..engine.varpro import Structure
 from .frf_data import FRFData, refined
 from .starts import delay_grid, grown_starts, starting_points
 

@@ -2,7 +2,7 @@
 
 What is minimised, and how a step is kept within bounds, is the caller's; here is when a step is
 taken and how the damping follows [1]_, [2]_. Many starts of one problem at once are moved by
-`separable.batch_search`, to their very minima by `separable.polish`.
+`engine.batch_search`, to their very minima by `engine.polish`.
 
 References
 ----------

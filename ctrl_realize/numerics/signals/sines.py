@@ -1,6 +1,6 @@
 r"""Points of a frequency response as rows of a separable least-squares problem.
 
-In `separable.varpro` a model is a sum of modes of an input. A point of a frequency response is the
+In `engine.varpro` a model is a sum of modes of an input. A point of a frequency response is the
 response to another input, :math:`e^{j \omega t}`: with the residues r_j of ``G(s) / s`` at its
 poles p_j and its static gain g, G has
 
@@ -46,7 +46,7 @@ class Sines:
         return [self]
 
     def modes(self, tau: FloatArray, poles: ComplexArray) -> tuple[FloatArray, Any, Any]:
-        """Evaluate H, E and T of every row; see `separable.responses`."""
+        """Evaluate H, E and T of every row; see `engine.responses`."""
         s = 1j * self.omega
         turn = np.exp(-s * tau[:, None])
         gap = s[:, None] - poles[:, None, :]

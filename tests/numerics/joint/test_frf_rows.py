@@ -5,18 +5,18 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from ctrl_realize.numerics.joint.frf_rows import MeasuredPoints, both_together
-from ctrl_realize.numerics.separable.compressed import compress
-from ctrl_realize.numerics.separable.local_terms import Segments
-from ctrl_realize.numerics.separable.poles import parameters_from_poles
-from ctrl_realize.numerics.separable.responses import SampledInput
-from ctrl_realize.numerics.separable.varpro import (
+from ctrl_realize.numerics.engine.compressed import compress
+from ctrl_realize.numerics.engine.local_terms import Segments
+from ctrl_realize.numerics.engine.poles import parameters_from_poles
+from ctrl_realize.numerics.engine.responses import SampledInput
+from ctrl_realize.numerics.engine.varpro import (
     KnownFactor,
     Problem,
     Structure,
     evaluate,
     respond,
 )
+from ctrl_realize.numerics.joint.frf_rows import MeasuredPoints, both_together
 
 OMEGA = np.geomspace(0.1, 50.0, 12)
 POLES = np.array([-3.0, -1.0 + 4.0j, -1.0 - 4.0j])

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+from ctrl_realize.numerics.engine.responses import SampledInput
 from ctrl_realize.numerics.output_error.any_input.averaged_input import AveragedInput
-from ctrl_realize.numerics.separable.responses import SampledInput
 
 DT = 0.3
 SIGNAL = np.random.default_rng(0).choice([-1.0, 1.0], 2003)

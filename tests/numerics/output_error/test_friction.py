@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize
 
+from ctrl_realize.numerics.engine.varpro import KnownFactor, Structure
+from ctrl_realize.numerics.engine.window import fit_window
 from ctrl_realize.numerics.output_error.friction import latest_slip
 from ctrl_realize.numerics.output_error.step_data import step_data, step_scales, window
 from ctrl_realize.numerics.output_error.step_fit import fit_step_record
-from ctrl_realize.numerics.separable.varpro import KnownFactor, Structure
-from ctrl_realize.numerics.separable.window import fit_window
 
 DEAD, FAST, SLOW = 20.3, 9.0, 45.0
 ONE_LAG, TWO_LAGS = Structure(1, 1), Structure(2, 2)

@@ -7,14 +7,14 @@ import pytest
 
 from benchmarks.accuracy.cramer_rao import dead_time_bound
 from ctrl_realize.identification.output_error.flags import sampled_flags
+from ctrl_realize.numerics.engine.structures import PLAUSIBLE, Scales, needless_parameters
+from ctrl_realize.numerics.engine.varpro import KnownFactor, Structure, evaluate
+from ctrl_realize.numerics.engine.window import WindowFit, fit_window
 from ctrl_realize.numerics.output_error.interval import likelihood_fit
 from ctrl_realize.numerics.output_error.margins import CLOSE, close_to
 from ctrl_realize.numerics.output_error.profiles import laid_profiles, lower_minima
 from ctrl_realize.numerics.output_error.result import DelayInterval
 from ctrl_realize.numerics.output_error.step_data import step_data, step_scales, window
-from ctrl_realize.numerics.separable.structures import PLAUSIBLE, Scales, needless_parameters
-from ctrl_realize.numerics.separable.varpro import KnownFactor, Structure, evaluate
-from ctrl_realize.numerics.separable.window import WindowFit, fit_window
 from tests import rigs
 
 DT = 0.5

@@ -7,11 +7,11 @@ from scipy.optimize import minimize
 from scipy.stats import norm
 
 import ctrl_realize as cr
+from ctrl_realize.numerics.engine.structures import Candidate
+from ctrl_realize.numerics.engine.varpro import KnownFactor, Structure
+from ctrl_realize.numerics.engine.window import fit_window
 from ctrl_realize.numerics.output_error.rounded import fit_rounded, log_probability, scores
 from ctrl_realize.numerics.output_error.step_data import step_data, step_scales, window
-from ctrl_realize.numerics.separable.structures import Candidate
-from ctrl_realize.numerics.separable.varpro import KnownFactor, Structure
-from ctrl_realize.numerics.separable.window import fit_window
 
 STEP = 0.02
 EDGE, COUNT = 150, 600

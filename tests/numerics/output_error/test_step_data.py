@@ -5,6 +5,10 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy.signal import lfilter
 
+from ctrl_realize.numerics.engine.local_terms import local_columns
+from ctrl_realize.numerics.engine.profile_ends import profile_limits
+from ctrl_realize.numerics.engine.responses import SampledInput
+from ctrl_realize.numerics.engine.varpro import KnownFactor
 from ctrl_realize.numerics.output_error.any_input.condensed import MOST_LAGS, condensed
 from ctrl_realize.numerics.output_error.step_data import (
     StepData,
@@ -13,10 +17,6 @@ from ctrl_realize.numerics.output_error.step_data import (
     stop_at,
     window,
 )
-from ctrl_realize.numerics.separable.local_terms import local_columns
-from ctrl_realize.numerics.separable.profile_ends import profile_limits
-from ctrl_realize.numerics.separable.responses import SampledInput
-from ctrl_realize.numerics.separable.varpro import KnownFactor
 
 EDGE, DELAY, LAG, DT = 200, 40, 60.0, 0.5
 

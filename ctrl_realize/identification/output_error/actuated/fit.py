@@ -14,6 +14,9 @@ from ....numerics.actuated.choice import ActuatedFit, Rival, fit_actuated
 from ....numerics.actuated.errors import Errors, propagated
 from ....numerics.actuated.records import MOST_MOVES, ActuatedRecord, actuated_record
 from ....numerics.arrays import FloatArray, IntArray
+from ....numerics.engine.local_terms import Segments, local_columns
+from ....numerics.engine.structures import PLAUSIBLE, Scales
+from ....numerics.engine.varpro import Structure
 from ....numerics.output_error.any_input.stretch import WHITE
 from ....numerics.output_error.result import (
     DistributedLags,
@@ -24,9 +27,6 @@ from ....numerics.output_error.result import (
 )
 from ....numerics.output_error.step_data import bare_data, own_regressors
 from ....numerics.output_error.step_fit import ADEQUATE
-from ....numerics.separable.local_terms import Segments, local_columns
-from ....numerics.separable.structures import PLAUSIBLE, Scales
-from ....numerics.separable.varpro import Structure
 from ....numerics.signals.correlation import fit_percent
 from ....numerics.signals.noise import mad_sigma
 from ...step.steps import found_step

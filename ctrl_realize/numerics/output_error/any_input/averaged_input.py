@@ -27,7 +27,7 @@ from scipy.interpolate import BarycentricInterpolator
 from scipy.signal import lfilter
 
 from ...arrays import ComplexArray, FloatArray
-from ...separable.responses import TOGETHER, Modes
+from ...engine.responses import TOGETHER, Modes
 
 _NODES = 16
 _MOST_KEPT = 2**23  # numbers of all sums that are kept, to limit the memory

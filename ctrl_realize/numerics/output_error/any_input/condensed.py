@@ -37,8 +37,8 @@ from scipy.signal import fftconvolve, lfilter
 
 from ...arrays import ComplexArray, FloatArray
 from ...constants import HUBER
+from ...engine.responses import Modes, SampledInput
 from ...regression.normal_equations import NormalEquations, normal_equations
-from ...separable.responses import Modes, SampledInput
 from ...signals.excitation import lively_start
 from ...signals.noise import mad_sigma
 from ...signals.noise_model import MOST_LAGS as MOST_NOISE_LAGS

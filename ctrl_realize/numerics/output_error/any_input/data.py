@@ -13,9 +13,9 @@ import numpy as np
 from scipy.signal import lfilter
 
 from ...arrays import FloatArray, IntArray
-from ...separable.local_terms import Segments
-from ...separable.responses import HeldInput, SampledInput, SeveralInputs, StepSequence
-from ...separable.varpro import KnownFactor, Problem
+from ...engine.local_terms import Segments
+from ...engine.responses import HeldInput, SampledInput, SeveralInputs, StepSequence
+from ...engine.varpro import KnownFactor, Problem
 from ...signals.excitation import lively_start
 from .averaged_input import AveragedInput
 

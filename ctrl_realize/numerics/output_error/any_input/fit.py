@@ -25,13 +25,13 @@ from functools import partial
 import numpy as np
 
 from ...arrays import FloatArray
-from ...parameters.process_form import ProcessForm
-from ...separable.batch_search import fit_batch
-from ...separable.compared_fits import converged
-from ...separable.poles import parameters_from_poles
-from ...separable.structures import Candidate, neighbour_starts, parameter_bounds
-from ...separable.varpro import KnownFactor, Problem, Structure
-from ...separable.window import Window, WindowFit, extended
+from ...engine.batch_search import fit_batch
+from ...engine.compared_fits import converged
+from ...engine.poles import parameters_from_poles
+from ...engine.structures import Candidate, neighbour_starts, parameter_bounds
+from ...engine.varpro import KnownFactor, Problem, Structure
+from ...engine.window import Window, WindowFit, extended
+from ...families.process_form import ProcessForm
 from ...signals.correlation import fit_percent
 from ...signals.noise import correlation_time, winsorised_sigma
 from ...validation.own_response import OwnResponse

@@ -12,9 +12,9 @@ from typing import TypeAlias
 import numpy as np
 
 from ...arrays import FloatArray
-from ...separable.structures import Candidate
-from ...separable.varpro import KnownFactor, Structure
-from ...separable.window import WindowFit
+from ...engine.structures import Candidate
+from ...engine.varpro import KnownFactor, Structure
+from ...engine.window import WindowFit
 from ..result import UnweightedModel
 from .condensed import MOST_LAGS
 from .data import SampledData, cut

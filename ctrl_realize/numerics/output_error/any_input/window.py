@@ -20,12 +20,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ...arrays import FloatArray, without_gaps
-from ...separable.compared_fits import settled
-from ...separable.poles import poles_from_parameters
-from ...separable.static_gain import StaticGain
-from ...separable.structures import Candidate, Scales, search
-from ...separable.varpro import KnownFactor, Problem, Structure, evaluate, respond
-from ...separable.window import Window, WindowFit, fit_window
+from ...engine.compared_fits import settled
+from ...engine.poles import poles_from_parameters
+from ...engine.static_gain import StaticGain
+from ...engine.structures import Candidate, Scales, search
+from ...engine.varpro import KnownFactor, Problem, Structure, evaluate, respond
+from ...engine.window import Window, WindowFit, fit_window
 from ...signals.noise import quantisation_step, winsorised_sigma
 from ...signals.noise_model import noise_lags, whitening_filter
 from ...signals.onset import correlation_onset

@@ -97,3 +97,11 @@ def _separate(poles: ComplexArray) -> ComplexArray:
                 break
             poles[clash, j] *= 1 + _GAP
     return poles
+
+
+def lag_sum(poles: ComplexArray, numerator: FloatArray) -> float:
+    """Total delay of b(s)/a(s) without dead time: sum of its lags minus that of its leads, in s."""
+    lag = float(np.sum(-1.0 / poles).real)
+    if numerator.size > 1 and numerator[0] != 0:
+        lag -= float(numerator[1] / numerator[0])
+    return lag

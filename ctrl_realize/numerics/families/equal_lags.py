@@ -26,13 +26,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..arrays import ComplexArray, FloatArray
+from ..arrays import FloatArray
 from ..constants import Z_95
+from ..engine.compressed import compress, eliminate
+from ..engine.poles import lag_sum, parameters_from_poles
+from ..engine.structures import Candidate, Scales
+from ..engine.varpro import Problem, Structure
 from ..regression.marquardt import Damping, damped_step, descend
-from .compressed import compress, eliminate
-from .poles import parameters_from_poles
-from .structures import Candidate, Scales
-from .varpro import Problem, Structure
 
 SHORTEST, LONGEST = 4, 8
 """Shorter ones have few parameters when they are free; of longer ones rounding shows."""
@@ -187,14 +187,6 @@ def chain_limits(chain: LagChain, scales: Scales) -> tuple[float, float]:
     dead_time, half = chain.candidate.dead_time, Z_95 * chain.error
     low = max(dead_time - half - chain.truncated, scales.earliest)
     return low, min(dead_time + half, scales.latest)
-
-
-def lag_sum(poles: ComplexArray, numerator: FloatArray) -> float:
-    """Total delay of b(s)/a(s) without dead time: sum of its lags minus that of its leads, in s."""
-    lag = float(np.sum(-1.0 / poles).real)
-    if numerator.size > 1 and numerator[0] != 0:
-        lag -= float(numerator[1] / numerator[0])
-    return lag
 
 
 def time_moments(problem: Problem, like: Candidate) -> tuple[float, float]:

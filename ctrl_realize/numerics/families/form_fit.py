@@ -23,11 +23,11 @@ from scipy.optimize import least_squares
 
 from ..arrays import ComplexArray, FloatArray
 from ..constants import CHI2_95, SMALLEST, Z_95
-from ..separable.poles import parameters_from_poles
-from ..separable.profile import profile_curve, within_a_sample
-from ..separable.static_gain import INTEGRATOR
-from ..separable.structures import FASTEST, SLOWEST, Candidate, Scales
-from ..separable.varpro import Problem, respond
+from ..engine.poles import parameters_from_poles
+from ..engine.profile import profile_curve, within_a_sample
+from ..engine.static_gain import INTEGRATOR
+from ..engine.structures import FASTEST, SLOWEST, Candidate, Scales
+from ..engine.varpro import Problem, respond
 from .physical import ProcessParameter
 from .process_form import ProcessForm
 

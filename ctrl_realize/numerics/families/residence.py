@@ -29,7 +29,7 @@ from typing import Any
 import numpy as np
 from scipy.special import erfcx
 
-from ...arrays import ComplexArray, FloatArray
+from ..arrays import ComplexArray, FloatArray
 
 _DOUBLE = 1e-12
 """Instead of a square of q of 0, where a derivative is a quotient of two zeros."""

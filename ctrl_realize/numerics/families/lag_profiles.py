@@ -24,9 +24,9 @@ import numpy as np
 from scipy.optimize import brentq
 
 from ..constants import CHI2_95, SMALLEST, Z_95
-from ..separable.profile_ends import root_of
-from ..separable.structures import Scales
-from ..separable.varpro import Problem
+from ..engine.profile_ends import root_of
+from ..engine.structures import Scales
+from ..engine.varpro import Problem
 from .form_fit import FormSearch
 from .physical import ProcessParameter
 from .process_form import ProcessForm

@@ -18,12 +18,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...arrays import ComplexArray, FloatArray
-from ...regression.marquardt import Damping, damped_step, descend
-from ..newton import minimum
-from ..responses import StepSequence
-from ..structures import Scales
-from ..varpro import Problem, partial_fractions
+from ..arrays import ComplexArray, FloatArray
+from ..engine.newton import minimum
+from ..engine.responses import StepSequence
+from ..engine.structures import Scales
+from ..engine.varpro import Problem, partial_fractions
+from ..regression.marquardt import Damping, damped_step, descend
 from .residence import flow_modes
 
 _SPREADS = (0.1, 1.2)

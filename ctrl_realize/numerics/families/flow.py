@@ -16,13 +16,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...arrays import FloatArray
-from ..lag_chains import time_moments
-from ..profile_ends import solve_ends
-from ..responses import StepSequence
-from ..structures import PLAUSIBLE, Candidate, Scales
-from ..varpro import Problem
-from .least_squares import FlowProblem
+from ..arrays import FloatArray
+from ..engine.profile_ends import solve_ends
+from ..engine.responses import StepSequence
+from ..engine.structures import PLAUSIBLE, Candidate, Scales
+from ..engine.varpro import Problem
+from .equal_lags import time_moments
+from .flow_search import FlowProblem
 
 _CHARGE = 8.0
 """What a flow must be worth in the criterion: a few lags are more common. Ablation: charge for a

@@ -21,8 +21,7 @@ from scipy.special import ndtr, ndtri
 from ..arrays import ComplexArray, FloatArray
 from ..constants import SMALLEST, Z_95
 from .compressed import eliminate
-from .lag_chains import lag_sum
-from .poles import poles_from_parameters
+from .poles import lag_sum, poles_from_parameters
 from .structures import Candidate
 from .varpro import Problem, partial_fractions, responses
 

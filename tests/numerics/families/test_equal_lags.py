@@ -7,13 +7,13 @@ from scipy.integrate import quad
 from scipy.special import gammainc
 from scipy.stats import invgauss
 
+from ctrl_realize.numerics.engine.batch_search import fit_batch
+from ctrl_realize.numerics.engine.poles import parameters_from_poles
+from ctrl_realize.numerics.engine.structures import Candidate, parameter_bounds
+from ctrl_realize.numerics.engine.varpro import KnownFactor, Structure
+from ctrl_realize.numerics.families.equal_lags import fit_diffusion
+from ctrl_realize.numerics.families.residence import flow_modes
 from ctrl_realize.numerics.output_error.step_data import step_data, step_scales, window
-from ctrl_realize.numerics.separable.batch_search import fit_batch
-from ctrl_realize.numerics.separable.dispersion.residence import flow_modes
-from ctrl_realize.numerics.separable.lag_chains import fit_diffusion
-from ctrl_realize.numerics.separable.poles import parameters_from_poles
-from ctrl_realize.numerics.separable.structures import Candidate, parameter_bounds
-from ctrl_realize.numerics.separable.varpro import KnownFactor, Structure
 
 SIGMA = 1e-3
 

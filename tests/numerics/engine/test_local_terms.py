@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from ctrl_realize.numerics.separable.local_terms import FixedTerms, LocalTerms, Segments
-from ctrl_realize.numerics.separable.poles import poles_from_parameters
+from ctrl_realize.numerics.engine.local_terms import FixedTerms, LocalTerms, Segments
+from ctrl_realize.numerics.engine.poles import poles_from_parameters
 
 CLOCK = np.concatenate([np.arange(70.0), np.arange(110.0)])
 EDGES = np.array([0, 70, 180])

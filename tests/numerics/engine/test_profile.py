@@ -6,16 +6,16 @@ import numpy as np
 import pytest
 from scipy.optimize import least_squares
 
+from ctrl_realize.numerics.engine.batch_search import fit_batch
+from ctrl_realize.numerics.engine.compared_fits import at_dead_time, converged, on_new_data
+from ctrl_realize.numerics.engine.newton import settle, solve_level
+from ctrl_realize.numerics.engine.poles import parameters_from_poles
+from ctrl_realize.numerics.engine.polish import polish
+from ctrl_realize.numerics.engine.profile import dead_time_error, dead_time_profile
+from ctrl_realize.numerics.engine.profile_ends import profile_limits
+from ctrl_realize.numerics.engine.structures import Candidate, parameter_bounds, search
+from ctrl_realize.numerics.engine.varpro import KnownFactor, Structure, evaluate
 from ctrl_realize.numerics.output_error.step_data import step_data, step_scales, window
-from ctrl_realize.numerics.separable.batch_search import fit_batch
-from ctrl_realize.numerics.separable.compared_fits import at_dead_time, converged, on_new_data
-from ctrl_realize.numerics.separable.newton import settle, solve_level
-from ctrl_realize.numerics.separable.poles import parameters_from_poles
-from ctrl_realize.numerics.separable.polish import polish
-from ctrl_realize.numerics.separable.profile import dead_time_error, dead_time_profile
-from ctrl_realize.numerics.separable.profile_ends import profile_limits
-from ctrl_realize.numerics.separable.structures import Candidate, parameter_bounds, search
-from ctrl_realize.numerics.separable.varpro import KnownFactor, Structure, evaluate
 
 SIGMA, DEAD, LAGS = 0.01, 20.3, (12.0, 30.0)
 

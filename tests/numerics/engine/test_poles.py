@@ -4,16 +4,16 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from ctrl_realize.numerics.separable.poles import parameters_from_poles, poles_from_parameters
-from ctrl_realize.numerics.separable.responses import StepSequence
-from ctrl_realize.numerics.separable.structures import (
+from ctrl_realize.numerics.engine.poles import parameters_from_poles, poles_from_parameters
+from ctrl_realize.numerics.engine.responses import StepSequence
+from ctrl_realize.numerics.engine.structures import (
     PLAUSIBLE,
     Candidate,
     choose,
     needless_parameters,
     plausible,
 )
-from ctrl_realize.numerics.separable.varpro import Structure
+from ctrl_realize.numerics.engine.varpro import Structure
 
 
 def ordered(poles):

@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from ctrl_realize.numerics.separable.batch_search import fit_batch
-from ctrl_realize.numerics.separable.compressed import compress
-from ctrl_realize.numerics.separable.local_terms import Segments
-from ctrl_realize.numerics.separable.poles import parameters_from_poles
-from ctrl_realize.numerics.separable.responses import SampledInput, SeveralInputs, StepSequence
-from ctrl_realize.numerics.separable.structures import Scales, parameter_bounds, search
-from ctrl_realize.numerics.separable.varpro import (
+from ctrl_realize.numerics.engine.batch_search import fit_batch
+from ctrl_realize.numerics.engine.compressed import compress
+from ctrl_realize.numerics.engine.local_terms import Segments
+from ctrl_realize.numerics.engine.poles import parameters_from_poles
+from ctrl_realize.numerics.engine.responses import SampledInput, SeveralInputs, StepSequence
+from ctrl_realize.numerics.engine.structures import Scales, parameter_bounds, search
+from ctrl_realize.numerics.engine.varpro import (
     KnownFactor,
     Problem,
     Structure,

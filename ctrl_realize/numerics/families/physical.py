@@ -21,10 +21,10 @@ from typing import NamedTuple
 import numpy as np
 
 from ..arrays import ComplexArray, FloatArray
-from ..separable.poles import poles_from_parameters
-from ..separable.static_gain import INTEGRATOR, local_errors
-from ..separable.structures import Candidate
-from ..separable.varpro import Problem
+from ..engine.poles import poles_from_parameters
+from ..engine.static_gain import INTEGRATOR, local_errors
+from ..engine.structures import Candidate
+from ..engine.varpro import Problem
 
 _REAL = 1e-9  # relative imaginary part that is rounding
 

@@ -1,1 +1,0 @@
-"""Separable least squares for models with dead time."""

@@ -1,1 +1,0 @@
-"""Axial dispersion: responses of a flow that disperses, and its fit to a step record."""
