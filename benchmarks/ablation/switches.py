@@ -336,6 +336,10 @@ SWITCHES = (
         {f"{FITS}.step_data:StepData.coarse": lambda _: property(lambda _data: False)},
     ),
     Switch(
+        "noise that the model has taken",
+        {f"{STEP}:with_noise_of_residual": lambda _: lambda fit: fit},
+    ),
+    Switch(
         "correlation in units of weight",
         {f"{ENGINE}.window:weighted_correlation": lambda _: lambda time, _counted: time},
     ),

@@ -26,7 +26,7 @@ import numpy as np
 from ..arrays import FloatArray
 from ..constants import HUBER, SMALLEST
 from ..signals.bins import Bins
-from ..signals.noise import correlation_time, is_coarse, mad_sigma
+from ..signals.noise import correlation_of_noise, correlation_time, is_coarse, mad_sigma
 from .compared_fits import converged, on_new_data, settled
 from .local_terms import Segments
 from .responses import HeldInput
@@ -196,6 +196,22 @@ class WindowFit:
         """Information criterion of other candidates on the same data."""
         values = criteria(candidates, self.variance, self.independent)
         return {s: value + self.problem.local_count(s.order) for s, value in values.items()}
+
+
+def with_noise_of_residual(fit: WindowFit) -> WindowFit:
+    """Correct the noise of a fit for what its model has taken from slow noise.
+
+    For a residual that is noise: that of a misfit tells no noise. Ablation: noise that the model
+    has taken.
+    """
+    structure, window = fit.best.structure, fit.window
+    parameters = 1 + structure.order + structure.zeros + window.columns.shape[1]
+    parameters += fit.problem.local_count(structure.order)
+    count = window.output.size - window.start
+    correlation, missing = correlation_of_noise(fit.correlation, parameters / count)
+    sigma = fit.sigma / float(np.sqrt(1.0 - missing))
+    fit = replace(fit, sigma=sigma, correlation=correlation)
+    return replace(fit, criterion=fit.criteria(fit.candidates))
 
 
 def weighted_correlation(correlation: float, counted: float) -> float:

@@ -71,7 +71,7 @@ from ..engine.structures import (
     choose,
 )
 from ..engine.varpro import KnownFactor, Structure, evaluate, respond
-from ..engine.window import WindowFit, among, fit_window
+from ..engine.window import WindowFit, among, fit_window, with_noise_of_residual
 from ..families.equal_lags import LagChain
 from ..families.flow import DispersedFlow
 from ..families.physical import without_errors
@@ -179,6 +179,8 @@ def _given_structures(
     others = other_structures(fits, lambda: fit(data, data.output.size, ALL_STRUCTURES))
     if adequate and whiten:
         fits = in_coloured_noise(fits, data)
+    if adequate and fits.colour is None:
+        fits = with_noise_of_residual(fits)
     if forms:
         level = max(ADEQUATE * data.colour, fits.normalized_rms if adequate else 0.0)
         return process_fit(fits, forms, is_noise=lambda rms, _: rms <= level, others=others,
@@ -197,6 +199,8 @@ def _free_choice(
     noisy = _at_noise_level(data, plain)
     if noisy is not None:
         fits = in_coloured_noise(noisy, data) if whiten else noisy
+        if fits.colour is None:
+            fits = with_noise_of_residual(fits)
         chains = chains_of(fits)
         likely = likelihood_fit(
             fits,

@@ -173,6 +173,38 @@ def correlation_time(residual: FloatArray) -> float:
     return time if time > 1.5 else 1.0
 
 
+_LOST_OF_NOISE = np.linspace(1e-9, 0.43, 200)
+"""Part c of the variance of slow noise that a model takes, up to where the other grows no more."""
+_SEEN_OF_NOISE = _LOST_OF_NOISE * (
+    1.0 + _LOST_OF_NOISE * np.log(_LOST_OF_NOISE) / (1.0 - _LOST_OF_NOISE)
+)
+"""The same computed with the correlation time of the residual; see `correlation_of_noise`."""
+
+
+def correlation_of_noise(correlation: float, parameters: float) -> tuple[float, float]:
+    """Correlation time of noise whose residual has one of `correlation`, and its variance lost.
+
+    A model with p parameters takes part c = p tau / n of the variance of noise that is correlated
+    over tau of n samples, and lowers all its autocorrelations by c (our own computation). Those of
+    a first-order autoregression, less c, are positive up to lag ``ln c / ln rho``, and sum to
+
+        tau (1 + c ln c / (1 - c)).
+
+    Noise that is slower than the record tells (c above 0.43) cannot be told from a misfit.
+
+    Parameters
+    ----------
+    correlation : float
+        Correlation time of the residual, in samples; 1 if it is white.
+    parameters : float
+        Estimated parameters over samples.
+    """
+    if correlation <= 1.0:
+        return correlation, 0.0
+    lost = float(np.interp(parameters * correlation, _SEEN_OF_NOISE, _LOST_OF_NOISE))
+    return max(lost / parameters, correlation), lost
+
+
 def kept_in_blocks(residual: FloatArray, length: int) -> float:
     """Fraction of the variance of slow means that remains in blocks of `length` samples.
 
