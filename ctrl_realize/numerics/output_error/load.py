@@ -36,7 +36,6 @@ from ..engine.compressed import eliminate
 from ..engine.polish import polish
 from ..engine.static_gain import local_errors
 from ..engine.structures import (
-    ALL_STRUCTURES,
     PLAUSIBLE,
     SIMPLE_STRUCTURES,
     Candidate,
@@ -85,6 +84,7 @@ def load_of(
     data: StepData,
     fits: WindowFit,
     refit: Callable[..., WindowFit],
+    free: Callable[[], WindowFit],
     is_noise: Callable[[StepData, WindowFit, Candidate], bool],
 ) -> tuple[LoadStep, FloatArray] | None:
     """Find a step of a load that moved the output as well.
@@ -99,6 +99,8 @@ def load_of(
         Without load.
     refit : callable
         Fit of the data up to a sample by some structures.
+    free : callable
+        Fit of the default structures without load.
     is_noise : callable
         Whether the residual of a candidate is at noise level.
 
@@ -107,13 +109,11 @@ def load_of(
     tuple of LoadStep and ndarray, shape (N,), or None
         The load, and its part of the output; None if the evidence is not very strong.
     """
+    # Of few structures none may be right.
+    few = len(fits.candidates) < len(SIMPLE_STRUCTURES)
+    if few and (not is_noise(data, fits, fits.best) or _suspects(data, fits)):
+        fits = free()
     found = _found(data, fits)
-    few: Sequence[Structure] = ALL_STRUCTURES
-    if found is not None and len(fits.candidates) < len(SIMPLE_STRUCTURES):
-        # Of few structures none may be right.
-        few = SIMPLE_STRUCTURES
-        fits = refit(data, data.output.size, few)
-        found = _found(data, fits)
     if found is None or found.evidence <= 0:
         return None
     load, loaded = found.load, data.with_load(found.load, found.part)
@@ -125,7 +125,7 @@ def load_of(
     early = since < _TOLD_APART * rise
     if since < _SOONEST * rise or load.lag > _MOST_LAG * (data.clock[-1] - load.time):
         return None
-    also = refit(loaded, data.output.size, few)
+    also = refit(loaded, data.output.size, tuple(fits.candidates))
     error = also.window.output - also.window.predict(also.problem, also.best)
     white = also.correlation == 1.0
     least = PLAUSIBLE if white and not early else _IN_SLOW_NOISE
@@ -147,13 +147,15 @@ class _Found:
 
 def _found(data: StepData, fits: WindowFit) -> _Found | None:
     """LoadStep that explains a record best; None if the score test finds nothing."""
-    start = data.edges[0][0] * data.dt + fits.scales.onset + _FIRST * fits.scales.rise
-    ends = start, float(data.clock[-1]) - _LAST * data.length
-    if fits.problem.segments is not None or _grid(fits, data.clock, ends)[0].size < _FEWEST_TIMES:
-        return None
-    suspects = _suspects(fits, data.clock, ends, data.sigma * data.colour)
-    found = [_followed(fits, one, data.clock, ends) for one in suspects]
+    ends = _ends(data, fits)
+    found = [_followed(fits, one, data.clock, ends) for one in _suspects(data, fits)]
     return max(found, key=lambda one: one.evidence, default=None)
+
+
+def _ends(data: StepData, fits: WindowFit) -> tuple[float, float]:
+    """Times between which a load is looked for."""
+    start = data.edges[0][0] * data.dt + fits.scales.onset + _FIRST * fits.scales.rise
+    return start, float(data.clock[-1]) - _LAST * data.length
 
 
 def _evidence(fits: WindowFit, error: FloatArray, structure: Structure) -> float:
@@ -182,14 +184,15 @@ def _innovations(error: FloatArray) -> FloatArray:
     return np.concatenate([first, error[1:] - along * error[:-1]])
 
 
-def _suspects(
-    fits: WindowFit, clock: FloatArray, ends: tuple[float, float], noise: float
-) -> list[Candidate]:
+def _suspects(data: StepData, fits: WindowFit) -> list[Candidate]:
     """Score test: models about which a load would lower the criterion; none if it is noise."""
+    clock, noise = data.clock, data.sigma * data.colour
+    grid = _grid(fits, clock, _ends(data, fits))
+    if fits.problem.segments is not None or grid[0].size < _FEWEST_TIMES:
+        return []
     best, problem = fits.best, fits.window.problem
     plain = float(evaluate(problem, best.structure, best.parameters[None]).cost[0])
     tried = [s for s in fits.candidates if s.zeros <= 1 and s.order <= _SIMPLE]
-    grid = _grid(fits, clock, ends)
     found = []
     for s in dict.fromkeys((*tried, best.structure)):
         left, _ = _scan(fits, fits.candidates[s], clock, *grid)

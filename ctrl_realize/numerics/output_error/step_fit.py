@@ -58,7 +58,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from functools import partial
+from functools import cache, partial
 
 import numpy as np
 
@@ -148,7 +148,8 @@ def fit_step_record(
     data, fits = fitted_from_rest(
         data, fit, ALL_STRUCTURES if structures is None else tuple(structures)
     )
-    loaded = None if data.load is not None else load_of(data, fits, fit, _is_noise)
+    free = cache(partial(fit, data, data.output.size, ALL_STRUCTURES))
+    loaded = None if data.load is not None else load_of(data, fits, fit, free, _is_noise)
     if loaded is not None and not loaded[0].early:
         data, found = fit_step_record(
             given.with_load(*loaded),
@@ -163,20 +164,20 @@ def fit_step_record(
     if structures is None:
         found = _free_choice(data, fits, fit, whiten)
     else:
-        found = _given_structures(data, fits, fit, forms, whiten)
+        found = _given_structures(data, fits, free, forms, whiten)
     return data, found if loaded is None else replace(found, load=loaded[0])
 
 
 def _given_structures(
     data: StepData,
     fits: WindowFit,
-    fit: Callable[..., WindowFit],
+    free: Callable[[], WindowFit],
     forms: Sequence[ProcessForm],
     whiten: bool,
 ) -> OutputErrorEstimate:
     """Estimate the dead time by the likelihood of the best of given structures, adequate or not."""
     adequate, near = _is_noise(data, fits, fits.best), _close_to_noise(data, fits)
-    others = other_structures(fits, lambda: fit(data, data.output.size, ALL_STRUCTURES))
+    others = other_structures(fits, free)
     if adequate and whiten:
         fits = in_coloured_noise(fits, data)
     if adequate and fits.colour is None:
