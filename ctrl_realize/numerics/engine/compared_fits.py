@@ -35,7 +35,7 @@ from .structures import (
     pattern_starts,
     plausible,
 )
-from .varpro import Bounds, Problem, Structure
+from .varpro import Bounds, Family, Problem, Structure
 
 REACH = 3 * PLAUSIBLE
 """Excess of the criterion up to which structures are followed to their minima. Of measured records
@@ -134,6 +134,8 @@ def _in_order(problem: Problem, candidate: Candidate, bounds: Bounds) -> Candida
 
     Otherwise a fit that starts here, of a profile for instance, would depend on it.
     """
+    if isinstance(candidate.structure, Family):
+        return candidate
     x = np.append(candidate.dead_time, parameters_from_poles(candidate.poles))
     if np.any(x < bounds.low) or np.any(x > bounds.high):
         return candidate

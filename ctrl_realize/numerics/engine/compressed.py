@@ -27,7 +27,7 @@ from ..arrays import ComplexArray, FloatArray
 from .local_terms import solve_upper
 from .poles import poles_from_parameters
 from .responses import StepSequence
-from .varpro import Problem, Structure, evaluate, moved_amplitudes, partial_fractions
+from .varpro import Family, Problem, Structure, evaluate, moved_amplitudes, partial_fractions
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,7 +41,7 @@ class Compressed:
 
 def compress(problem: Problem, structure: Structure, parameters: FloatArray) -> Compressed:
     """Eliminate the linear terms at parameters (B, 1 + n); see `varpro.evaluate`."""
-    if not _compressible(problem):
+    if not _compressible(problem, structure):
         state = evaluate(problem, structure, parameters)
         return Compressed(state.residual, state.jacobian, state.cost)
     n = structure.order
@@ -78,7 +78,7 @@ class Eliminated:
 
 def eliminate(problem: Problem, structure: Structure, parameters: FloatArray) -> Eliminated:
     """Eliminate the linear terms, and leave derivatives aside."""
-    if not _compressible(problem):
+    if not _compressible(problem, structure):
         state = evaluate(problem, structure, parameters)
         return Eliminated(state.cost, state.numerator)
     poles, _ = poles_from_parameters(parameters[:, 1:])
@@ -89,8 +89,9 @@ def eliminate(problem: Problem, structure: Structure, parameters: FloatArray) ->
     return Eliminated(np.add.reduce(residual * residual, axis=1), numerator)
 
 
-def _compressible(problem: Problem) -> bool:
-    return problem.real and problem.segments is None and not problem.known.poles.size
+def _compressible(problem: Problem, structure: Structure) -> bool:
+    plain = problem.real and problem.segments is None and not problem.known.poles.size
+    return plain and not isinstance(structure, Family)
 
 
 def _eliminated(

@@ -81,7 +81,8 @@ def profile_points(
 ) -> Points:
     """Best models for a grid of dead times that brackets the ends of the interval."""
     half = _EDGE * dead_time_error(problem, candidate, variance)
-    low, high = scales.earliest, scales.latest
+    structure, bounds = candidate.structure, parameter_bounds(candidate.structure, scales)
+    low, high = float(bounds.low[0]), float(bounds.high[0])
     grid = np.linspace(low, high, _FAR)
     if np.isfinite(half):
         grid = np.concatenate([candidate.dead_time + half * _NEAR, grid])
@@ -89,7 +90,6 @@ def profile_points(
     grid = np.unique(np.clip(grid, low, high))
     starts = np.tile(candidate.parameters, (grid.size, 1))
     starts[:, 0] = grid
-    structure, bounds = candidate.structure, parameter_bounds(candidate.structure, scales)
     level = candidate.cost + CHI2_95 * variance
 
     def followed(starts: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -172,7 +172,8 @@ def within_a_sample(candidate: Candidate, scales: Scales) -> FloatArray:
 
 
 def _jumps(candidate: Candidate, scales: Scales) -> bool:
-    return scales.bounds is None and float(np.abs(candidate.poles).max()) * scales.dt > JUMP
+    fastest = float(np.abs(candidate.poles).max(initial=0.0))
+    return scales.bounds is None and fastest * scales.dt > JUMP
 
 
 def _jump_sample(candidate: Candidate, scales: Scales) -> float:

@@ -23,7 +23,7 @@ from ..constants import SMALLEST, Z_95
 from .compressed import eliminate
 from .poles import lag_sum, poles_from_parameters
 from .structures import Candidate
-from .varpro import Problem, partial_fractions, responses
+from .varpro import Family, Problem, partial_fractions, responses
 
 INTEGRATOR = 5e-3
 """Poles slower than this, times the length of the record, cannot be distinguished from integrators:
@@ -34,6 +34,7 @@ SIGNIFICANT = Z_95  # standard errors: a gain of less may as well be none, or ha
 _STEP = 1e-4  # of logarithms, and part of a numerator: for slopes by differences
 _TOGETHER = 2**16  # samples of responses that are found at a time
 _HALVINGS = 60  # of an interval, until a double has no more digits
+_ROUNDED = 1e-7  # part of a derivative that differences leave of nothing
 _NOTHING = 1e-13  # part of the largest singular value that is rounding
 
 
@@ -97,8 +98,8 @@ def static_gain(
     length : float
         Duration of the record after the change of the input, in s.
     """
-    theta = candidate.parameters
-    numerator = eliminate(problem, candidate.structure, theta[None]).numerator[0]
+    theta = candidate.theta
+    numerator = eliminate(problem, candidate.structure, candidate.parameters[None]).numerator[0]
     point = np.concatenate([theta, numerator])
     moves = _moves(candidate, numerator, length)
 
@@ -133,10 +134,12 @@ class LocalErrors:
 
     `slopes` (m, p) are the weighted derivatives of the model with respect to dead time, pole
     parameters and numerator, `own` (m, q) the columns of the terms that are estimated with it.
+    Along the `tangent` (p, j) of a family these may change; the slopes (m, j) are then along it.
     """
 
     slopes: FloatArray
     own: FloatArray
+    tangent: FloatArray | None = None
 
     def std(self, gradient: FloatArray, variance: float) -> FloatArray:
         """Standard errors (k,) of functions with these gradients (k, p), by the delta method.
@@ -144,6 +147,10 @@ class LocalErrors:
         Parameters that none of them depends on, like the slowness of a pole that is taken for an
         integrator, are no unknowns.
         """
+        if self.tangent is not None:
+            size = np.abs(gradient) @ np.abs(self.tangent)
+            gradient = gradient @ self.tangent
+            gradient[np.abs(gradient) < _ROUNDED * size] = 0.0
         seen = np.any(gradient != 0, axis=0)
         columns = np.concatenate([self.slopes[:, seen], self.own], axis=1)
         size = np.linalg.norm(columns, axis=0)
@@ -157,7 +164,13 @@ class LocalErrors:
 def local_errors(
     problem: Problem, candidate: Candidate, numerator: FloatArray, length: float
 ) -> LocalErrors:
-    """Derivatives of a model with respect to its parameters, by differences."""
+    """Derivatives of a model with respect to its parameters, by differences.
+
+    Those of a family are its own.
+    """
+    if isinstance(candidate.structure, Family):
+        slopes, tangent = candidate.structure.directions(problem, candidate.parameters)
+        return LocalErrors(slopes, slopes[:, :0], tangent)
     theta = candidate.parameters
     moves = _moves(candidate, numerator, length)
     # A dead time is not negative: the derivatives at zero are those slightly later.
@@ -183,7 +196,7 @@ def _moves(candidate: Candidate, numerator: FloatArray, length: float) -> FloatA
     steps = np.concatenate(
         [
             [_STEP * min(1 / float(np.abs(candidate.poles).max()), length)],
-            np.full(candidate.parameters.size - 1, _STEP),
+            np.full(candidate.theta.size - 1, _STEP),
             _STEP * np.maximum(np.abs(numerator), _STEP * largest),
         ]
     )

@@ -25,7 +25,7 @@ from ..arrays import ComplexArray, FloatArray
 from ..constants import SMALLEST
 from .batch_search import fit_batch
 from .poles import parameters_from_poles, poles_from_parameters
-from .varpro import Bounds, Problem, Structure
+from .varpro import Bounds, Family, Problem, Structure
 
 ALL_STRUCTURES = tuple(Structure(n, r) for n in range(1, 6) for r in range(n, 0, -1))
 """Further lags are those of a chain or a flow: free ones could not be distinguished."""
@@ -106,7 +106,12 @@ class Candidate:
     @property
     def poles(self) -> ComplexArray:
         """Poles in 1/s."""
-        return np.asarray(poles_from_parameters(self.parameters[None, 1:])[0][0])
+        return np.asarray(poles_from_parameters(self.theta[None, 1:])[0][0])
+
+    @property
+    def theta(self) -> FloatArray:
+        """Dead time and pole parameters, shape (1 + n,)."""
+        return self.structure.theta(self.parameters)
 
 
 def search(
@@ -176,6 +181,8 @@ def parameter_bounds(structure: Structure, scales: Scales) -> Bounds:
     With zeros they are at least half a sample: with more freedom such a model imitates an
     oscillation that was sampled too coarsely.
     """
+    if isinstance(structure, Family):
+        return structure.bounds
     order = structure.order
     if scales.bounds is not None:
         return scales.bounds(order)
@@ -209,7 +216,7 @@ def criteria(
     penalty = parameter_charge(samples)
     # A constant record has no noise, and nothing to compare.
     variance = max(variance, SMALLEST)
-    return {s: c.cost / variance + (s.order + s.zeros + 2) * penalty for s, c in candidates.items()}
+    return {s: c.cost / variance + (s.free + 2) * penalty for s, c in candidates.items()}
 
 
 def parameter_charge(samples: float) -> float:
@@ -256,7 +263,7 @@ def plausible(
 def charged(criterion: dict[Structure, float], penalty: float) -> dict[Structure, float]:
     """Criterion with at least the penalty per parameter used for ruling out."""
     more = max(LEAST_CHARGE - penalty, 0.0)
-    return {s: value + more * (s.order + s.zeros) for s, value in criterion.items()}
+    return {s: value + more * s.free for s, value in criterion.items()}
 
 
 def needless_parameters(structure: Structure) -> float:

@@ -18,10 +18,13 @@ References
    doi:10.1137/0710036.
 .. [3] G. Golub and V. Pereyra, Separable nonlinear least squares: the variable projection method
    and its applications, Inverse Problems 19 (2003) R1-R26, doi:10.1088/0266-5611/19/2/201.
+.. [4] L. Ljung, System Identification: Theory for the User, 2nd ed., Prentice Hall 1999, section
+   4.5 (model structures as differentiable mappings).
 """
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
@@ -108,6 +111,20 @@ class Structure:
         """Number of zeros, n - r."""
         return self.order - self.relative_degree
 
+    @property
+    def free(self) -> int:
+        """Number of free parameters beside dead time and gain."""
+        return self.order + self.zeros
+
+    @property
+    def plain(self) -> Structure:
+        """Structure of which order and relative degree are all that is given."""
+        return Structure(self.order, self.relative_degree)
+
+    def theta(self, parameters: FloatArray) -> FloatArray:
+        """Dead time and pole parameters (1 + n,) of one model: the parameters themselves."""
+        return parameters
+
 
 @dataclass(frozen=True, eq=False)
 class Bounds:
@@ -141,8 +158,36 @@ class Evaluation:
         return np.asarray(np.einsum("bm,bm->b", self.residual, self.residual))
 
 
+@dataclass(frozen=True, eq=False)
+class Family(Structure, ABC):
+    """Model structure with few parameters (k,), the first of which is the dead time.
+
+    A differentiable map from the parameters to models, as in [4]_; `bounds` are theirs.
+    """
+
+    bounds: Bounds
+
+    # Two families of one order differ.
+    __eq__ = object.__eq__
+    __hash__ = object.__hash__
+
+    @abstractmethod
+    def directions(self, problem: Problem, x: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Directions j in which a model x (k,) may change.
+
+        Its weighted derivatives (m, j), orthogonal to the terms that are estimated with it, and
+        those of `theta` and numerator (1 + n + z + 1, j).
+        """
+
+    @abstractmethod
+    def evaluate(self, problem: Problem, parameters: FloatArray) -> Evaluation:
+        """Eliminate the linear terms at parameters (B, k)."""
+
+
 def evaluate(problem: Problem, structure: Structure, parameters: FloatArray) -> Evaluation:
     """Eliminate the linear terms at parameters (B, 1 + n)."""
+    if isinstance(structure, Family):
+        return structure.evaluate(problem, parameters)
     n, count = structure.order, structure.zeros + 1
     batch = parameters.shape[0]
     free, dfree = poles_from_parameters(parameters[:, 1:])

@@ -107,7 +107,7 @@ class Window:
         if self.bins is None:
             # The samples are the data of the problem, all with weight 1.
             return np.asarray(problem.data - state.residual[0])
-        setting = problem.known, state.numerator[0], candidate.parameters
+        setting = problem.known, state.numerator[0], candidate.theta
         model = respond(self.drive, *setting)
         model += self.columns @ state.regression[0]
         if self.own is not None:

@@ -6,8 +6,8 @@ in series they are nearly equal, as in Strejc's method: here, spread evenly arou
 diffusion of heat or matter they grow as (k - c)^2, with c between 0 and 1/2 depending on the
 boundaries.
 
-Tanks follow [1]_, diffusion [2]_ (eigenvalues of a slab), steps [3]_; the spread of the rates and
-the penalty on a kind of chain are our own.
+Tanks follow [1]_, diffusion [2]_ (eigenvalues of a slab); the spread of the rates and the penalty
+on a kind of chain are our own.
 
 References
 ----------
@@ -15,8 +15,6 @@ References
    (1959) 124-128.
 .. [2] H. S. Carslaw and J. C. Jaeger, Conduction of Heat in Solids, 2nd ed., Oxford University
    Press 1959, chapter 3 (Linear flow of heat in the solid bounded by two parallel planes).
-.. [3] D. W. Marquardt, An algorithm for least-squares estimation of nonlinear parameters, J. SIAM
-   11 (1963) 431-441, doi:10.1137/0111030.
 """
 
 from __future__ import annotations
@@ -28,11 +26,12 @@ import numpy as np
 
 from ..arrays import FloatArray
 from ..constants import Z_95
-from ..engine.compressed import compress, eliminate
-from ..engine.poles import lag_sum, parameters_from_poles
+from ..engine.compressed import eliminate
+from ..engine.poles import lag_sum
+from ..engine.profile import dead_time_error
 from ..engine.structures import Candidate, Scales
-from ..engine.varpro import Problem, Structure
-from ..regression.marquardt import Damping, damped_step, descend
+from ..engine.varpro import Bounds, Problem, Structure
+from .shaped import LagFamily, Mapped, lowest, paired
 
 SHORTEST, LONGEST = 4, 8
 """Shorter ones have few parameters when they are free; of longer ones rounding shows."""
@@ -42,10 +41,6 @@ FREE_IN_A_CHAIN = 2
 
 _DIFFUSION_CHARGE = 8.0
 """Two lags far apart look like diffusion, and are more common. Ablation: charge for diffusion."""
-_ITERATIONS = 60  # at most
-_CONVERGED = 1e-13  # gain over the cost at which a fit ends, as rounding allows
-_DAMPING = Damping(rise=10.0, fall=10.0, tries=12)  # usual factors: Marquardt (1963)
-_SMALL = 1e-4  # step of the numerical derivatives of pole parameters
 _WORSE = 100.0  # in the criterion: a longer chain will not come back from there
 
 
@@ -64,38 +59,50 @@ class LagChain:
     truncated: float = 0.0
 
 
-@dataclass(frozen=True, eq=False)
-class _Point:
-    """Dead time, logarithm of the lag and shape; parameters of the model and what it leaves."""
-
-    x: FloatArray
-    parameters: FloatArray
-    residual: FloatArray
-    jacobian: FloatArray
-    cost: float
-
-
 @dataclass(frozen=True)
 class _Law:
-    """Law of the rates of a chain: ``rates(order, shape)``, and the bounds of the shape."""
+    """Law of the rates of a chain, and the bounds of the shape.
 
-    rates: Callable[[int, float], FloatArray]
+    ``rates(order, shape)`` are logarithms of the rates (n,), and their derivatives.
+    """
+
+    rates: Callable[[int, float], tuple[FloatArray, FloatArray]]
     low: float
     first: float
     high: float
 
 
-def _spread_rates(order: int, square: float) -> FloatArray:
+def _spread_rates(order: int, square: float) -> tuple[FloatArray, FloatArray]:
     # The square of half the range, because the response is an even function of the range.
-    return np.asarray(1 + np.sqrt(square) * np.linspace(-1, 1, order))
+    half, away = float(np.sqrt(square)), np.linspace(-1, 1, order)
+    return np.log1p(half * away), away / (2 * half * (1 + half * away))
 
 
-def _diffusion_rates(order: int, shift: float) -> FloatArray:
-    return np.asarray(((np.arange(1, order + 1) - shift) / (1 - shift)) ** 2)
+def _diffusion_rates(order: int, shift: float) -> tuple[FloatArray, FloatArray]:
+    number = np.arange(1, order + 1) - shift
+    return 2 * np.log(number / (1 - shift)), 2 / (1 - shift) - 2 / number
 
 
 _TANKS = _Law(_spread_rates, 0.08**2, 0.1**2, 0.5**2)  # partial fractions need distinct poles
 _DIFFUSION = _Law(_diffusion_rates, 0.0, 0.25, 0.5)
+
+
+@dataclass(frozen=True, eq=False)
+class _Chain(LagFamily):
+    """Lags that follow a law, over x = (dead time, logarithm of a lag, shape)."""
+
+    law: _Law
+
+    def mapped(self, x: FloatArray) -> Mapped:
+        """Model with gain 1, and its derivatives."""
+        rates, by_shape = self.law.rates(self.order, float(x[2]))
+        slopes = np.column_stack([np.zeros(self.order), -np.ones(self.order), by_shape])
+        theta, dtheta = paired(rates - x[1], slopes)
+        level = np.array([np.exp(np.sum(rates - x[1]))])
+        return Mapped(
+            np.append(x[0], theta), np.append(np.eye(1, 3), dtheta, axis=0),
+            level, level * slopes.sum(axis=0)[None],
+        )  # fmt: skip
 
 
 def fit_chains(
@@ -207,77 +214,17 @@ def _chain(
     penalty: float,
 ) -> LagChain:
     mean, spread = moments
-    lags = 1 / law.rates(order, law.first)
+    lags = np.exp(-law.rates(order, law.first)[0])
     lag = float(np.sqrt(spread / (lags @ lags)))
-    start = np.array([mean - lag * float(lags.sum()), np.log(lag), law.first])
-    candidate, x = _fit(problem, order, law, start, scales)
-    value = candidate.cost / variance + (FREE_IN_A_CHAIN + 2) * penalty
-    value += problem.local_count(order)
-    return LagChain(candidate, value, _error(problem, candidate, law, x, variance))
-
-
-def _fit(
-    problem: Problem, order: int, law: _Law, start: FloatArray, scales: Scales
-) -> tuple[Candidate, FloatArray]:
-    """Levenberg-Marquardt in dead time, logarithm of the lag, and shape."""
-    structure = Structure(order, order)
-    low = np.array([scales.earliest, -np.inf, law.low])
-    high = np.array([scales.latest, np.inf, law.high])
-
-    def at(x: FloatArray) -> _Point:
-        parameters, residual, jacobian = _evaluate(problem, structure, law, x)
-        return _Point(x, parameters, residual, jacobian, float(residual @ residual))
-
-    def linearised(here: _Point) -> Callable[[float], _Point]:
-        normal, downhill = here.jacobian.T @ here.jacobian, here.jacobian.T @ here.residual
-        free = ~((here.x <= low) & (downhill < 0) | (here.x >= high) & (downhill > 0))
-
-        def ahead(damping: float) -> _Point:
-            step = np.zeros(3)
-            step[free] = damped_step(normal[np.ix_(free, free)], downhill[free], damping)
-            return at(np.clip(here.x + step / max(1.0, abs(float(step[1]))), low, high))
-
-        return ahead
-
-    best, _ = descend(
-        at(np.clip(start, low, high)),
-        linearised,
-        lambda gain, here: gain < _CONVERGED * here.cost,
-        _DAMPING,
-        _ITERATIONS,
+    start = np.array([[mean - lag * float(lags.sum()), np.log(lag), law.first]])
+    # A response that begins with the fourth power of the time has no kinks.
+    bounds = Bounds(
+        np.array([scales.earliest, -np.inf, law.low]),
+        np.array([scales.latest, np.inf, law.high]),
+        smooth=True,
     )
-    return Candidate(structure, best.parameters, best.cost), best.x
-
-
-def _error(
-    problem: Problem, candidate: Candidate, law: _Law, x: FloatArray, variance: float
-) -> float:
-    """Standard error of the dead time."""
-    jacobian = _evaluate(problem, candidate.structure, law, x)[2]
-    size = np.sqrt((jacobian**2).sum(axis=0))
-    if size[0] == 0:
-        return float("inf")
-    size[size == 0] = 1.0
-    on_dead_time = np.linalg.pinv(jacobian / size)[0] / size[0]
-    return float(np.sqrt(variance * (on_dead_time @ on_dead_time)))
-
-
-def _evaluate(
-    problem: Problem, structure: Structure, law: _Law, x: FloatArray
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Parameters, residual, and its derivatives w.r.t. dead time, log of the lag, and shape."""
-    order = structure.order
-    rates = law.rates(order, x[2]) * np.exp(-x[1])
-    parameters = np.append(x[:1], _parameters(rates))
-    state = compress(problem, structure, parameters[None])
-    by_dead_time, by_poles = state.jacobian[0][:, :1], state.jacobian[0][:, 1:]
-    inwards = -_SMALL if x[2] + _SMALL > law.high else _SMALL
-    slower = _parameters(rates * np.exp(-_SMALL))
-    reshaped = _parameters(law.rates(order, x[2] + inwards) * np.exp(-x[1]))
-    moves = [(slower - parameters[1:]) / _SMALL, (reshaped - parameters[1:]) / inwards]
-    columns = by_poles @ np.stack(moves, axis=1)
-    return parameters, state.residual[0], np.concatenate([by_dead_time, columns], axis=1)
-
-
-def _parameters(rates: FloatArray) -> FloatArray:
-    return parameters_from_poles(-rates.astype(np.complex128))
+    fit = lowest(problem, _Chain(order, order, bounds, (-np.inf, np.inf), law), start, scales.dt)
+    value = fit.cost / variance + (FREE_IN_A_CHAIN + 2) * penalty
+    value += problem.local_count(order)
+    error = dead_time_error(problem, fit, variance)
+    return LagChain(Candidate(Structure(order, order), fit.theta, fit.cost), value, error)

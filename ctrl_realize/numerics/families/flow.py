@@ -1,4 +1,4 @@
-"""Fit of the axial-dispersion model to a step record, and the profile of its dead time.
+"""Axial dispersion behind a dead time: the family of models, and its fit to a step record.
 
 Three or four lags with a longer dead time have the same response as a flow that disperses [1]_ to
 within the noise, which no residual shows; in a fit to the same record, dispersion needs two
@@ -12,45 +12,152 @@ References
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
-from ..arrays import FloatArray
-from ..engine.profile_ends import solve_ends
+from ..arrays import ComplexArray, FloatArray
+from ..engine.compressed import eliminate
 from ..engine.responses import StepSequence
 from ..engine.structures import PLAUSIBLE, Candidate, Scales
-from ..engine.varpro import Problem
+from ..engine.varpro import Bounds, KnownFactor, Problem, moved_amplitudes, partial_fractions
 from .equal_lags import time_moments
-from .flow_search import FlowProblem
+from .residence import flow_modes
+from .shaped import ShapedFamily, UnitResponse, lowest
 
 _CHARGE = 8.0
 """What a flow must be worth in the criterion: a few lags are more common. Ablation: charge for a
 flow."""
 _MINOR = 0.5  # of the lag behind it: a flow that spreads by less is no different from a second lag
 _FOLLOWED = 3  # starts that are improved: time
-_SAME = 0.1  # variances by which two ends are one
-_HOPELESS = 300.0  # above what is to be beaten, after the first of them: time
 _REACH = 3 * PLAUSIBLE  # excess up to which a flow is followed to its minimum
-_PROFILE = np.array([0.7, 1.2, 1.7, 2.3, 3.2])  # standard errors from the optimum
+_SPREADS = (0.1, 1.2)
+"""Standard deviations over means: narrower is no different from many lags, wider from few."""
+_DELAYS, _LAGS = (0.0, 0.4, 0.7, 0.95), (0.05, 0.3, 0.6, 0.9)
+"""Starts: parts of a dead time that is too long, and of the whole spread in time."""
+
+
+@dataclass(frozen=True, eq=False)
+class FlowFamily(ShapedFamily):
+    """Dispersion over x = (dead time, log mean, log spread, log lag), times in s.
+
+    The last is missing if no lag is in series; `order` is 1 if there is one.
+    """
+
+    def theta(self, parameters: FloatArray) -> FloatArray:
+        """Dead time, without poles: a flow has none."""
+        return parameters[:1]
+
+    def tangent(self, x: FloatArray, gain: float) -> FloatArray:
+        """Derivatives of dead time and gain, all that it has of a rational model."""
+        return np.eye(x.size + 1)[[0, -1]]
+
+    def times(self, x: FloatArray) -> tuple[float, float, float, float]:
+        """Dead time, mean, spread and lag; all but the spread in s."""
+        mean, spread, *lag = (float(value) for value in np.exp(x[1:]))
+        return float(x[0]), mean, spread, lag[0] if lag else 0.0
+
+    def response(self, problem: Problem, x: FloatArray) -> UnitResponse:
+        """Unit response in means over the bins (m,), by Simpson's rule for wide bins, and slopes.
+
+        Where samples are missing, in means over two times, as in `StepSequence`. The slopes
+        (m, k) are derivatives with respect to the parameters.
+        """
+        drive = problem.drive
+        assert isinstance(drive, StepSequence)
+        sampled = partial(self._sampled, drive, problem.known, x)
+        if drive.samples is not None:
+            early, late = (sampled(drive.first + node) for node in drive.nodes)
+            total = (early + late) / 2
+        else:
+            wide = drive.width > 1
+            span = drive.lengths[wide]
+            since = np.concatenate(
+                [drive.first, drive.first[wide] + span / 2, drive.first[wide] + span]
+            )
+            every = sampled(since)
+            total, middle, end = np.split(every, [wide.size, wide.size + span.size])
+            total[wide] = (total[wide] + 4 * middle + end) / 6
+        none = np.empty((0, x.size), dtype=np.complex128)
+        return UnitResponse(total[:, 0], total[:, 1:], np.ones(1), none[:, 0], none)
+
+    def _sampled(
+        self, drive: StepSequence, known: KnownFactor, x: FloatArray, times: FloatArray
+    ) -> FloatArray:
+        """Unit response and its slopes at given times, shape (m, 1 + k)."""
+        weights = self._residues(known, x)
+        moves = zip(drive.moves, drive.sizes, strict=True)
+        return np.asarray(sum(size * self._step(times - move, x, *weights) for move, size in moves))
+
+    def _step(
+        self,
+        time: FloatArray,
+        x: FloatArray,
+        poles: ComplexArray,
+        residues: ComplexArray,
+        slopes: ComplexArray,
+    ) -> FloatArray:
+        """Step response of the flow, the lag and the known dynamics, and its slopes."""
+        dead_time, mean, spread, lag = self.times(x)
+        response = np.zeros((time.size, 1 + x.size))
+        begun = time > dead_time
+        modes = flow_modes(time[begun] - dead_time, mean, spread, poles)
+        response[begun, 0] = (modes.values @ residues).real
+        response[begun, 1] = -(modes.by_time @ residues).real
+        response[begun, 2] = (modes.by_mean @ residues).real
+        response[begun, 3] = (modes.by_spread @ residues).real
+        if lag:
+            # The pole is minus the inverse of the lag.
+            moved = modes.by_pole[:, -2] * residues[-2] / lag
+            response[begun, 4] = (modes.values @ slopes + moved).real
+        return response
+
+    def _residues(
+        self, known: KnownFactor, x: FloatArray
+    ) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
+        """Poles behind the flow, the lag's and that of the step last; residues in a step response.
+
+        The third are derivatives of the residues with respect to the logarithm of the lag.
+        """
+        lag = self.times(x)[3]
+        poles = np.append(known.poles, [-1 / lag] if lag else [])[None]
+        residues, gain, moved = partial_fractions(poles, known.numerator, 1)
+        level = np.array([[1 / lag if lag else 1.0]])
+        amplitudes = residues[:, :, 0] * level
+        slopes = np.zeros_like(amplitudes)
+        if lag:
+            slopes = moved_amplitudes(poles, amplitudes, moved, level)[:, :, -1] / lag - amplitudes
+        return (
+            np.append(poles, 0.0),
+            np.append(amplitudes, gain * level[0]),
+            np.append(slopes, 0.0),
+        )
 
 
 @dataclass(frozen=True, eq=False)
 class DispersedFlow:
     """Best fit of dispersion with a dead time; times in s.
 
-    `mean` is that of the residence time, `spread` its standard deviation over the mean, `lag` the
-    time constant in series, 0 if there is none. `criterion` includes the penalty on dispersion,
-    `delta_bic` is its difference from the best lags.
+    `fit` has the parameters of the family, `mean` is that of the residence time, `spread` its
+    standard deviation over the mean, `lag` the time constant in series, 0 if there is none.
+    `criterion` includes the penalty on dispersion, `delta_bic` is its difference from the best
+    lags.
     """
 
+    fit: Candidate
     dead_time: float
     mean: float
     spread: float
     lag: float
-    cost: float
     criterion: float
     delta_bic: float
+
+    @property
+    def cost(self) -> float:
+        """Weighted sum of squares."""
+        return self.fit.cost
 
     @property
     def parameters(self) -> int:
@@ -99,74 +206,39 @@ def fit_flows(
     mean, square = time_moments(problem, like)
     if not square > scales.dt**2:
         return []
-    target = like.dead_time, mean, float(np.sqrt(square))
-    lagging = FlowProblem(problem, problem.drive, scales, True)
-    flows = _followed(lagging, target, variance, penalty, level)
-    # Without the lag the sum of squares is no smaller: only a parameter can be saved.
-    if flows and flows[0].delta_bic - penalty <= PLAUSIBLE:
-        plain = FlowProblem(problem, problem.drive, scales, False)
-        flows += _followed(plain, target, variance, penalty, level)
+    flows: list[DispersedFlow] = []
+    time = np.log(0.1 * scales.dt), np.log(3 * scales.length)
+    for lagging in (True, False):
+        # Without the lag the sum of squares is no smaller: only a parameter can be saved.
+        if not lagging and flows[0].delta_bic - penalty > PLAUSIBLE:
+            break
+        low, high = (
+            np.array([dead_time, time[end], np.log(_SPREADS[end]), *[time[end]] * lagging])
+            for end, dead_time in enumerate((scales.earliest, scales.latest))
+        )
+        bounds = Bounds(low, high, smooth=True)
+        family = FlowFamily(int(lagging), int(lagging), bounds, (-np.inf, np.inf))
+        starts = np.array(list(_starts(family, like.dead_time, mean, float(np.sqrt(square)))))
+        promising = starts[np.argsort(eliminate(problem, family, starts).cost)[:_FOLLOWED]]
+        charge = (family.bounds.low.size + 1) * penalty + _CHARGE
+        fit = lowest(problem, family, promising, scales.dt, (level + _REACH - charge) * variance)
+        criterion = fit.cost / variance + charge
+        flows.append(
+            DispersedFlow(fit, *family.times(fit.parameters), criterion, criterion - level)
+        )
     return [flow for flow in flows if flow.spread * flow.mean >= _MINOR * flow.lag]
 
 
-def _followed(
-    fit: FlowProblem,
-    target: tuple[float, float, float],
-    variance: float,
-    penalty: float,
-    level: float,
-) -> list[DispersedFlow]:
-    """Follow the most promising starts while one may reach the level; return the best, if any."""
-    best: DispersedFlow | None = None
-    for start in sorted(fit.starts(*target), key=fit.cost)[:_FOLLOWED]:
-        x = fit.improved(start)
-        cost = fit.cost(x)
-        again = best is not None and abs(cost - best.cost) < _SAME * variance
-        if best is None or cost < best.cost:
-            criterion = cost / variance + fit.count * penalty + _CHARGE
-            best = DispersedFlow(*fit.times(x), cost, criterion, criterion - level)
-        if again or best.delta_bic > _HOPELESS:
-            break
-    if best is not None and best.delta_bic <= _REACH:
-        # Everything that is compared with a limit has converged.
-        x = fit.improved(fit.parameters(*_times(best)), converged=True)
-        cost = fit.cost(x)
-        criterion = cost / variance + fit.count * penalty + _CHARGE
-        best = DispersedFlow(*fit.times(x), cost, criterion, criterion - level)
-    return [] if best is None else [best]
-
-
-def flow_profile(
-    problem: Problem, flow: DispersedFlow, scales: Scales, variance: float
-) -> tuple[FloatArray, FloatArray]:
-    """Misfit over the dead time, as `dead_time_profile`."""
-    assert isinstance(problem.drive, StepSequence)
-    fit = FlowProblem(problem, problem.drive, scales, flow.lag > 0)
-    best = fit.parameters(*_times(flow))
-    low, high = (float(bound[0]) for bound in fit.bounds)
-    found = {float(best[0]): best}
-    error = fit.dead_time_error(best, variance)
-    for side in (-1, 1):
-        x = best
-        for distance in _PROFILE:
-            at = float(np.clip(best[0] + side * distance * error, low, high))
-            if at in found:
-                break
-            x = found[at] = fit.improved(np.append(at, x[1:]), True, True)
-    costs = {at: fit.cost(x) for at, x in found.items()}
-    least = min(costs.values())
-
-    def excess(at: float) -> float:
-        near = min(found, key=lambda other: abs(other - at))
-        found[at] = fit.improved(np.append(at, found[near][1:]), True, True)
-        costs[at] = fit.cost(found[at])
-        return (costs[at] - least) / variance
-
-    solve_ends(excess, {at: (cost - least) / variance for at, cost in costs.items()})
-    dead_time = np.array(sorted(costs))
-    cost = np.array([costs[at] for at in dead_time])
-    return dead_time * scales.rise, (cost - cost.min()) / variance
-
-
-def _times(flow: DispersedFlow) -> tuple[float, float, float, float]:
-    return flow.dead_time, flow.mean, flow.spread, flow.lag
+def _starts(
+    family: FlowFamily, dead_time: float, mean: float, deviation: float
+) -> Iterator[FloatArray]:
+    """Divide mean and variance in time between dead time, dispersion and lag."""
+    lagging, bounds = bool(family.order), family.bounds
+    for part in _DELAYS:
+        for share in _LAGS if lagging else (0.0,):
+            lag = share * deviation
+            residence = mean - part * dead_time - lag
+            if residence > 0:
+                spread = np.sqrt(deviation**2 - lag**2) / residence
+                logs = np.log([residence, spread, *[lag] * lagging])
+                yield np.clip(np.append(part * dead_time, logs), bounds.low, bounds.high)

@@ -1,201 +1,170 @@
-"""Fit of a process model of a prescribed form.
+"""Fit of a process model of a prescribed form: a family of lags, by the engine.
 
-Bounded nonlinear least squares [1]_; level, drift and other terms that enter linearly are
-eliminated (variable projection [2]_).
+Level, drift, gain and other terms that enter linearly are eliminated (variable projection [1]_).
+Standard errors by the delta method [2]_.
 
 References
 ----------
-.. [1] M. A. Branch, T. F. Coleman and Y. Li, A subspace, interior, and conjugate gradient method
-   for large-scale bound-constrained minimization problems, SIAM J. Sci. Comput. 21 (1999) 1-23,
-   doi:10.1137/S1064827595289108.
-.. [2] G. Golub and V. Pereyra, Separable nonlinear least squares: the variable projection method
+.. [1] G. Golub and V. Pereyra, Separable nonlinear least squares: the variable projection method
    and its applications, Inverse Problems 19 (2003) R1-R26, doi:10.1088/0266-5611/19/2/201.
+.. [2] E. L. Lehmann and G. Casella, Theory of Point Estimation, 2nd ed., Springer 1998, section 1.8
+   (the delta method), doi:10.1007/b98854.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 
 import numpy as np
-from scipy.optimize import least_squares
 
-from ..arrays import ComplexArray, FloatArray
-from ..constants import CHI2_95, SMALLEST, Z_95
-from ..engine.poles import parameters_from_poles
-from ..engine.profile import profile_curve, within_a_sample
-from ..engine.static_gain import INTEGRATOR
+from ..arrays import FloatArray
+from ..constants import SMALLEST
+from ..engine.static_gain import INTEGRATOR, LocalErrors
 from ..engine.structures import FASTEST, SLOWEST, Candidate, Scales
-from ..engine.varpro import Problem, respond
+from ..engine.varpro import Bounds, Problem
 from .physical import ProcessParameter
 from .process_form import ProcessForm
+from .shaped import LagFamily, Mapped, lowest, paired
 
 _LEAST_DAMPING = 0.005  # as in `parameter_bounds`
-_MOST_TURNS = 60  # of a search, each about the evaluations of a gradient
-_STEP = 1e-6  # relative, for derivatives at the optimum
 _AT_BOUND = 1e-4  # part of a parameter by which it may be away from a bound that it is at
-_NEAR = np.array([-3, -1.7, -1.2, -0.9, 0.9, 1.2, 1.7, 3])  # in half intervals, for a profile
-_FAR = 9  # points of a profile all over the range
 
 
 @dataclass(frozen=True, eq=False)
-class FormFit:
-    """Best model of a form.
+class FormFamily(LagFamily):
+    """Models of a form: dead time, logarithms of time constants and damping, lead over the rise."""
 
-    `candidate` has its dead time and poles, `numerator` its numerator, `parameters` values and
-    standard errors: 0 where they are fixed, NaN at a bound (``at_bound``). `profile` are dead times
-    and the excess of the misfit there. `free` is the number of free parameters.
-    """
-
-    form: ProcessForm
-    candidate: Candidate
-    numerator: FloatArray
-    parameters: tuple[ProcessParameter, ...]
-    profile: tuple[FloatArray, FloatArray]
-    at_bound: tuple[str, ...]
-    total_std: float
-    free: int
-
-
-@dataclass(frozen=True, eq=False)
-class FormSearch:
-    """Least squares over some of the parameters; lags and times in logarithms."""
-
-    problem: Problem
     form: ProcessForm
     scales: Scales
-    gain_scale: float
+    at_bound: tuple[str, ...] = ()
 
-    @cached_property
-    def limits(self) -> dict[str, tuple[float, float]]:
-        """Bounds of the parameters, those that were asked for or wide ones."""
-        scales, form = self.scales, self.form
-        lag = 1.0 / FASTEST * scales.dt, scales.length / INTEGRATOR
-        wide = {
-            "gain": (-np.inf, np.inf),
-            "dead_time": (scales.earliest, scales.latest) if form.dead_time else (0.0, 0.0),
-            "pair_time_1": lag,
-            "pair_damping_1": (_LEAST_DAMPING, 1.0),
-            "lead_1": (-1e3 * scales.length, 1e3 * scales.length),
-        }
-        wide |= {name: lag for name in form.names if name.startswith("lag_")}
-        wide |= form.bounds
-        wide |= {name: (value, value) for name, value in form.fixed.items()}
-        return {name: wide[name] for name in form.names}
+    @property
+    def varied(self) -> tuple[str, ...]:
+        """Names of the parameters that are neither fixed nor at a bound; the gain comes last."""
+        fixed = [*self.form.fixed, *self.at_bound]
+        fixed += [] if self.form.dead_time else ["dead_time"]
+        return tuple(name for name in (*self.names, "gain") if name not in fixed)
 
-    def model(self, values: Mapping[str, float]) -> tuple[Candidate, FloatArray]:
-        """Dead time and poles, and numerator."""
-        form = self.form
-        lags = [values[name] for name in form.names if name.startswith("lag_")]
-        roots: list[complex] = [-1.0 / lag for lag in lags]
-        if form.pair:
-            size, damping = 1.0 / values["pair_time_1"], min(values["pair_damping_1"], 1.0)
-            swing = size * np.sqrt(1.0 - damping**2)
-            roots += [complex(-size * damping, swing), complex(-size * damping, -swing)]
-        monic = values["gain"] * float(np.prod(-np.array(roots, dtype=np.complex128)).real)
+    @property
+    def free(self) -> int:
+        """Number of free parameters beside dead time and gain."""
+        return len(self.varied) - 2
+
+    def directions(self, problem: Problem, x: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Derivatives of model, and of `theta` and numerator, by the parameters that vary."""
+        slopes, tangent = super().directions(problem, x)
+        varied = [(*self.names, "gain").index(name) for name in self.varied]
+        return slopes[:, varied], tangent[:, varied]
+
+    def parameters(
+        self, problem: Problem, x: FloatArray, variance: float
+    ) -> tuple[ProcessParameter, ...]:
+        """Values by name, with their standard errors: 0 where they are fixed, NaN at a bound."""
+        values, sizes = self.values(x)
+        values["gain"] = self.linearised(problem, x).gain
+        scale = dict(zip(self.names, sizes, strict=True)) | {"gain": 1.0}
+        slopes, _ = self.directions(problem, x)
+        gradient = np.diag([scale[name] for name in self.varied])
+        errors = LocalErrors(slopes, slopes[:, :0]).std(gradient, variance)
+        std = dict.fromkeys(self.form.fixed, 0.0) | dict.fromkeys(self.at_bound, float("nan"))
+        std |= dict(zip(self.varied, map(float, errors), strict=True))
+        shown = [name for name in self.form.names if name in std]
+        return tuple(ProcessParameter(name, values[name], std[name]) for name in shown)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the parameters x; the gain is not among them."""
+        return self.form.names[1:]
+
+    def mapped(self, x: FloatArray) -> Mapped:
+        """Model with gain 1, and its derivatives."""
+        form, every = self.form, np.eye(x.size)
+        lags = slice(1, 1 + form.lags)
+        rates, slopes = -x[lags], -every[lags]
+        growth, dgrowth = float(rates.sum()), slopes.sum(axis=0)
         if form.integrator:
-            roots.append(-SLOWEST / self.scales.length)
-        numerator = np.array([monic, monic * values["lead_1"]] if form.lead else [monic])
-        poles: ComplexArray = np.array(roots, dtype=np.complex128)
-        theta = np.concatenate([[values["dead_time"]], parameters_from_poles(poles)])
-        return Candidate(form.structure, theta, 0.0), numerator
+            rates = np.append(rates, np.log(SLOWEST / self.scales.length))
+            slopes = np.append(slopes, np.zeros((1, x.size)), axis=0)
+        theta, dtheta = paired(rates, slopes)
+        if form.pair:
+            first, at = theta.size % 2, form.lags + 1
+            theta = np.insert(theta, first, [-x[at], x[at + 1]])
+            dtheta = np.insert(dtheta, first, [-every[at], every[at + 1]], axis=0)
+            growth, dgrowth = growth - 2 * x[at], dgrowth - 2 * every[at]
+        # The numerator of a monic denominator.
+        level = np.exp(growth)
+        numerator, dnumerator = np.array([level]), level * dgrowth[None]
+        if form.lead:
+            lead, by_lead = x[-1] * self.scales.rise, every[-1] * self.scales.rise
+            numerator = np.array([level, level * lead])
+            dnumerator = level * np.stack([dgrowth, lead * dgrowth + by_lead])
+        return Mapped(np.append(x[0], theta), np.append(every[:1], dtheta, axis=0), numerator,
+                      dnumerator)  # fmt: skip
 
-    def residual(self, values: Mapping[str, float]) -> FloatArray:
-        """Weighted residual (m,) without the terms that enter linearly."""
-        return self._residual(values)[0]
+    def coordinates(self, values: Mapping[str, float]) -> FloatArray:
+        """Parameters x (k,) of values by name."""
+        return np.array([_coordinate(name, values[name], self.scales) for name in self.names])
 
-    def _residual(self, values: Mapping[str, float]) -> tuple[FloatArray, float]:
-        """Residual (m,), and the gain, which is the best one if it is not given."""
-        candidate, numerator = self.model({"gain": 1.0, **values})
-        problem = self.problem
-        model = respond(problem.drive, problem.known, numerator, candidate.parameters)
-        left = problem.weighted(np.stack([problem.data, model], axis=1))
-        if problem.segments is not None:
-            terms = problem.local_terms(candidate.poles[None])
-            fixed = problem.weighted(problem.regressors)
-            both = terms.without(np.concatenate([left, fixed], axis=1)[None])[0]
-            left, basis = both[:, :2], np.linalg.qr(both[:, 2:])[0]
-        else:
-            basis = self._basis
-        data, unit = (left - basis @ (basis.T @ left)).T
-        if "gain" in values:
-            return np.asarray(data - unit), values["gain"]
-        gain = float(data @ unit / max(unit @ unit, SMALLEST))
-        return np.asarray(data - gain * unit), gain
+    def values(self, x: FloatArray) -> tuple[dict[str, float], FloatArray]:
+        """Values by name, and their derivatives with respect to x (k,)."""
+        unit = np.array([_unit(name, self.scales) for name in self.names])
+        value = np.where(np.isfinite(unit), x * np.where(np.isfinite(unit), unit, 1), np.exp(x))
+        slope = np.where(np.isfinite(unit), unit, value)
+        return dict(zip(self.names, map(float, value), strict=True)), slope
 
-    @cached_property
-    def _basis(self) -> FloatArray:
-        return np.asarray(np.linalg.qr(self.problem.weighted(self.problem.regressors))[0])
 
-    def coordinate(self, name: str, value: float) -> float:
-        """Coordinate of the search for a parameter: logarithms of times, others scaled."""
-        if name == "gain":
-            return value / self.gain_scale
-        if name in ("dead_time", "lead_1"):
-            return value / self.scales.rise
-        return float(np.log(value)) if value > 0 else -np.inf
+def form_family(form: ProcessForm, scales: Scales) -> FormFamily:
+    """Family of a form, with the bounds that were asked for, or wide ones."""
+    wide = _limits(form, scales)
+    low, high = (
+        np.array([_coordinate(name, wide[name][end], scales) for name in form.names[1:]])
+        for end in (0, 1)
+    )
+    structure = form.structure
+    return FormFamily(
+        structure.order, structure.relative_degree, Bounds(low, high), wide["gain"], form, scales
+    )
 
-    def value(self, name: str, coordinate: float) -> float:
-        """Inverse of `coordinate`."""
-        if name == "gain":
-            return float(coordinate * self.gain_scale)
-        if name in ("dead_time", "lead_1"):
-            return float(coordinate * self.scales.rise)
-        return float(np.exp(coordinate))
 
-    def solve(
-        self,
-        start: Mapping[str, float],
-        fixed: Mapping[str, float] | None = None,
-        exact: float = 1e-12,
-    ) -> tuple[dict[str, float], float]:
-        """Best values from a start, and their sum of squares, `exact` to a part of it.
+def _limits(form: ProcessForm, scales: Scales) -> dict[str, tuple[float, float]]:
+    lag = scales.dt / FASTEST, scales.length / INTEGRATOR
+    lead = 1e3 * scales.length
+    wide = {
+        "gain": (-np.inf, np.inf),
+        "dead_time": (scales.earliest, scales.latest) if form.dead_time else (0.0, 0.0),
+        "pair_damping_1": (_LEAST_DAMPING, 1.0),
+        "lead_1": (-lead, lead),
+    }
+    limits = {}
+    for name in form.names:
+        low, high = wide.get(name, lag)
+        if name in form.fixed:
+            low = high = form.fixed[name]
+        elif name in form.bounds:
+            first, last = form.bounds[name]
+            # Of a time that may be zero or endless as of one that has no bounds.
+            logarithmic = name not in ("gain", "dead_time", "lead_1")
+            low = low if logarithmic and first <= 0 else first
+            high = high if not np.isfinite(last) and name != "gain" else last
+        limits[name] = low, high
+    return limits
 
-        `fixed` ones stay.
-        """
-        held = {name: low for name, (low, high) in self.limits.items() if low == high}
-        held |= fixed or {}
-        names = [name for name in self.form.names if name not in held]
-        if not np.isfinite(self.limits["gain"]).any():
-            names.remove("gain")  # enters linearly
-        if not names:
-            return self._with_gain(held)
-        low, high = (
-            np.array([self.coordinate(name, self.limits[name][end]) for name in names])
-            for end in (0, 1)
-        )
-        first = np.array([self.coordinate(name, start[name]) for name in names])
-        margin = 1e-9 * np.maximum(np.abs(first), 1.0)
-        first = np.clip(first, low + margin, np.maximum(high - margin, low + margin))
 
-        def left(x: FloatArray) -> FloatArray:
-            pairs = zip(names, x, strict=True)
-            return self.residual(held | {name: self.value(name, at) for name, at in pairs})
+def _unit(name: str, scales: Scales) -> float:
+    """Size of the coordinate of a parameter in s; infinite for a logarithm."""
+    return {"dead_time": 1.0, "lead_1": scales.rise}.get(name, np.inf)
 
-        found = least_squares(
-            left, first, bounds=(low, high), x_scale="jac", max_nfev=_MOST_TURNS,
-            xtol=1e-10, ftol=exact, gtol=1e-12,
-        )  # fmt: skip
-        return self._with_gain(
-            held | {name: self.value(name, at) for name, at in zip(names, found.x, strict=True)}
-        )
 
-    def _with_gain(self, values: dict[str, float]) -> tuple[dict[str, float], float]:
-        """Add the gain, and the sum of squares."""
-        left, gain = self._residual(values)
-        return values | {"gain": gain}, float(left @ left)
+def _coordinate(name: str, value: float, scales: Scales) -> float:
+    unit = _unit(name, scales)
+    return value / unit if np.isfinite(unit) else float(np.log(value))
 
 
 def fit_form(
-    problem: Problem,
-    form: ProcessForm,
-    scales: Scales,
-    like: Sequence[Candidate],
-    numerators: Sequence[FloatArray],
-    variance: float,
-) -> FormFit:
-    """Fit a process model of a prescribed form.
+    problem: Problem, form: ProcessForm, scales: Scales, like: Sequence[Candidate]
+) -> Candidate:
+    """Fit a process model of a prescribed form, a `FormFamily`.
 
     Parameters
     ----------
@@ -204,66 +173,35 @@ def fit_form(
     scales : Scales
     like : sequence of Candidate
         Models without the prescriptions, from which the search starts.
-    numerators : sequence of ndarray
-        Of these.
-    variance : float
-        Of the noise, per sample.
     """
-    gains = []
-    for one, numerator in zip(like, numerators, strict=True):
-        moving = one.poles[np.abs(one.poles) * scales.length >= INTEGRATOR]
-        gains.append(float(numerator[0] / np.prod(-moving).real))
-    search = FormSearch(problem, form, scales, max(abs(gains[0]), SMALLEST))
-    starts = [_start(form, one, gain, scales) for one, gain in zip(like, gains, strict=True)]
-    starts += [{**one, "dead_time": 0.5 * one["dead_time"]} for one in starts]
-    tried = [search.solve({**one, **form.start}) for one in starts]
-    values, cost = min(tried, key=lambda pair: pair[1])
-    values, cost = search.solve(values)
-    alike = form.free_lags
-    values |= dict(zip(alike, sorted((values[name] for name in alike), reverse=True), strict=True))
-    names = [
-        name
-        for name, (low, high) in search.limits.items()
-        if low < high and not _at_end(values[name], low, high)
-    ]
-    at_bound = tuple(
-        name for name, (low, high) in search.limits.items() if low < high and name not in names
-    )
-    covariance = _covariance(search, values, names, variance)
-    std = {name: float(np.sqrt(covariance[i, i])) for i, name in enumerate(names)}
-    std |= dict.fromkeys(form.fixed, 0.0)
-    if not form.dead_time:
-        std["dead_time"] = 0.0
-    shown = [name for name in form.names if form.dead_time or name != "dead_time"]
-    candidate, numerator = search.model(values)
-    total = np.array([_in_total(name, values) for name in names])
-    return FormFit(
-        form=form,
-        candidate=Candidate(form.structure, candidate.parameters, cost),
-        numerator=numerator,
-        parameters=tuple(
-            ProcessParameter(name, values[name], std.get(name, float("nan"))) for name in shown
-        ),
-        profile=_profile(search, values, cost, std.get("dead_time", 0.0), variance),
-        at_bound=at_bound,
-        total_std=float(np.sqrt(total @ covariance @ total)),
-        free=len(names),
-    )
+    family = form_family(form, scales)
+    starts = [family.coordinates({**_start(form, c, scales), **form.start}) for c in like]
+    every = np.array(starts + starts)
+    if "dead_time" not in form.start:
+        every[len(starts) :, 0] *= 0.5
+    best = lowest(problem, family, every, scales.dt)
+    x = best.parameters
+    alike = [family.names.index(name) for name in form.free_lags]
+    x[alike] = np.sort(x[alike])[::-1]
+    values = family.values(x)[0] | {"gain": family.linearised(problem, x).gain}
+    limits = _limits(form, scales).items()
+    ends = tuple(n for n, (low, high) in limits if low < high and _at_end(values[n], low, high))
+    return Candidate(replace(family, at_bound=ends), x, best.cost)
 
 
-def _start(form: ProcessForm, like: Candidate, gain: float, scales: Scales) -> dict[str, float]:
+def _start(form: ProcessForm, like: Candidate, scales: Scales) -> dict[str, float]:
     """Parameters of the form that are closest to a model without prescriptions."""
     poles = like.poles[np.abs(like.poles) * scales.length >= INTEGRATOR]
     lags = sorted((float(1.0 / abs(p)) for p in poles), reverse=True)
     lags = lags or [scales.rise]
     if form.integrator and poles.size == like.poles.size:
         # a slow lag is taken for the integrator: K / (T s + 1) begins like (K / T) / s
-        gain, lags = gain / lags[0], lags[1:] or [0.3 * scales.rise]
+        lags = lags[1:] or [0.3 * scales.rise]
     elif not form.integrator and poles.size < like.poles.size:
-        gain, lags = gain * 3 * scales.length, [3 * scales.length, *lags]
+        lags = [3 * scales.length, *lags]
     needed = form.lags + 2 * form.pair
     lags = [*lags, *(0.2 * lags[-1] * 0.7**i for i in range(needed))][:needed]
-    found = {"gain": gain, "dead_time": like.dead_time, "lead_1": 0.1 * scales.rise}
+    found = {"dead_time": like.dead_time, "lead_1": 0.1 * scales.rise}
     if form.pair:
         pair, lags = lags[:2], lags[2:]
         swinging = like.poles[like.poles.imag > 0]
@@ -275,58 +213,3 @@ def _start(form: ProcessForm, like: Candidate, gain: float, scales: Scales) -> d
 def _at_end(value: float, low: float, high: float) -> bool:
     size = _AT_BOUND * max(abs(value), abs(low) if np.isfinite(low) else 0.0, SMALLEST)
     return value - low <= size or high - value <= size
-
-
-def _covariance(
-    search: FormSearch, values: Mapping[str, float], names: Sequence[str], variance: float
-) -> FloatArray:
-    if not names:
-        return np.zeros((0, 0))
-    columns = []
-    for name in names:
-        step = _STEP * max(
-            abs(values[name]),
-            1e-3 * search.scales.rise if name in ("dead_time", "lead_1") else SMALLEST,
-        )
-        ahead, behind = (
-            search.residual({**values, name: values[name] + way * step}) for way in (1, -1)
-        )
-        columns.append((behind - ahead) / (2 * step))
-    jacobian = np.stack(columns, axis=1)
-    size = np.linalg.norm(jacobian, axis=0)
-    size[size == 0] = SMALLEST
-    scaled = jacobian / size
-    return np.asarray(variance * np.linalg.pinv(scaled.T @ scaled) / np.outer(size, size))
-
-
-def _in_total(name: str, values: Mapping[str, float]) -> float:
-    """Derivative of the total delay with respect to a parameter."""
-    if name == "pair_time_1":
-        return 2 * values["pair_damping_1"]
-    if name == "pair_damping_1":
-        return 2 * values["pair_time_1"]
-    return {"gain": 0.0, "lead_1": -1.0}.get(name, 1.0)
-
-
-def _profile(
-    search: FormSearch, values: Mapping[str, float], cost: float, std: float, variance: float
-) -> tuple[FloatArray, FloatArray]:
-    """Misfit of the best model for each of a range of dead times, as in `dead_time_profile`."""
-    low, high = search.limits["dead_time"]
-    at = values["dead_time"]
-    best = replace(search.model(values)[0], cost=cost)
-    points = {at: best}
-    if low < high:
-        grid = np.concatenate([np.linspace(low, high, _FAR), within_a_sample(best, search.scales)])
-        if np.isfinite(std) and std > 0:
-            grid = np.concatenate([grid, at + Z_95 * std * _NEAR])
-        ahead = sorted({float(x) for x in np.clip(grid, low, high) if x > at})
-        behind = sorted({float(x) for x in np.clip(grid, low, high) if x < at}, reverse=True)
-        for path in (ahead, behind):
-            near = dict(values)
-            for dead_time in path:
-                near, there = search.solve(near, {"dead_time": dead_time})
-                points[dead_time] = replace(search.model(near)[0], cost=there)
-                if there > cost + 30 * CHI2_95 * variance:
-                    break
-    return profile_curve(points, best, max(variance, SMALLEST), search.scales)

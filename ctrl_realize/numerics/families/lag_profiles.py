@@ -17,25 +17,25 @@ References
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.optimize import brentq
 
-from ..constants import CHI2_95, SMALLEST, Z_95
+from ..arrays import FloatArray
+from ..constants import CHI2_95, Z_95
 from ..engine.profile_ends import root_of
 from ..engine.structures import Scales
-from ..engine.varpro import Problem
-from .form_fit import FormSearch
+from ..engine.varpro import Bounds, Problem
+from .form_fit import FormFamily, form_family
 from .physical import ProcessParameter
 from .process_form import ProcessForm
+from .shaped import lowest
 
 _EDGE = float(np.sqrt(CHI2_95))
 _STEP, _WIDER = 0.2, 2.0  # of a search for an end: largest first step in the logarithm, its growth
-_WIDE = 1 + 1e-6  # ratio of bounds between which there is something to search
 _EXACT = 0.02  # of the step in which an end lies, to which it is solved
-_COST = 1e-3  # variances of the noise, to which a cost is solved
 
 
 def with_profiled_lags(
@@ -61,16 +61,19 @@ def with_profiled_lags(
     free = form.free_lags
     if variance <= 0 or all(one.name not in free or _alone(one, lags) for one in lags):
         return tuple(found)
-    values = {one.name: one.value for one in found} | dict(form.fixed)
-    values = {"dead_time": 0.0} | values
-    base = FormSearch(problem, form, scales, max(abs(values["gain"]), SMALLEST))
-    least = float(np.sum(base.residual(values) ** 2))
-    std = {one.name: one.std if np.isfinite(one.std) else np.inf for one in lags}
+    family = form_family(form, scales)
+    values = {"dead_time": 0.0} | {one.name: one.value for one in found} | dict(form.fixed)
+    x = family.coordinates(values)
+    least = float(np.sum(family.linearised(problem, x).residual ** 2))
+    order = [family.names.index(name) for name in free]
     ends = {}
-    for name in free:
-        step = float(np.clip(1.1 * Z_95 * std[name] / values[name], _EXACT * _STEP, _STEP))
-        profile = _Profile(base, name, free, values, least, variance, step)
-        ends[name] = profile.end(-1), profile.end(1)
+    for one in lags:
+        if one.name in free:
+            error = one.std if np.isfinite(one.std) else np.inf
+            step = float(np.clip(1.1 * Z_95 * error / one.value, _EXACT * _STEP, _STEP))
+            place = family.names.index(one.name)
+            profile = _Profile(problem, family, x, least, place, order, variance, step, scales.dt)
+            ends[one.name] = profile.end(-1), profile.end(1)
     return tuple(
         one._replace(std=(ends[one.name][1] - ends[one.name][0]) / (2 * Z_95), ends=ends[one.name])
         if one.name in ends
@@ -93,23 +96,29 @@ def _alone(one: ProcessParameter, lags: Sequence[ProcessParameter]) -> bool:
 
 @dataclass(frozen=True, eq=False)
 class _Profile:
-    """Excess of the misfit over a lag, the others being slower or faster as at the optimum."""
+    """Excess of the misfit over a lag, the others being slower or faster as at the optimum.
 
-    base: FormSearch
-    name: str
-    order: Sequence[str]
-    values: Mapping[str, float]
+    `place` is that of its logarithm among the parameters, `order` those of all free lags, the
+    slowest first.
+    """
+
+    problem: Problem
+    family: FormFamily
+    x: FloatArray
     least: float
+    place: int
+    order: Sequence[int]
     variance: float
     step: float
+    dt: float
 
     def end(self, way: int) -> float:
         """End of the interval below (way -1) or above the optimum; 0 or infinity without one."""
-        limits = self.base.limits[self.name]
-        last = float(np.log(limits[0 if way < 0 else 1]))
-        if way < 0 and self._at(last, self.values)[1] <= _EDGE:
+        bounds = self.family.bounds
+        last = float((bounds.low if way < 0 else bounds.high)[self.place])
+        inside, near = float(self.x[self.place]), self.x
+        if way < 0 and self._at(last, near)[1] <= _EDGE:
             return 0.0
-        inside, near = float(np.log(self.values[self.name])), self.values
         known, step = {inside: -_EDGE}, self.step
         while True:
             at = inside + way * step
@@ -129,16 +138,15 @@ class _Profile:
 
         return float(np.exp(brentq(over, inside, at, xtol=_EXACT * abs(at - inside))))
 
-    def _at(self, log_lag: float, start: Mapping[str, float]) -> tuple[dict[str, float], float]:
-        """Best other parameters, and the root of the excess, for a lag."""
-        lag, place = float(np.exp(log_lag)), self.order.index(self.name)
-        bounds = dict(self.base.form.bounds)
-        for number, other in enumerate(self.order):
-            low, high = self.base.limits[other]
-            if number > place:
-                bounds[other] = (low, lag if lag > low * _WIDE else low)
-            elif number < place:
-                bounds[other] = (lag if lag < high / _WIDE else high, high)
-        search = replace(self.base, form=replace(self.base.form, bounds=bounds))
-        found, cost = search.solve(start, {self.name: lag}, _COST * self.variance / self.least)
-        return found, root_of((cost - self.least) / self.variance)
+    def _at(self, log_lag: float, start: FloatArray) -> tuple[FloatArray, float]:
+        """Best other parameters, and the root of the excess, for the logarithm of the lag."""
+        bounds = self.family.bounds
+        low, high = bounds.low.copy(), bounds.high.copy()
+        number = self.order.index(self.place)
+        slower, faster = list(self.order[:number]), list(self.order[number + 1 :])
+        low[slower] = np.minimum(log_lag, high[slower])
+        high[faster] = np.maximum(log_lag, low[faster])
+        low[self.place] = high[self.place] = log_lag
+        held = replace(self.family, bounds=Bounds(low, high))
+        found = lowest(self.problem, held, start[None], self.dt)
+        return found.parameters, root_of((found.cost - self.least) / self.variance)

@@ -90,7 +90,7 @@ def fitted_parameters(
     length : float
         As in `process_parameters`.
     """
-    theta = candidate.parameters
+    theta = candidate.theta
     poles, dpoles = (found[0] for found in poles_from_parameters(theta[None, 1:]))
     kept = np.abs(poles) * length >= INTEGRATOR
     size = theta.size + numerator.size

@@ -26,7 +26,7 @@ from ..engine.poles import parameters_from_poles, poles_from_parameters
 from ..engine.polish import polish
 from ..engine.static_gain import StaticGain
 from ..engine.structures import Candidate, parameter_bounds
-from ..engine.varpro import KnownFactor, Structure
+from ..engine.varpro import Family, KnownFactor, Structure
 from ..engine.window import WindowFit
 
 _FASTEST = 4.0  # over the length of the record: 2 % of such a mode are left at its end
@@ -53,6 +53,7 @@ def least_extrapolating(
     slow = int(np.argmin(np.abs(poles)))
     static = fits.static(candidate)
     alone = problem.segments is None and structure.order > 1
+    alone = alone and not isinstance(structure, Family)
     if static.significant or poles[slow].imag or not alone:
         return candidate, static
     rest = Structure(structure.order - 1, structure.relative_degree - 1)

@@ -34,12 +34,19 @@ from ..families.equal_lags import (
     chain_profile,
     still_improving,
 )
-from ..families.flow import DispersedFlow, flow_profile
+from ..families.flow import DispersedFlow
 from ..families.physical import without_errors
 from .extrapolation import least_extrapolating
 from .friction import latest_slip
 from .margins import CloseDecision, close_choices, close_exclusions
-from .profiles import Profile, curves, laid_profiles, lower_minima, solved_profiles
+from .profiles import (
+    Profile,
+    curves,
+    laid_profiles,
+    lower_minima,
+    profile_of,
+    solved_profiles,
+)
 from .result import (
     DelayInterval,
     DistributedLags,
@@ -195,7 +202,7 @@ def _not_ruled_out(
     return _Kept(
         profiles,
         [
-            (flow, flow_profile(fits.problem, flow, fits.scales, fits.variance))
+            (flow, profile_of(fits, flow.fit))
             for flow in flows
             if flow.criterion + more * flow.parameters <= limit
         ],

@@ -25,6 +25,7 @@ from ..engine.varpro import Structure, evaluate, respond
 from ..engine.window import WindowFit
 from ..families.equal_lags import LagChain
 from ..families.flow import DispersedFlow
+from ..families.form_fit import FormFamily
 from ..families.physical import ProcessParameter, fitted_parameters
 from ..families.process_form import ProcessForm
 from ..signals.correlation import fit_percent
@@ -278,7 +279,9 @@ def _table(fits: WindowFit, profiles: dict[Structure, Profile]) -> tuple[Structu
         total = candidate.dead_time + lag_sum(poles, numerator)
         excess = fits.criterion[s] - best
         gain = float(np.real(numerator[0] / np.prod(-poles)))
-        lines.append(StructureFit(s, candidate.dead_time, total, excess, interval, poles, gain))
+        lines.append(
+            StructureFit(s.plain, candidate.dead_time, total, excess, interval, poles, gain)
+        )
     return tuple(sorted(lines, key=lambda line: line.delta_bic))
 
 
@@ -286,11 +289,11 @@ def followed_by(fits: WindowFit, chosen: Candidate, numerator: FloatArray) -> Fo
     """Compare a model alone, and the structure with the smallest residual, with the output."""
     window, problem = fits.window, fits.problem
     closest = min(fits.candidates.values(), key=lambda candidate: candidate.cost)
-    alone = respond(window.drive, problem.known, numerator, chosen.parameters)
+    alone = respond(window.drive, problem.known, numerator, chosen.theta)
     alone += np.mean(window.output - alone)
     modelled = [window.predict(problem, chosen), alone, window.predict(problem, closest)]
     complete, simulated, most = fit_percent(np.tile(window.output, (3, 1)), np.stack(modelled))
-    return Followed(float(complete), float(simulated), closest.structure, float(most))
+    return Followed(float(complete), float(simulated), closest.structure.plain, float(most))
 
 
 def assembled(
@@ -309,8 +312,15 @@ def assembled(
     `profiles` are those of the table of structures, `profile` that of the dead time chosen;
     `static` is the static response, if it is not that of the model alone.
     """
-    state = evaluate(fits.problem, chosen.structure, chosen.parameters[None])
-    numerator = state.numerator[0]
+    problem, family = fits.problem, chosen.structure
+    numerator = evaluate(problem, family, chosen.parameters[None]).numerator[0]
+    if isinstance(family, FormFamily):
+        parameters = family.parameters(problem, chosen.parameters, fits.variance)
+        process = ProcessEstimate(parameters, family.form, family.at_bound)
+    else:
+        process = ProcessEstimate(
+            fitted_parameters(problem, chosen, numerator, fits.variance, fits.scales.length)
+        )
     interval = interval.rounded(chosen.dead_time, fits.scales)
     static = static or fits.static(chosen)
     charged = {s: fits.criterion[s] + needless_parameters(s) for s in profiles}
@@ -325,7 +335,7 @@ def assembled(
         low=interval.low,
         high=interval.high,
         std=interval.std,
-        structure=chosen.structure,
+        structure=chosen.structure.plain,
         poles=chosen.poles,
         numerator=numerator,
         adequate=adequate,
@@ -340,7 +350,5 @@ def assembled(
         latest=fits.scales.latest,
         static=static,
         alike=tuple((other, weight) for other, weight in alike if other.resolved),
-        process=ProcessEstimate(
-            fitted_parameters(fits.problem, chosen, numerator, fits.variance, fits.scales.length)
-        ),
+        process=process,
     )

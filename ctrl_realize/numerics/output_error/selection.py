@@ -54,7 +54,7 @@ class Choice:
         if self.flow is not None:
             return self.flow.parameters
         own = self.model.structure
-        return FREE_IN_A_CHAIN if self.chain is not None else own.order + own.zeros
+        return FREE_IN_A_CHAIN if self.chain is not None else own.free
 
 
 def chains_of(fits: WindowFit) -> list[LagChain]:
