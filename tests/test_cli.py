@@ -1,6 +1,5 @@
 """The command line: what it writes, what it says, and how it ends."""
 
-import json
 import subprocess
 import sys
 from contextlib import redirect_stderr, redirect_stdout
@@ -113,7 +112,6 @@ def test_nothing_is_written_where_no_record_is_usable(folder, tmp_path, capsys):
         (["compare", "{folder}/nix.json", "{folder}/frf.csv"], "there is no such file"),
         (["invent"], "invent"),
         (["identify"], "files"),
-        (["demo", "-o", "{out}", "--seed", "-1"], "--seed"),
     ],
 )
 def test_errors_are_one_line_and_leave_nothing(folder, tmp_path, capsys, arguments, says):
@@ -248,44 +246,6 @@ def test_the_version_is_told(capsys):
     assert capsys.readouterr() == (f"ctrl-realize {cr.__version__}\n", "")
 
 
-@pytest.mark.slow
-def test_the_demo_does_the_paper_from_end_to_end(tmp_path, capsys):
-    out = tmp_path / "demo"
-    assert main(["demo", "-o", str(out), "--seed", "3"]) == 0
-    names = files_in(out)
-    assert {"report.html", "model.json", "model_paper.json", "table_1.csv"} <= names
-    figures = {name.split("/")[1][:4] for name in names if name.startswith("figures/fig")}
-    assert figures == {f"fig{k}" for k in range(2, 9)}
-    table = pd.read_csv(out / "table_1.csv", index_col="number")
-    np.testing.assert_array_equal(table.filter(like="printed"), cr.paper.TABLE_1)
-    ours = table.filter(like="simulated").to_numpy()
-    assert ours.shape == (10, 4)
-    # Table 1: mean 37 and variance 2 without the three values at each end, at 4 mA as at 16 mA.
-    statistics = cr.paper.trimmed_statistics(ours, cr.paper.SETTINGS.trim)
-    assert statistics.mean == pytest.approx(37, abs=1)
-    assert statistics.variance == pytest.approx(2, abs=1.2)
-    # The method as printed is late by its filter's 13 samples and more (paper map, E11).
-    late = ours.mean() - cr.bench.paper_valve().truth.delay
-    assert 13 < late < 25
-    content = json.loads((out / "model.json").read_text(encoding="utf-8"))
-    assert content["provenance"]["settings"]["simulated"] is True
-    said = capsys.readouterr().out
-    assert "simulated; none are measured" in said
-    assert "simulated data" in (out / "report.html").read_text(encoding="utf-8")
-    assert cr.read_record(out / "record_simulated.csv").n_samples == 6400
-    frf = cr.read_frf(out / "frf_simulated.csv")
-    assert frf.frequency_hz.size == 500
-    # The fit has the dead time of its record, the sweep the mean, with backlash: apart from a delay
-    # of a few samples, the truth of order 4 with 30 Hz LVDT is known to much better than this.
-    model = cr.load_model(out / "model.json")
-    hz = frf.frequency_hz[frf.frequency_hz < 13]
-    ratio = model(np.exp(2j * np.pi * hz * model.dt))
-    ratio = ratio / cr.bench.paper_valve().truth.response(2 * np.pi * hz)
-    late = -np.polyfit(2 * np.pi * hz, np.unwrap(np.angle(ratio)), 1)[0]
-    assert abs(late) / model.dt < 6
-    assert np.abs(ratio * np.exp(2j * np.pi * hz * late) - 1).max() < 0.01
-
-
 def test_units_of_a_frequency_response_can_be_told(folder, first, tmp_path, capsys):
     frf = cr.read_frf(folder / "frf.csv")
     columns = {
@@ -312,7 +272,7 @@ def test_records_of_different_plants_are_kept_apart_on_request(folder, tmp_path,
     assert {"step_0/model.json", "slow/model.json"} <= files_in(tmp_path / "out")
 
 
-@pytest.mark.parametrize("command", [[], ["identify"], ["compare"], ["valve"], ["loop"], ["demo"]])
+@pytest.mark.parametrize("command", [[], ["identify"], ["compare"], ["valve"], ["loop"]])
 def test_help_has_examples_and_exit_codes(command, capsys):
     assert main([*command, "--help"]) == 0
     said = " ".join(capsys.readouterr().out.split())

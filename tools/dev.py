@@ -85,7 +85,7 @@ def main(arguments: list[str]) -> None:
         sys.exit(0 if task in ("help", "-h", "--help") else 2)
     set_up(EXTRAS[task])
     if task == "demo":
-        run(PYTHON, "-m", "ctrl_realize", "demo", *(rest or ["--output", "demo-output"]))
+        run(PYTHON, "examples/demo.py", *rest)
     elif task == "docs":
         site = ["-W", "--keep-going", "-b", "html", "docs", "docs/_build/html"]
         run(PYTHON, "-m", "sphinx", *(rest or site))

@@ -19,8 +19,7 @@ FORMAT = "ctrl_realize results"
 SCHEMA = 1
 _MOST_BYTES = 16 * 2**20
 _RESULTS = (
-    "model.json", "report.html", "records.csv", "frf_comparison.csv", "table_1.csv",
-    "model_paper.json", "frf_simulated.csv", "record_simulated.csv", "models/*.json",
+    "model.json", "report.html", "records.csv", "frf_comparison.csv", "models/*.json",
     "figures/*.png", "metrics.csv", "sizes.csv", "steps.csv",
 )  # fmt: skip
 """Names of results if there is no manifest."""

@@ -161,28 +161,3 @@ def loop(
         files, folder, process=process.value, set_point=set_point, reading=trend,
         report=not no_report, overwrite=overwrite,
     )  # fmt: skip
-
-
-def demo(
-    folder: o.Folder,
-    seed: Annotated[int, typer.Option(min=0, help="Seed of the random numbers.")] = 1,
-    jobs: Annotated[int, typer.Option(help="Number of processes; -1: all cores.")] = 1,
-    no_report: o.NoReport = False,
-    overwrite: o.Overwrite = False,
-) -> int:
-    """Reproduce the paper from start to end, on simulated data.
-
-    Forty steps and a stepped sine of 500 x 5 points are simulated on a valve with a known dead time
-    of 16.1 samples, on which the paper's method finds the 37 samples of the paper. It gives
-    Table 1, Figs. 2-8 and its final model; the output-error fit of one record gives a better one.
-    The output contains report.html, model.json, table_1.csv, figures/ and more.
-
-    \b
-    Examples:
-      ctrl-realize demo -o demo
-      ctrl-realize demo -o demo --seed 7 --jobs 2
-    """  # noqa: D301  # \b keeps the lines of the examples apart
-    with loading():
-        from .demo_command import run_demo_command
-
-    return run_demo_command(folder, seed, jobs, report=not no_report, overwrite=overwrite)

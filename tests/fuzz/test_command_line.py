@@ -157,7 +157,6 @@ def test_compare_ends_in_an_exit_code_and_one_complaint(rng, folder, model):
 
 @fuzz(60)
 def test_any_words_end_in_an_exit_code(rng, folder):
-    # "demo" is not among the words: it has nothing to refuse, and takes its time
     words = some(rng, any_word, 4)
     with contextlib.chdir(folder), good_end(seconds=60) as codes:
         codes.append(run(words))
