@@ -119,14 +119,6 @@ def _method_lines(counts: dict[tuple[str, str], Counter[str]], seeds: int) -> li
             cells = [" / ".join(f"{_percent(each, word)}" for word in SAID[:3]) for each in both]
             many = [sum(each[word] for word in SAID[:3]) for each in both]
             lines.append(f"| {name} | {many[0]}, {many[1]} | {cells[0]} | {cells[1]} |")
-    rows = [name for name, _ in counts if "bicoherence" in name]
-    for name in dict.fromkeys(rows):
-        both = [counts.get((name, cause), Counter()) for cause in CAUSES[:2]]
-        shares = [each["nonlinear"] / max(each["nonlinear"] + each["linear"], 1) for each in both]
-        many = [each["nonlinear"] + each["linear"] for each in both]
-        lines.append(
-            f"| {name}: nonlinear | {many[0]}, {many[1]} | {shares[0]:.0%} | {shares[1]:.0%} |"
-        )
     return lines
 
 

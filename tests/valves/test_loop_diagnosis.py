@@ -11,7 +11,6 @@ from ctrl_realize.numerics.oscillation.cycles import crossings, find_cycles, wit
 from ctrl_realize.numerics.oscillation.ellipse import fit_ellipse
 from ctrl_realize.numerics.oscillation.half_cycles import half_cycles
 from ctrl_realize.numerics.oscillation.movements import movement_indices
-from ctrl_realize.numerics.oscillation.rests import rests
 from tests import measured
 
 STICKS, NOT_SO = "stiction", "no stiction: tuning or external oscillation"
@@ -91,17 +90,6 @@ def test_movements_of_a_valve_that_sticks_half_of_the_time():
     found = movement_indices(op, position, 64.0)
     assert found == pytest.approx((0.5, 0.5), abs=2 / 16)  # at a reversal OP rests, too
     assert movement_indices(op, op, 64.0) == pytest.approx((0.0, 0.0), abs=0.03)
-
-
-def test_rests_of_a_parallelogram_have_its_sides():
-    op = np.abs((TIME % 64) - 32)
-    position = np.clip(np.abs(((TIME - 8) % 64) - 32), 8, 24)  # moves half of the time
-    found = rests(op - op.mean(), position - position.mean(), 64.0)
-    assert found.part == pytest.approx(0.5, abs=0.15)  # the ends of a movement count as rest
-    # of its swing, 2 sqrt(2) standard deviations, OP moves from a corner to the middle and back
-    assert found.side == pytest.approx(16 / (2 * np.sqrt(2) * op.std()), abs=0.15)
-    assert rests(op - op.mean(), op - op.mean(), 64.0).part < 0.05
-    assert rests(op * 0.0, op, 64.0) is None
 
 
 def test_commands_of_many_pairs_of_S_and_J_move_the_stem_as_those_of_one():

@@ -8,7 +8,6 @@ import numpy as np
 
 from ..._checks import one_of
 from ...data import Record
-from ...numerics.oscillation.bicoherence import bicoherence
 from ...numerics.oscillation.cross_correlation import cross_correlation
 from ...numerics.oscillation.cycles import (
     SHORTEST_PERIOD,
@@ -20,7 +19,6 @@ from ...numerics.oscillation.cycles import (
 from ...numerics.oscillation.ellipse import fit_ellipse
 from ...numerics.oscillation.half_cycles import HalfCycles, half_cycles
 from ...numerics.oscillation.movements import movement_indices
-from ...numerics.oscillation.rests import rests
 from ...numerics.oscillation.stiction_fit import fit_stiction
 from . import methods
 from .data import loop_data
@@ -74,12 +72,10 @@ def diagnose_loop(
     decays slowly [2]_, and the areas between the zeros of PV are alike [3]_. Then its cause: the
     cross-correlation of OP and PV is odd for stiction in a self-regulating loop [4]_; half cycles
     of OP, of PV in an integrating loop, are triangles rather than sines [5]_; those of PV are
-    responses to a relay rather than sines [6]_; flows rest while OP moves [7]_ [11]_; and a model
-    of stiction before a linear process, fitted to OP and PV, has an S that is a large part of the
+    responses to a relay rather than sines [6]_; flows rest while OP moves [7]_; and a model of
+    stiction before a linear process, fitted to OP and PV, has an S that is a large part of the
     swing of OP [8]_ [9]_. The verdict on the cause needs two of these methods that agree, and twice
-    as many as contradict them. Not counted are the bicoherence [10]_, which tells whether the loop
-    is nonlinear, not why, and the part of the time in which the flow rests [11]_, which says the
-    same as [7]_.
+    as many as contradict them.
 
     Up to three missing samples in a row are interpolated; longer gaps cut the record, and the
     longest part is judged. An external disturbance with edges, and a limit cycle by other
@@ -107,11 +103,6 @@ def diagnose_loop(
        (2005) 6719-6728.
     .. [9] M. Jelali, Estimation of valve stiction in control loops using separable least-squares
        and global search algorithms, Journal of Process Control 18 (2008) 632-642.
-    .. [10] M. A. A. S. Choudhury, S. L. Shah and N. F. Thornhill, Diagnosis of poor control-loop
-       performance using higher-order statistics, Automatica 40 (2004) 1719-1728.
-    .. [11] M. Kano, H. Maruta, H. Kugemoto and K. Shimizu, Practical model and detection algorithm
-       for valve stiction, IFAC Symposium on Dynamics and Control of Process Systems, Cambridge
-       2004.
 
     Examples
     --------
@@ -133,7 +124,7 @@ def diagnose_loop(
         if oscillates(of_output):
             cycles, seen, state = of_output, "OP", True
     note = "" if state is not False else "no oscillation"
-    correlation = halves_op = halves_pv = moved = rested = ellipse = higher = fit = None
+    correlation = halves_op = halves_pv = moved = ellipse = fit = None
     if cycles is not None and state is not False:
         period = cycles.period
         output, deviation = without_drift(data.op, period), without_drift(value, period)
@@ -142,8 +133,6 @@ def diagnose_loop(
         if period >= SHORTEST_PERIOD:
             halves_op, halves_pv = _halves(output, period), _halves(deviation, period)
             moved = movement_indices(output, deviation, period)
-            rested = rests(output, deviation, period)
-            higher = bicoherence(value, period)
             if state:
                 fit = fit_stiction(data.op, value, period, ellipse.phase, kind == "integrating")
         else:
@@ -154,9 +143,7 @@ def diagnose_loop(
         methods.curve_fit(halves_op, halves_pv, kind, note),
         methods.relay_fit(halves_pv, note),
         methods.movements(moved, kind, note),
-        methods.flow_rests(rested, kind, note),
         methods.stiction_fit(fit, note),
-        methods.bicoherence(higher, note),
     )
     flags = flags_of(data, cycles)
     verdict, reason = judge(state, data.op.size, found, flags)

@@ -8,7 +8,6 @@ from typing import Literal, TypeAlias
 import numpy as np
 
 from ...numerics.constants import Z_95
-from ...numerics.oscillation import bicoherence as higher_order
 from ...numerics.oscillation.cross_correlation import (
     EVEN_HEIGHT,
     EVEN_SHIFT,
@@ -19,13 +18,11 @@ from ...numerics.oscillation.cross_correlation import (
 from ...numerics.oscillation.cycles import Cycles
 from ...numerics.oscillation.half_cycles import HalfCycles
 from ...numerics.oscillation.movements import LIMIT
-from ...numerics.oscillation.rests import REST_LIMIT, REST_NONE, Rests
 from ...numerics.oscillation.stiction_fit import FEWEST_BLOCKS, StictionFit
 
 LoopProcess: TypeAlias = Literal["self-regulating", "flow", "integrating"]
 MethodVerdict: TypeAlias = Literal[
-    "oscillation", "no oscillation", "stiction", "no stiction", "nonlinear", "linear",
-    "cannot tell", "not applicable",
+    "oscillation", "no oscillation", "stiction", "no stiction", "cannot tell", "not applicable",
 ]  # fmt: skip
 
 _HE_STICTION, _HE_NONE = 0.6, 0.4
@@ -43,9 +40,7 @@ _SOURCES = {
     "curve_fit": "He et al. 2007",
     "relay_fit": "Rossi and Scali 2005",
     "movements": "Yamashita 2006",
-    "rests": "Kano et al. 2004, method A",
     "stiction_fit": "Srinivasan et al. 2005; Jelali 2008",
-    "bicoherence": "Choudhury, Shah and Thornhill 2004",
 }
 _NAMES = {
     "acf_zeros": "zeros of the autocorrelation",
@@ -55,9 +50,7 @@ _NAMES = {
     "curve_fit": "curve fit: sine or triangle",
     "relay_fit": "relay fit",
     "movements": "movements of OP and flow",
-    "rests": "rests of the flow (parallelogram)",
     "stiction_fit": "fit of stiction (Hammerstein)",
-    "bicoherence": "bicoherence",
 }
 VOTERS = ("cross_correlation", "curve_fit", "relay_fit", "movements", "stiction_fit")
 """Methods that are counted in the verdict."""
@@ -79,7 +72,7 @@ class LoopMethod:
         Limits of the indices.
     verdict : str
         ``"oscillation"``, ``"no oscillation"``; ``"stiction"``, ``"no stiction"``;
-        ``"nonlinear"``, ``"linear"``; ``"cannot tell"`` or ``"not applicable"``.
+        ``"cannot tell"`` or ``"not applicable"``.
     note : str
         Why a method is not applicable.
     source : str
@@ -193,24 +186,6 @@ def movements(found: tuple[float, float] | None, process: LoopProcess, note: str
     return _method("movements", "OP, PV", found[0], limit, said, found[1])
 
 
-def flow_rests(found: Rests | None, process: LoopProcess, note: str) -> LoopMethod:
-    """Judge by the part of the time in which the flow rests while OP moves.
-
-    Not counted in the verdict: it tells the same as `movements`.
-    """
-    limit = f"stiction from {REST_LIMIT:g}, none up to {REST_NONE:g}"
-    if process != "flow":
-        note = "for flows, or a measured position, only: process='flow'"
-    if found is None or process != "flow":
-        note = note or "nothing moves"
-        return _method("rests", "OP, PV", np.nan, limit, "not applicable", note=note)
-    said: MethodVerdict = (
-        "stiction" if found.part >= REST_LIMIT
-        else "no stiction" if found.part <= REST_NONE else "cannot tell"
-    )  # fmt: skip
-    return _method("rests", "OP, PV", found.part, limit, said, found.side)
-
-
 def stiction_fit(found: StictionFit | None, note: str) -> LoopMethod:
     """Judge by the stiction of a Hammerstein model, and by what it explains beyond a linear one."""
     limit = f"stiction from {_FIT_STICTION:g} and {Z_95:.2f}, none up to {_FIT_NONE:g}"
@@ -227,20 +202,6 @@ def stiction_fit(found: StictionFit | None, note: str) -> LoopMethod:
     elif index <= _FIT_NONE:
         said = "no stiction"
     return _method("stiction_fit", "OP, PV", index, limit, said, found.significance)
-
-
-def bicoherence(found: higher_order.Bicoherence | None, note: str) -> LoopMethod:
-    """Judge whether the loop is nonlinear, whatever the cause."""
-    limit = f"nonlinear above {higher_order.NGI_LIMIT:g} and {higher_order.NLI_LIMIT:g}"
-    if found is None:
-        note = note or f"too short: fewer than {higher_order.FEWEST_SEGMENTS} segments"
-        return _method("bicoherence", "PV", np.nan, limit, "not applicable", note=note)
-    both = (
-        found.non_gaussianity > higher_order.NGI_LIMIT
-        and found.nonlinearity > higher_order.NLI_LIMIT
-    )
-    said: MethodVerdict = "nonlinear" if both else "linear"
-    return _method("bicoherence", "PV", found.non_gaussianity, limit, said, found.nonlinearity)
 
 
 def _without_shape(key: str, signal: str, limit: str, note: str) -> LoopMethod:
