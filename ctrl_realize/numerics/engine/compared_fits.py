@@ -47,7 +47,7 @@ _CLOSE, _OTHERS = 1.0, 2
 _STARTS, _PROMISING = 3, 10.0
 """Starts that are followed beside the best end of a search, and variances that they may be above
 it. With free initial states of records all are: there valleys are many, and flat."""
-_SLACK = 2.0  # variances that may be left to a minimum where steps of Gauss and Newton end
+SLACK = 2.0  # variances that may be left to a minimum where steps of Gauss and Newton end
 _SAME = 1e-12  # of the cost, by which another pairing of poles may differ
 _ALL = 6  # structures that are few enough for each to matter: those of up to three poles
 
@@ -114,7 +114,7 @@ def _that_matter(
     values = charged(criteria(found, variance, samples), parameter_charge(samples))
     chosen = choose(values)
     level = values[chosen] + needless_parameters(chosen)
-    return plausible(found, values, variance, found[chosen], level, _SLACK)
+    return plausible(found, values, variance, found[chosen], level, SLACK)
 
 
 def settled(problem: Problem, candidate: Candidate, scales: Scales) -> Candidate:

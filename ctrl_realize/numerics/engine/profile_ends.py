@@ -4,21 +4,16 @@ References
 ----------
 .. [1] D. J. Venzon and S. H. Moolgavkar, A method for computing profile-likelihood-based confidence
    intervals, Appl. Statist. 37 (1988) 87-94, doi:10.2307/2347496.
-.. [2] M. Dowell and P. Jarratt, A modified regula falsi method for computing the root of an
-   equation, BIT 11 (1971) 168-174, doi:10.1007/BF01934364.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 
 import numpy as np
 
 from ..arrays import FloatArray
 from ..constants import CHI2_95
-
-_SOLVED = 1e-6  # standard errors to which an end is solved
-_MOST_TRIES = 20
 
 
 def bracket_ends(excess: Mapping[float, float]) -> list[tuple[float, float]]:
@@ -30,32 +25,6 @@ def bracket_ends(excess: Mapping[float, float]) -> list[tuple[float, float]]:
     return found + (
         [(dead_times[last], dead_times[last + 1])] if last < len(dead_times) - 1 else []
     )
-
-
-def solve_ends(excess_at: Callable[[float], float], excess: Mapping[float, float]) -> None:
-    """Request the excess at dead times that approach both ends.
-
-    Regula falsi (Illinois) in the root of the excess, which is linear in the dead time for a
-    quadratic misfit.
-    """
-    edge = float(np.sqrt(CHI2_95))
-    for inside, outside in bracket_ends(excess):
-        a, b = inside, outside
-        below, above = (root_of(excess[at]) - edge for at in (a, b))
-        side = 0
-        for _ in range(_MOST_TRIES):
-            at = a + below / (below - above) * (b - a)
-            if not min(a, b) < at < max(a, b):
-                break
-            root = root_of(excess_at(at)) - edge
-            if abs(root) < _SOLVED:
-                break
-            if root < 0:
-                above = above / 2 if side < 0 else above
-                a, below, side = at, root, -1
-            else:
-                below = below / 2 if side > 0 else below
-                b, above, side = at, root, 1
 
 
 def root_of(excess: float) -> float:

@@ -17,8 +17,10 @@ References
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from functools import partial
+from typing import TypeAlias
 
 import numpy as np
 from scipy.optimize import brentq
@@ -26,13 +28,16 @@ from scipy.optimize import brentq
 from ..arrays import FloatArray
 from ..constants import CHI2_95, Z_95
 from ..engine.profile_ends import root_of
-from ..engine.structures import Scales
+from ..engine.structures import Candidate, Scales
 from ..engine.varpro import Bounds, Problem
 from .form_fit import FormFamily, form_family
 from .physical import ProcessParameter
 from .process_form import ProcessForm
 from .shaped import lowest
 
+Excess: TypeAlias = Callable[[FloatArray, float], tuple[FloatArray, float]]
+"""From a start and the logarithm of a lag to the best other parameters, and the root of the excess
+over that at an end."""
 _EDGE = float(np.sqrt(CHI2_95))
 _STEP, _WIDER = 0.2, 2.0  # of a search for an end: largest first step in the logarithm, its growth
 _EXACT = 0.02  # of the step in which an end lies, to which it is solved
@@ -42,7 +47,7 @@ def with_profiled_lags(
     problem: Problem,
     scales: Scales,
     form: ProcessForm,
-    found: Sequence[ProcessParameter],
+    parameters: Sequence[ProcessParameter],
     variance: float,
 ) -> tuple[ProcessParameter, ...]:
     """Replace the errors of lags that are nearly equal, or may be zero.
@@ -52,101 +57,82 @@ def with_profiled_lags(
     problem : Problem
     scales : Scales
     form : ProcessForm
-    found : sequence of ProcessParameter
+    parameters : sequence of ProcessParameter
         At the optimum.
     variance : float
         Of the noise, per sample.
     """
-    lags = [one for one in found if one.name.startswith("lag_") and one.name not in form.fixed]
+    lags = [p for p in parameters if p.name.startswith("lag_") and p.name not in form.fixed]
     free = form.free_lags
-    if variance <= 0 or all(one.name not in free or _alone(one, lags) for one in lags):
-        return tuple(found)
+    if variance <= 0 or all(p.name not in free or _alone(p, lags) for p in lags):
+        return tuple(parameters)
     family = form_family(form, scales)
-    values = {"dead_time": 0.0} | {one.name: one.value for one in found} | dict(form.fixed)
+    values = {"dead_time": 0.0} | {p.name: p.value for p in parameters} | dict(form.fixed)
     x = family.coordinates(values)
-    least = float(np.sum(family.linearised(problem, x).residual ** 2))
+    best = Candidate(family, x, float(np.sum(family.linearised(problem, x).residual ** 2)))
     order = [family.names.index(name) for name in free]
-    ends = {}
-    for one in lags:
-        if one.name in free:
-            error = one.std if np.isfinite(one.std) else np.inf
-            step = float(np.clip(1.1 * Z_95 * error / one.value, _EXACT * _STEP, _STEP))
-            place = family.names.index(one.name)
-            profile = _Profile(problem, family, x, least, place, order, variance, step, scales.dt)
-            ends[one.name] = profile.end(-1), profile.end(1)
-    return tuple(
-        one._replace(std=(ends[one.name][1] - ends[one.name][0]) / (2 * Z_95), ends=ends[one.name])
-        if one.name in ends
-        else one
-        for one in found
-    )
+
+    def excess(place: int, start: FloatArray, log_lag: float) -> tuple[FloatArray, float]:
+        held = _ordered(family, order, place, log_lag)
+        found = lowest(problem, held, start[None], scales.dt)
+        return found.parameters, root_of((found.cost - best.cost) / variance) - _EDGE
+
+    profiled = []
+    for p in parameters:
+        if p.name in free:
+            place = family.names.index(p.name)
+            error = p.std if np.isfinite(p.std) else np.inf
+            step = float(np.clip(1.1 * Z_95 * error / p.value, _EXACT * _STEP, _STEP))
+            low, high = float(family.bounds.low[place]), float(family.bounds.high[place])
+            at = partial(excess, place)
+            ends = _end(at, x, x[place], low, -step), _end(at, x, x[place], high, step)
+            p = p._replace(std=(ends[1] - ends[0]) / (2 * Z_95), ends=ends)
+        profiled.append(p)
+    return tuple(profiled)
 
 
-def _alone(one: ProcessParameter, lags: Sequence[ProcessParameter]) -> bool:
+def _alone(lag: ProcessParameter, lags: Sequence[ProcessParameter]) -> bool:
     """Whether the interval of the curvature is clear of zero and of the other lags'."""
-    reach = Z_95 * one.std
-    if not reach < one.value:
-        return False
-    return all(
-        abs(one.value - other.value) > reach + Z_95 * other.std
+    reach = Z_95 * lag.std
+    return reach < lag.value and all(
+        abs(lag.value - other.value) > reach + Z_95 * other.std
         for other in lags
-        if other is not one
+        if other is not lag
     )
 
 
-@dataclass(frozen=True, eq=False)
-class _Profile:
-    """Excess of the misfit over a lag, the others being slower or faster as at the optimum.
+def _ordered(family: FormFamily, order: Sequence[int], place: int, log_lag: float) -> FormFamily:
+    """Family with one of the lags given, and the others slower or faster as at the optimum."""
+    low, high = family.bounds.low.copy(), family.bounds.high.copy()
+    number = order.index(place)
+    slower, faster = list(order[:number]), list(order[number + 1 :])
+    low[slower] = np.minimum(log_lag, high[slower])
+    high[faster] = np.maximum(log_lag, low[faster])
+    low[place] = high[place] = log_lag
+    return replace(family, bounds=Bounds(low, high))
 
-    `place` is that of its logarithm among the parameters, `order` those of all free lags, the
-    slowest first.
-    """
 
-    problem: Problem
-    family: FormFamily
-    x: FloatArray
-    least: float
-    place: int
-    order: Sequence[int]
-    variance: float
-    step: float
-    dt: float
-
-    def end(self, way: int) -> float:
-        """End of the interval below (way -1) or above the optimum; 0 or infinity without one."""
-        bounds = self.family.bounds
-        last = float((bounds.low if way < 0 else bounds.high)[self.place])
-        inside, near = float(self.x[self.place]), self.x
-        if way < 0 and self._at(last, near)[1] <= _EDGE:
-            return 0.0
-        known, step = {inside: -_EDGE}, self.step
-        while True:
-            at = inside + way * step
-            at = max(at, last) if way < 0 else min(at, last)
-            there, root = self._at(at, near)
-            known[at] = root - _EDGE
-            if root > _EDGE:
-                break
-            if at == last:
-                return 0.0 if way < 0 else np.inf
-            inside, near, step = at, there, _WIDER * step
-
-        def over(x: float) -> float:
-            if x not in known:
-                known[x] = self._at(x, near)[1] - _EDGE
-            return known[x]
-
-        return float(np.exp(brentq(over, inside, at, xtol=_EXACT * abs(at - inside))))
-
-    def _at(self, log_lag: float, start: FloatArray) -> tuple[FloatArray, float]:
-        """Best other parameters, and the root of the excess, for the logarithm of the lag."""
-        bounds = self.family.bounds
-        low, high = bounds.low.copy(), bounds.high.copy()
-        number = self.order.index(self.place)
-        slower, faster = list(self.order[:number]), list(self.order[number + 1 :])
-        low[slower] = np.minimum(log_lag, high[slower])
-        high[faster] = np.maximum(log_lag, low[faster])
-        low[self.place] = high[self.place] = log_lag
-        held = replace(self.family, bounds=Bounds(low, high))
-        found = lowest(self.problem, held, start[None], self.dt)
-        return found.parameters, root_of((found.cost - self.least) / self.variance)
+def _end(at: Excess, x: FloatArray, inside: float, last: float, step: float) -> float:
+    """End of the interval of a lag from the optimum on; 0 or infinity without one."""
+    nothing = 0.0 if step < 0 else np.inf
+    if step < 0 and at(x, last)[1] <= 0:
+        return nothing
+    known = {inside: -_EDGE}
+    while True:
+        outside = max(inside + step, last) if step < 0 else min(inside + step, last)
+        there, known[outside] = at(x, outside)
+        if known[outside] > 0:
+            break
+        if outside == last:
+            return nothing
+        inside, x, step = outside, there, _WIDER * step
+    return float(
+        np.exp(
+            brentq(
+                lambda lag: known[lag] if lag in known else at(x, lag)[1],
+                inside,
+                outside,
+                xtol=_EXACT * abs(outside - inside),
+            )
+        )
+    )

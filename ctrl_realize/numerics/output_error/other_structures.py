@@ -11,9 +11,11 @@ References
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 
+from ..engine.compared_fits import SLACK, converged, on_new_data, settled
 from ..engine.profile_ends import profile_limits
 from ..engine.structures import (
     ALL_STRUCTURES,
@@ -26,7 +28,7 @@ from ..engine.structures import (
     search,
 )
 from ..engine.varpro import Structure, evaluate
-from ..engine.window import WindowFit, extended
+from ..engine.window import WindowFit
 from .profiles import profile_of
 from .result import OtherStructures, StructureFit
 
@@ -47,11 +49,21 @@ def other_structures(fits: WindowFit, refit: Callable[[], WindowFit]) -> OtherSt
         Fit of the default structures.
     """
     given = fits.best
+    n, r = given.structure.order, given.structure.relative_degree
     # Beside an exact fit no other structure tells anything.
-    if given.structure.order >= _MOST_ORDER or not fits.variance > 0:
+    if n >= _MOST_ORDER or not fits.variance > 0:
         return OtherStructures()
-    better = _better(refit(), given) if _lacks_a_pole(fits, given) else None
-    return OtherStructures(better, () if better is not None else _not_ruled_out(fits, given))
+    # Without Huber's clipping towards the given model, which may hide its errors.
+    problem = fits.window.problem
+    start = on_new_data(problem, {given.structure: given})
+    richer = search(problem, (Structure(n + 1, r + 1), Structure(n + 1, r)), fits.scales, start)
+    cost = richer.pop(given.structure).cost
+    least = min(candidate.cost for candidate in richer.values())
+    # Relative to the residual of the richer ones: that of the given one may be large and
+    # correlated.
+    variance = least / max(problem.data.size - 2 * n - 4, 1)
+    better = _better(refit(), given) if cost - least > PLAUSIBLE * variance else None
+    return OtherStructures(better, () if better is not None else _not_ruled_out(fits, richer))
 
 
 def _better(free: WindowFit, given: Candidate) -> StructureFit | None:
@@ -67,18 +79,33 @@ def _better(free: WindowFit, given: Candidate) -> StructureFit | None:
     return _line(free, best.structure, -excess)
 
 
-def _not_ruled_out(fits: WindowFit, given: Candidate) -> tuple[StructureFit, ...]:
+def _not_ruled_out(fits: WindowFit, richer: dict[Structure, Candidate]) -> tuple[StructureFit, ...]:
     """List structures of one pole more that the data do not rule out, the best first."""
+    given, problem, scales = fits.best, fits.problem, fits.scales
     order = given.structure.order + 1
-    more = tuple(Structure(order, r) for r in range(order, 0, -1))
-    free = extended(fits, more)
-    level = _charged(free.criterion, given.structure)
-    least = level + max(LEAST_CHARGE - free.penalty, 0.0) * (order - 1 + given.structure.zeros)
-    kept = plausible(
-        free.candidates, charged(free.criterion, free.penalty), free.variance, given, least
-    )
-    lines = [_line(free, s, _charged(free.criterion, s) - level) for s in kept if s in more]
+    more = [Structure(order, r) for r in range(order, 0, -1)]
+    found = on_new_data(problem, richer) | fits.candidates
+    found = search(problem, [s for s in more if s not in found], scales, found)
+    found = converged(problem, found, scales, fits.variance, fits.independent, last=False)
+    # Those that are ruled out by more than is left to their minima need not be followed there.
+    for s in _kept(fits, found, SLACK):
+        found[s] = settled(problem, found[s], scales) if s in more else found[s]
+    free = replace(fits, candidates=found, criterion=fits.criteria(found))
+    level = _charged(fits.criterion, given.structure)
+    lines = [
+        _line(free, s, _charged(free.criterion, s) - level)
+        for s in _kept(fits, found, 0.0)
+        if s in more
+    ]
     return tuple(sorted(lines, key=lambda line: line.delta_bic))
+
+
+def _kept(fits: WindowFit, found: dict[Structure, Candidate], slack: float) -> list[Structure]:
+    """Structures that the data do not rule out beside the best of those requested."""
+    given, values = fits.best, fits.criteria(found)
+    level = _charged(fits.criterion, given.structure)
+    least = level + max(LEAST_CHARGE - fits.penalty, 0.0) * given.structure.free
+    return plausible(found, charged(values, fits.penalty), fits.variance, given, least, slack)
 
 
 def _charged(criterion: dict[Structure, float], structure: Structure) -> float:
@@ -98,21 +125,6 @@ def _line(fits: WindowFit, structure: Structure, excess: float) -> StructureFit:
         candidate.poles,
         static.gain,
     )
-
-
-def _lacks_a_pole(fits: WindowFit, given: Candidate) -> bool:
-    n, r = given.structure.order, given.structure.relative_degree
-    # Without Huber's clipping towards the given model, which may hide its errors.
-    problem = fits.window.problem
-    state = evaluate(problem, given.structure, given.parameters[None])
-    start = Candidate(given.structure, given.parameters, float(state.cost[0]))
-    richer = (Structure(n + 1, r + 1), Structure(n + 1, r))
-    found = search(problem, richer, fits.scales, {given.structure: start})
-    least = min(found[s].cost for s in richer)
-    # Relative to the residual of the richer ones: that of the given one may be large and
-    # correlated.
-    variance = least / max(problem.data.size - 2 * n - 4, 1)
-    return bool(start.cost - least > PLAUSIBLE * variance)
 
 
 def _cost(free: WindowFit, given: Candidate) -> float:
