@@ -1,0 +1,100 @@
+"""Families of models with few parameters: derivatives, gains within bounds, standard errors."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from scipy.special import gammainc
+
+from ctrl_realize.numerics.engine.structures import Candidate
+from ctrl_realize.numerics.engine.varpro import KnownFactor, Structure
+from ctrl_realize.numerics.families.equal_lags import fit_chains
+from ctrl_realize.numerics.families.flow import fit_flows
+from ctrl_realize.numerics.families.form_fit import fit_form, form_family
+from ctrl_realize.numerics.families.process_form import ProcessForm
+from ctrl_realize.numerics.output_error.step_data import step_data, step_scales, window
+
+DELAY, SIGMA = 20.3, 1e-3
+VALUES = {
+    "dead_time": DELAY, "lag_1": 20.0, "lag_2": 8.0, "lag_3": 7.9, "pair_time_1": 12.0,
+    "pair_damping_1": 0.7, "lead_1": 3.0,
+}  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def case():
+    """Four equal lags of 12 samples behind a dead time of 20.3."""
+    k = np.arange(-300, 600, dtype=float)
+    y = gammainc(4, np.clip(k - DELAY, 0, None) / 12)
+    y += SIGMA * np.random.default_rng(3).standard_normal(k.size)
+    data = step_data(y, (k >= 0).astype(float), 1.0, [(300, 1)])
+    return window(data, k.size, KnownFactor()).problem, step_scales(data, k.size, None)
+
+
+def assert_exact(problem, family, x):
+    """The gradient of the sum of squares is the limit of its differences."""
+    state = family.evaluate(problem, x[None])
+    slope = -2 * state.jacobian[0].T @ state.residual[0]
+    moves = 1e-5 * np.diag(np.maximum(np.abs(x), 1.0))
+    ahead, behind = (family.evaluate(problem, x + way * moves).cost for way in (1, -1))
+    steep = (ahead - behind) / (2 * moves.diagonal())
+    assert_allclose(slope, steep, rtol=0, atol=1e-5 * np.abs(steep).max())
+
+
+@pytest.mark.parametrize(
+    "form",
+    [
+        ProcessForm("P2D", 2),
+        ProcessForm("P3D", 3),
+        ProcessForm("P3DUZ", 1, pair=True, lead=True),
+        ProcessForm("P1DI", 1, integrator=True),
+        ProcessForm("P2D", 2, fixed={"gain": 0.7}),
+    ],
+    ids=["two lags", "two of three are equal", "pair and lead", "integrator", "gain"],
+)
+def test_derivatives_of_forms_are_limits_of_differences(case, form):
+    problem, scales = case
+    family = form_family(form, scales)
+    assert_exact(problem, family, family.coordinates(VALUES))
+
+
+def test_derivatives_of_chains_and_flows_are_limits_of_differences(case):
+    problem, scales = case
+    theta = np.array([25.0, np.log(0.05), np.log(0.04), np.log(1.1)])
+    like = Candidate(Structure(3, 3), theta, 1.0)
+    flows = fit_flows(problem, like, scales, SIGMA**2, 7.0, 0.0)
+    assert flows
+    for flow in flows:
+        assert_exact(problem, flow.fit.structure, flow.fit.parameters + 0.1)
+    chain = fit_chains(problem, like, scales, SIGMA**2, 7.0)[0]
+    assert abs(chain.candidate.dead_time - DELAY) < 4 * chain.error
+
+
+def test_a_gain_within_bounds_is_the_best_one_or_at_a_bound(case):
+    problem, scales = case
+    form = ProcessForm("P2D", 2, bounds={"gain": (0.0, 0.9)})
+    bounded, free = form_family(form, scales), form_family(ProcessForm("P2D", 2), scales)
+    x = free.coordinates(VALUES)
+    best = free.linearised(problem, x)
+    assert best.gain > 0.9  # of a plant with gain 1
+    model = bounded.linearised(problem, x)
+    assert model.gain == 0.9
+    # Of all gains up to there no other one leaves less.
+    lost = [np.sum((best.residual + (best.gain - g) * best.unit) ** 2) for g in (0.9, 0.89)]
+    assert_allclose(np.sum(model.residual**2), lost[0], rtol=1e-12)
+    assert lost[1] > lost[0]
+
+
+def test_standard_errors_are_those_of_the_derivatives(case):
+    problem, scales = case
+    form = ProcessForm("P2D", 2, fixed={"gain": 1.0}, bounds={"lag_2": (1.0, 9.0)})
+    like = Candidate(Structure(1, 1), np.array([30.0, np.log(0.03)]), 1.0)
+    fit = fit_form(problem, form, replace(scales, latest=60.0), [like])
+    found = {p.name: p for p in fit.structure.parameters(problem, fit.parameters, SIGMA**2)}
+    assert found["gain"].std == 0.0
+    assert fit.structure.at_bound == ("lag_2",)
+    seen = np.array([n not in fit.structure.at_bound for n in fit.structure.names])
+    jacobian = fit.structure.evaluate(problem, fit.parameters[None]).jacobian[0][:, seen]
+    covariance = SIGMA**2 * np.linalg.inv(jacobian.T @ jacobian)
+    assert_allclose(found["dead_time"].std, np.sqrt(covariance[0, 0]), rtol=1e-6)
