@@ -13,8 +13,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 
-import numpy as np
-
 from ..engine.compared_fits import SLACK, converged, on_new_data, settled
 from ..engine.profile_ends import profile_limits
 from ..engine.structures import (
@@ -27,7 +25,7 @@ from ..engine.structures import (
     plausible,
     search,
 )
-from ..engine.varpro import Structure, evaluate
+from ..engine.varpro import Structure
 from ..engine.window import WindowFit
 from .profiles import profile_of
 from .result import OtherStructures, StructureFit
@@ -70,13 +68,13 @@ def _better(free: WindowFit, given: Candidate) -> StructureFit | None:
     best = free.best
     if best.structure == given.structure:
         return None
-    cost = _cost(free, given)
-    own = free.criteria({given.structure: Candidate(given.structure, given.parameters, cost)})
-    excess = _charged(own, given.structure) - _charged(free.criterion, best.structure)
+    here = on_new_data(free.problem, {given.structure: given})
+    cost, values = here[given.structure].cost, free.criteria(here)
+    excess = _charged(values, given.structure) - _charged(free.criterion, best.structure)
     # Too many poles are not excluded: their residual is as small.
     if excess <= PLAUSIBLE or cost <= best.cost + PLAUSIBLE * free.variance:
         return None
-    return _line(free, best.structure, -excess)
+    return line_of(free, best, -excess)
 
 
 def _not_ruled_out(fits: WindowFit, richer: dict[Structure, Candidate]) -> tuple[StructureFit, ...]:
@@ -93,7 +91,7 @@ def _not_ruled_out(fits: WindowFit, richer: dict[Structure, Candidate]) -> tuple
     free = replace(fits, candidates=found, criterion=fits.criteria(found))
     level = _charged(fits.criterion, given.structure)
     lines = [
-        _line(free, s, _charged(free.criterion, s) - level)
+        line_of(free, found[s], _charged(free.criterion, s) - level)
         for s in _kept(fits, found, 0.0)
         if s in more
     ]
@@ -112,22 +110,14 @@ def _charged(criterion: dict[Structure, float], structure: Structure) -> float:
     return criterion[structure] + needless_parameters(structure)
 
 
-def _line(fits: WindowFit, structure: Structure, excess: float) -> StructureFit:
-    candidate = fits.candidates[structure]
-    static = fits.static(candidate)
-    interval = profile_limits(*profile_of(fits, candidate))
-    return StructureFit(
-        structure,
-        candidate.dead_time,
-        static.total,
-        float(excess),
-        interval,
-        candidate.poles,
-        static.gain,
-    )
-
-
-def _cost(free: WindowFit, given: Candidate) -> float:
-    """Cost of the given structure for other data, starting from its optimum."""
-    state = evaluate(free.problem, given.structure, given.parameters[None])
-    return float(np.asarray(state.cost)[0])
+def line_of(
+    fits: WindowFit,
+    candidate: Candidate,
+    excess: float,
+    interval: tuple[float, float] | None = None,
+) -> StructureFit:
+    """Line of a table of structures; the interval in s is that of its profile by default."""
+    interval = interval or profile_limits(*profile_of(fits, candidate))
+    static, dead_time = fits.static(candidate), candidate.dead_time
+    values = dead_time, static.total, float(excess), interval, candidate.poles, static.gain
+    return StructureFit(candidate.structure, *values)

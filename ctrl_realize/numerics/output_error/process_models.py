@@ -25,6 +25,7 @@ from ..families.process_form import ProcessForm
 from ..signals.noise import correlation_time
 from .interval import likelihood_fit
 from .margins import CloseDecision
+from .other_structures import line_of
 from .result import OtherStructures, OutputErrorEstimate, ProcessEstimate, StructureFit
 
 _CONTRADICTED = 1.01
@@ -110,13 +111,4 @@ def _better(fits: WindowFit, chosen: Candidate, better: StructureFit | None) -> 
     if excess <= PLAUSIBLE:
         return None
     found = likelihood_fit(fits, adequate=True)
-    static = fits.static(fits.candidates[found.structure])
-    return StructureFit(
-        found.structure,
-        found.dead_time,
-        static.total,
-        -float(excess),
-        (found.low, found.high),
-        found.poles,
-        static.gain,
-    )
+    return line_of(fits, fits.candidates[found.structure], -excess, (found.low, found.high))
