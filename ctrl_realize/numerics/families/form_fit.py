@@ -176,10 +176,9 @@ def fit_form(
     """
     family = form_family(form, scales)
     starts = [family.coordinates({**_start(form, c, scales), **form.start}) for c in like]
-    every = np.array(starts + starts)
     if "dead_time" not in form.start:
-        every[len(starts) :, 0] *= 0.5
-    best = lowest(problem, family, every, scales.dt)
+        starts += [np.append(0.5 * x[0], x[1:]) for x in starts]
+    best = lowest(problem, family, np.array(starts), scales.dt)
     x = best.parameters
     alike = [family.names.index(name) for name in form.free_lags]
     x[alike] = np.sort(x[alike])[::-1]
