@@ -10,7 +10,7 @@ import numpy as np
 import ctrl_realize as cr
 from ctrl_realize.actuators import Characteristic
 from ctrl_realize.numerics.actuators.friction import backlash, kano
-from ctrl_realize.numerics.actuators.limits import resolved, saturated, slew_limited
+from ctrl_realize.numerics.actuators.limits import saturated, slew_limited
 
 from ..honesty.worlds import DT as HONESTY_DT
 from ..honesty.worlds import NOISES, step_case
@@ -20,6 +20,7 @@ from ..worlds.steps import fills_faster_than_it_empties, play, slewing, sticking
 Rng = np.random.Generator
 LAGS = ((1, 1), (2, 2), (3, 3))
 """Structures for staircases, to save time."""
+_SHOWN = (30, 60, 80)  # levels whose flows are judged
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,21 +128,25 @@ def both_ends(rng: Rng) -> Trial:
     return Trial(made, "saturation", plant.dead_time, truth, LAGS, sizes)
 
 
+def characteristic(rng: Rng, plug: Callable[[np.ndarray], np.ndarray]) -> Trial:
+    plant = drawn(rng)
+    low, high = plug(np.array([20.0, 90.0]))
+    flows = (plug(np.array(_SHOWN, dtype=float)) - low) / (high - low)
+    truth = {f"flow_at_{u}": float(flow) for u, flow in zip(_SHOWN, flows, strict=True)}
+    made = positions(rng, plug, plant)
+    return Trial(made, "characteristic", plant.dead_time, truth, LAGS)
+
+
 def equal_percentage(rng: Rng) -> Trial:
-    """The same staircase through equal percentages of rangeability 5 to 50"""
-    plant, ratio = drawn(rng), float(np.exp(rng.uniform(np.log(5), np.log(50))))
-    plug = Characteristic("equal-percentage", rangeability=ratio)
-    made = positions(rng, plug.simulate, plant)
-    return Trial(made, "characteristic", plant.dead_time, {"rangeability": ratio}, LAGS)
+    """The same staircase through equal percentages of rangeability 5 to 50: flows at its levels"""
+    ratio = float(np.exp(rng.uniform(np.log(5), np.log(50))))
+    return characteristic(rng, Characteristic("equal-percentage", rangeability=ratio).simulate)
 
 
 def quick_opening(rng: Rng) -> Trial:
     """The same staircase through a travel to the power of 0.4 to 0.6: flows at its levels"""
-    plant, power = drawn(rng), float(rng.uniform(0.4, 0.6))
-    made = positions(rng, lambda u: u**power, plant)
-    low, high = 20.0**power, 90.0**power
-    truth = {f"flow_at_{u}": (u**power - low) / (high - low) for u in (30, 60, 80)}
-    return Trial(made, "characteristic", plant.dead_time, truth, LAGS)
+    power = float(rng.uniform(0.4, 0.6))
+    return characteristic(rng, lambda u: u**power)
 
 
 def resolution(rng: Rng) -> Trial:
@@ -149,13 +154,6 @@ def resolution(rng: Rng) -> Trial:
     plant, step = drawn(rng, ((0.03, 0.06), (0.06, 0.1))), float(rng.uniform(0.4, 0.7))
     made = small_steps(rng, lambda u: kano(u, step, step, 1.0), plant)
     return Trial(made, "stiction", plant.dead_time, {"resolution": step}, LAGS)
-
-
-def whole_steps(rng: Rng) -> Trial:
-    """The same, a stem that moves in whole steps of 0.2 to 0.5"""
-    plant, step = drawn(rng, ((0.03, 0.06), (0.06, 0.1))), float(rng.uniform(0.2, 0.5))
-    made = small_steps(rng, lambda u: resolved(u, step), plant)
-    return Trial(made, "resolution", plant.dead_time, {"resolution": step}, LAGS)
 
 
 def linear_positions(rng: Rng) -> Trial:
@@ -212,11 +210,10 @@ ESTIMATED = {
     dead_band: ("dead_band",),
     stiction: ("S", "J"),
     resolution: ("resolution",),
-    whole_steps: ("resolution",),
     end_of_travel: ("travel_high",),
     both_ends: ("travel_low", "travel_high"),
-    equal_percentage: ("rangeability",),
-    quick_opening: ("flow_at_30", "flow_at_60", "flow_at_80"),
+    equal_percentage: tuple(f"flow_at_{u}" for u in _SHOWN),
+    quick_opening: tuple(f"flow_at_{u}" for u in _SHOWN),
 }
 """Names of the parameters that are judged."""
 LINEAR = (linear_step, linear_staircase, linear_positions, linear_small_steps)

@@ -111,8 +111,8 @@ def fit_output_error(
         its parameters; the interval of the dead time is that of both together. Otherwise the fit
         is linear, and its interval also covers the actuators that are not ruled out. Several
         records share actuator and linear part. A slew rate has one value, or one for each
-        direction; stiction with S = J is a resolution; a characteristic is one of equal
-        percentages, or flows at the levels of the command.
+        direction; stiction with S = J is a resolution; a characteristic is told by the flows at
+        the levels of the command.
 
     Returns
     -------

@@ -11,7 +11,7 @@ from .records import ActuatedRecord
 
 _ALIKE = 1e-3  # of the range of the commands: levels that are one
 _MOST_KNOTS = 11
-_KNOTS = 6  # of a command that is at no levels
+_KNOTS = 6  # of a command that is at more levels
 
 
 def levels(parts: Sequence[ActuatedRecord]) -> FloatArray:
@@ -22,32 +22,33 @@ def levels(parts: Sequence[ActuatedRecord]) -> FloatArray:
 
 
 def knots(parts: Sequence[ActuatedRecord]) -> tuple[float, ...]:
-    """Levels of a characteristic by points: those of the commands, at most eleven."""
+    """Levels of a characteristic: those of the commands, or six of a command that is at no few."""
     every = levels(parts)
-    if all(part.listed for part in parts):
-        if every.size > _MOST_KNOTS:
-            every = every[np.round(np.linspace(0, every.size - 1, _MOST_KNOTS)).astype(int)]
-    else:
+    if every.size > _MOST_KNOTS:
         every = np.linspace(every[0], every[-1], _KNOTS)
     return tuple(every.tolist())
 
 
+def moves(parts: Sequence[ActuatedRecord]) -> bool:
+    """Whether commands move at all."""
+    return any(part.moves.size for part in parts)
+
+
 def reverses(parts: Sequence[ActuatedRecord]) -> bool:
     """Whether commands move on in one direction and turn: less tells no dead band from the gain."""
-    moves = _moves(parts)
-    turned = any(np.any(own[1:] * own[:-1] < 0) for own in moves)
-    return turned and sum(own.size for own in moves) > 2
+    turned = any(np.any(sizes[1:] * sizes[:-1] < 0) for sizes in _sizes(parts))
+    return turned and sum(part.moves.size for part in parts) > 2
 
 
 def opens_and_closes(parts: Sequence[ActuatedRecord]) -> bool:
     """Whether commands move in both directions."""
-    every = np.concatenate(_moves(parts))
+    every = np.concatenate(_sizes(parts))
     return bool(np.any(every > 0) and np.any(every < 0))
 
 
 def moves_on(parts: Sequence[ActuatedRecord]) -> bool:
     """Whether a command moves four times or more: a stem then stays at some and catches up."""
-    return max(own.size for own in _moves(parts)) >= 4
+    return max(part.moves.size for part in parts) >= 4
 
 
 def has_levels(parts: Sequence[ActuatedRecord]) -> bool:
@@ -56,18 +57,12 @@ def has_levels(parts: Sequence[ActuatedRecord]) -> bool:
 
 
 def compares_levels(parts: Sequence[ActuatedRecord]) -> bool:
-    """Whether all levels, three or more, are compared by records that share some.
+    """Whether a single record is at all levels, three or more.
 
     A record has a level of its own, so that it tells differences between its positions alone.
     """
-    every = levels(parts)
-    groups: list[set[int]] = []
-    for part in parts:
-        own = set(np.abs(every - part.held[0][:, None]).argmin(axis=1).tolist())
-        apart = [group for group in groups if not group & own]
-        groups = [*apart, own.union(*(group for group in groups if group & own))]
-    return len(groups) == 1 and has_levels(parts)
+    return max(levels([part]).size for part in parts) == levels(parts).size >= 3
 
 
-def _moves(parts: Sequence[ActuatedRecord]) -> list[FloatArray]:
+def _sizes(parts: Sequence[ActuatedRecord]) -> list[FloatArray]:
     return [np.diff(part.command[np.concatenate([[0], part.moves])]) for part in parts]

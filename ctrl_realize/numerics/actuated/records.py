@@ -1,30 +1,32 @@
-"""Records for fits of actuators: means over bins, and what the command does between them.
+"""Records for fits of actuators: commands without noise, and outputs without the local terms.
 
-A command that is held between few moves is a list of moves, and the output is averaged over bins
-that grow with the distance from them (see `bins`); any other one is used sample by sample. Both
-are rules of our own.
+Level, drift and free motion of a record are eliminated by an orthogonal projection [1]_. Only a
+part of a very long record is used, which is our own rule.
+
+References
+----------
+.. [1] G. Golub and V. Pereyra, Separable nonlinear least squares: the variable projection method
+   and its applications, Inverse Problems 19 (2003) R1-R26, doi:10.1088/0266-5611/19/2/201.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from scipy.linalg import block_diag
 
 from ..arrays import FloatArray, IntArray
-from ..signals.bins import response_bins
+from ..engine.responses import SampledInput, SeveralInputs
+from ..engine.varpro import KnownFactor, Problem
 from ..signals.excitation import lively_start
-from ..signals.noise import quantisation_step, rest_noise
-from ..signals.onset import first_motion
 from ..signals.step_sequence import input_moves
 
-MOST_MOVES = 80
-"""Of a command that is a list of moves; beyond that a recursion over the samples is faster."""
+FEW_MOVES = 80
+"""Up to so many moves a command is a test: the plant is at rest where it begins."""
 MOST_SAMPLES = 4000  # of a record with any other command, to limit the time
-_REST = 8  # samples before the first move that tell the noise
-_LEAST_NOISE = 1e-4  # of the range, as for step records
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,64 +39,38 @@ class ActuatedRecord:
         At every sample, without noise.
     dt : float
         Sample time in s.
-    first, width : ndarray of int, shape (M,)
-        Bins of samples.
-    time, output : ndarray, shape (M,)
-        Means over the bins.
     measured : ndarray, shape (N,)
-        Output at every sample, NaN where it is missing.
-    own : ndarray, shape (N, q)
-        Level and other terms of the record that have nothing to do with the command.
-    offset : int
-        First sample of what is used within the record that was given.
+        Output, NaN where it is missing.
+    regressors : ndarray, shape (N, q)
+        Level and other terms of the record that do not depend on the command.
     """
 
     command: FloatArray
     dt: float
-    rows: IntArray
-    first: IntArray
-    width: IntArray
     measured: FloatArray
-    own: FloatArray
-    offset: int = 0
+    regressors: FloatArray
 
     @cached_property
-    def time(self) -> FloatArray:
-        """Mean times of the samples of every bin (M,), in s."""
-        return self.dt * self.averaged(self.rows.astype(np.float64))
-
-    def averaged(self, values: FloatArray) -> FloatArray:
-        """Mean over every bin of values at the samples that there are, (R,) or (R, q)."""
-        sums = np.add.reduceat(values, self.first, axis=0)
-        return np.asarray(sums / self.width.reshape(-1, *[1] * (values.ndim - 1)))
+    def rows(self) -> IntArray:
+        """Samples that are not missing."""
+        return np.flatnonzero(~np.isnan(self.measured))
 
     @cached_property
     def moves(self) -> IntArray:
         """Samples at which the command moves."""
         return np.flatnonzero(np.diff(self.command, prepend=self.command[0]))
 
-    @property
-    def listed(self) -> bool:
-        """Whether the command is a list of few moves."""
-        return self.moves.size <= MOST_MOVES
-
     @cached_property
     def held(self) -> tuple[FloatArray, IntArray]:
-        """Command without repetitions (K,), and the sample of each value.
+        """Command without repetitions (K,), and which of its values every sample has (N,).
 
         A value that is held for two samples or more is there twice, so that a pause is seen.
         """
-        kept = np.zeros(self.command.size, dtype=np.bool_)
+        first = np.zeros(self.command.size, dtype=np.bool_)
         starts = np.concatenate([[0], self.moves])
-        kept[starts] = True
-        kept[np.minimum(starts + 1, self.command.size - 1)] = True
-        index = np.flatnonzero(kept)
-        return self.command[index], index
-
-    def every_sample(self) -> ActuatedRecord:
-        """The same record with every sample as a bin."""
-        rows = np.arange(self.command.size)
-        return replace(self, rows=rows, first=rows, width=np.ones_like(rows))
+        first[starts] = True
+        first[np.minimum(starts + 1, first.size - 1)] = True
+        return self.command[first], np.cumsum(first) - 1
 
 
 def actuated_record(
@@ -103,7 +79,7 @@ def actuated_record(
     dt: float,
     *,
     edges: Sequence[tuple[int, int]] = (),
-    own: FloatArray | None = None,
+    regressors: FloatArray | None = None,
 ) -> ActuatedRecord:
     """Set up a record.
 
@@ -115,48 +91,72 @@ def actuated_record(
         Sample time in s.
     edges : sequence of (index, samples)
         Edges of the command if it is constant between them but for noise.
-    own : ndarray, shape (N, q), optional
-        Terms of the record itself; default: a level.
+    regressors : ndarray, shape (N, q), optional
+        Terms of the record that do not depend on the command; default: a level.
     """
-    own = np.ones((output.size, 1)) if own is None else own
+    regressors = np.ones((output.size, 1)) if regressors is None else regressors
     if edges:
         index, size = input_moves(command, list(edges), command.size)
         clean = np.zeros(command.size)
         clean[index] = size
         command = command[0] + np.cumsum(clean)
-    moves = np.flatnonzero(np.diff(command, prepend=command[0]))
-    rows = np.flatnonzero(~np.isnan(output))
-    few = 0 < moves.size <= MOST_MOVES
-    crossing = _crossing(output[rows], moves, rows) if few else None
-    if crossing is not None or (few and command.size > MOST_SAMPLES):
-        bins = response_bins(output.size, moves.tolist(), crossing or 0).holding(rows)
-        return ActuatedRecord(command, dt, rows, bins.first, bins.width, output, own)
-    offset = 0
-    if command.size > MOST_SAMPLES:
-        offset = lively_start(command[None], MOST_SAMPLES)
-        part = slice(offset, offset + MOST_SAMPLES)
-        command, output, own = command[part], output[part], own[part]
-        rows = np.flatnonzero(~np.isnan(output))
-    every = np.arange(rows.size)
-    ones = np.ones_like(every)
-    return ActuatedRecord(command, dt, rows, every, ones, output, own, offset)
+    found = ActuatedRecord(command, dt, output, regressors)
+    if found.moves.size <= FEW_MOVES or command.size <= MOST_SAMPLES:
+        return found
+    first = lively_start(command[None], MOST_SAMPLES)
+    part = slice(first, first + MOST_SAMPLES)
+    return ActuatedRecord(command[part], dt, output[part], regressors[part])
 
 
-def _crossing(output: FloatArray, moves: IntArray, rows: IntArray) -> int | None:
-    """Samples from a move of the command to the first visible motion, None if there is no rest.
+@dataclass(frozen=True, eq=False)
+class Records:
+    """Records that are fitted together."""
 
-    Not from the dead time of a linear model, which may be any: means over bins that are wide where
-    the response begins would bias the dead time.
-    """
-    edge = int(np.searchsorted(rows, moves[0]))
-    if edge < _REST:
-        return None
-    quantum = quantisation_step(output)
-    since = rows - int(moves[0])
-    sigma, drift = rest_noise(output[:edge], output, quantum, since[:edge])
-    sigma = max(sigma, _LEAST_NOISE * float(np.ptp(output)))
-    motion = first_motion(output, edge, sigma, quantum, drift, since)
-    if motion is None:
-        return None
-    visible = int(moves[0]) + motion.crossing
-    return visible - int(moves[moves <= visible][-1])
+    parts: tuple[ActuatedRecord, ...]
+
+    @cached_property
+    def output(self) -> FloatArray:
+        """Outputs (M,) of all records, one after the other."""
+        return np.concatenate([part.measured[part.rows] for part in self.parts])
+
+    @cached_property
+    def regressors(self) -> FloatArray:
+        """Regressors (M, q) of all records."""
+        return np.asarray(block_diag(*(part.regressors[part.rows] for part in self.parts)))
+
+    @cached_property
+    def _basis(self) -> FloatArray:
+        return np.linalg.qr(self.regressors)[0]
+
+    def projected(self, rows: FloatArray) -> FloatArray:
+        """Rows (K, M) without what the regressors explain."""
+        return np.asarray(rows - (rows @ self._basis) @ self._basis.T)
+
+    @cached_property
+    def data(self) -> FloatArray:
+        """Outputs (M,) without what the regressors explain."""
+        return np.asarray(self.projected(self.output[None])[0])
+
+    @property
+    def range(self) -> float:
+        """Largest range of a command."""
+        return max(float(np.ptp(part.command)) for part in self.parts)
+
+    @property
+    def problem(self) -> Problem:
+        """The problem of linear models of the same records."""
+        inputs = tuple(SampledInput(part.command - part.command[0], part.dt) for part in self.parts)
+        rows = tuple(part.rows for part in self.parts)
+        drive = SeveralInputs(inputs, (0,) * len(rows), rows)
+        weight = np.ones(self.output.size)
+        return Problem(self.output, weight, drive, self.regressors, KnownFactor())
+
+    def with_outputs(self, output: FloatArray) -> Records:
+        """The same records with other outputs (M,)."""
+        ends = np.cumsum([part.rows.size for part in self.parts])[:-1]
+        parts = []
+        for part, values in zip(self.parts, np.split(output, ends), strict=True):
+            measured = part.measured.copy()
+            measured[part.rows] = values
+            parts.append(ActuatedRecord(part.command, part.dt, measured, part.regressors))
+        return Records(tuple(parts))

@@ -14,7 +14,6 @@ from ctrl_realize.actuators import (
     Backlash,
     Characteristic,
     KanoStiction,
-    Resolution,
     Saturation,
     SlewRateLimit,
 )
@@ -117,19 +116,24 @@ def test_a_linear_valve_gets_no_actuator_and_its_interval_covers_those_not_ruled
 
 LEVELS = staircase(10, 10, 10, 10, -20, -10, -20, -20, 10, hold=80)  # 20 to 90
 SMALL = staircase(*[0.5] * 10, *[-0.5] * 14, *[0.5] * 8, hold=40)
-FLOWS = {f"flow_at_{u}": (u**0.5 - 20**0.5) / (90**0.5 - 20**0.5) for u in range(30, 90, 10)}
+
+
+def flows(plug):
+    """Flows at the levels between 20 and 90, from 0 to 1, and the width of their intervals."""
+    low, *inside, high = plug.simulate(np.arange(20.0, 100.0, 10.0))
+    parts = (np.array(inside) - low) / (high - low)
+    return {f"flow_at_{u}": (part, 0.03) for u, part in zip(range(30, 90, 10), parts, strict=True)}
+
+
+CURVED = (Characteristic("equal-percentage", rangeability=30), Characteristic("quick-opening"))
 OTHERS = [
     ("slew_rate", SlewRateLimit(12.0, 20.0), staircase(30, -30, 20, -30, hold=90),
      {"slew_rate_opening": (12.0, 1.2), "slew_rate_closing": (20.0, 2.0)}),
     ("saturation", Saturation(27.0, 84.0), LEVELS,
      {"travel_low": (27.0, 0.5), "travel_high": (84.0, 0.5)}),
     ("saturation", Saturation(-100.0, 76.0), LEVELS, {"travel_high": (76.0, 0.5)}),
-    ("characteristic", Characteristic("equal-percentage", rangeability=30), LEVELS,
-     {"rangeability": (30.0, 1.5)}),
-    ("characteristic", Characteristic("quick-opening"), LEVELS,
-     {name: (flow, 0.03) for name, flow in FLOWS.items()}),
+    *(("characteristic", plug, LEVELS, flows(plug)) for plug in CURVED),
     ("stiction", KanoStiction(1.7, 1.7), SMALL, {"resolution": (1.7, 0.6)}),
-    ("resolution", Resolution(1.3), SMALL, {"resolution": (1.3, 0.3)}),
 ]  # fmt: skip
 
 

@@ -10,10 +10,12 @@ import numpy as np
 from ...._parameters import Parameter
 from ....data import Record
 from ....errors import DataError, NoStepError
-from ....numerics.actuated.choice import ActuatedFit, Rival, fit_actuated
-from ....numerics.actuated.errors import Errors, propagated
-from ....numerics.actuated.records import MOST_MOVES, ActuatedRecord, actuated_record
+from ....numerics.actuated.choice import ActuatedFit, fit_actuated
+from ....numerics.actuated.intervals import propagated
+from ....numerics.actuated.motions import at_parts
+from ....numerics.actuated.records import FEW_MOVES, ActuatedRecord, actuated_record
 from ....numerics.arrays import FloatArray, IntArray
+from ....numerics.constants import CHI2_95, Z_95
 from ....numerics.engine.local_terms import Segments, local_columns
 from ....numerics.engine.structures import PLAUSIBLE, Scales
 from ....numerics.engine.varpro import Structure
@@ -32,7 +34,7 @@ from ....numerics.signals.noise import mad_sigma
 from ...step.steps import found_step
 from ..flags import model_flags
 from ..result import OutputErrorFit
-from .alternatives import ALTERNATIVES, SHOWN, Found
+from .alternatives import ALTERNATIVES, alternative_of, model_of
 from .result import ActuatorFit
 from .words import (
     cannot_tell,
@@ -45,6 +47,7 @@ from .words import (
 )
 
 _MOST_EDGES = 24  # of a command with noise, whose levels are then found
+_WELL = 0.25  # relative half width of an interval up to which a parameter is resolved
 
 
 def with_actuator(
@@ -60,7 +63,11 @@ def with_actuator(
     DataError
         The commands cannot identify the actuator that was requested.
     """
-    parts = _parts(result)
+    free = result
+    if len(result.records) > 1 or (result.data.load is not None and result.data.load.early):
+        # What a valve does makes a linear model see a load soon after the step.
+        free = replace(result, data=replace(result.data, load=None))
+    parts = _parts(free)
     names = tuple(ALTERNATIVES) if asked == "auto" else (asked,)
     tried = {name: ALTERNATIVES[name].wanted(parts) for name in names}
     identifiable = [name for name in names if tried[name]]
@@ -71,22 +78,20 @@ def with_actuator(
     # A kind may belong to two of those that were asked for.
     wanted = list(dict.fromkeys(one for name in identifiable for one in tried[name]))
     scales = _scales(result)
-    found = fit_actuated(
-        parts, scales, wanted, rivals=_rivals(result, parts), structures=structures
-    )
+    found = fit_actuated(parts, scales, wanted, structures)
     if found is None:
         return replace(result, choices=result.choices + skipped)
     if not found.chosen:
         said = (*skipped, not_needed(identifiable, found.evidence))
         return replace(_both(result, found), choices=result.choices + said)
-    return _replaced(result, parts, scales, found, skipped)
+    return _replaced(free, parts, scales, found, skipped)
 
 
 def _both(result: OutputErrorFit, found: ActuatedFit) -> OutputErrorFit:
     """Let the interval cover a model with an actuator that is not ruled out."""
     if found.evidence < -PLAUSIBLE:
         return result
-    low, high = found.dead_time_ends
+    low, high = found.ends[0]
     old = result.estimate
     return replace(result, estimate=replace(old, low=min(low, old.low), high=max(high, old.high)))
 
@@ -99,8 +104,8 @@ def _parts(result: OutputErrorFit) -> list[ActuatedRecord]:
     for record in result.records:
         output, command = np.ravel(record.output), np.ravel(record.input)
         edges = _edges(record)
-        own = None if edges else _free_motion(result, output.size)
-        found.append(actuated_record(output, command, record.dt, edges=edges, own=own))
+        terms = None if edges else _free_motion(result, output.size)
+        found.append(actuated_record(output, command, record.dt, edges=edges, regressors=terms))
     return found
 
 
@@ -109,17 +114,17 @@ def _only_part(result: OutputErrorFit) -> ActuatedRecord:
     output, command = np.ravel(record.output).copy(), np.ravel(record.input)
     if np.isfinite(result.onset):
         every = replace(data, rows=np.arange(command.size), output=np.zeros(command.size))
-        own = own_regressors(every, result.estimate.poles if result.data.relaxing else None)
-        return actuated_record(output, command, record.dt, edges=data.edges, own=own)
+        terms = own_regressors(every, result.estimate.poles if result.data.relaxing else None)
+        return actuated_record(output, command, record.dt, edges=data.edges, regressors=terms)
     rows = _rows(result)
     output[: rows[0]] = np.nan
     part = slice(0, int(rows[-1]) + 1)
     if rows[-1] - rows[0] + 1 < output.size // 2:
         # Of a long record the same part as that of the linear fit.
         part = slice(int(rows[0]), int(rows[-1]) + 1)
-    few = np.count_nonzero(np.diff(command[part])) <= MOST_MOVES  # a test, which begins at rest
+    few = np.count_nonzero(np.diff(command[part])) <= FEW_MOVES  # a test, which begins at rest
     free = None if few else _free_motion(result, output[part].size)
-    return actuated_record(output[part], command[part], record.dt, own=free)
+    return actuated_record(output[part], command[part], record.dt, regressors=free)
 
 
 def _rows(result: OutputErrorFit) -> IntArray:
@@ -157,25 +162,6 @@ def _scales(result: OutputErrorFit) -> Scales:
     )
 
 
-def _rivals(result: OutputErrorFit, parts: Sequence[ActuatedRecord]) -> list[Rival]:
-    """Linear models of a single record: the one chosen, and the one that follows it closest."""
-    if len(parts) > 1:
-        return []
-    part = parts[0]
-    residual = np.zeros(part.command.size)
-    left = result.measured - result.fitted
-    if left.size != part.rows.size:
-        return []
-    residual[part.rows] = left
-    followed = result.estimate.followed
-    found = [Rival(residual, result.estimate.structure)]
-    if followed.complete < 100:
-        # Of the closest one only the size of the residual is known.
-        smaller = (100 - followed.by_closest) / (100 - followed.complete)
-        found.append(Rival(smaller * residual, followed.closest))
-    return found
-
-
 def _replaced(
     result: OutputErrorFit,
     parts: Sequence[ActuatedRecord],
@@ -183,20 +169,15 @@ def _replaced(
     found: ActuatedFit,
     skipped: tuple[str, ...],
 ) -> OutputErrorFit:
-    errors = propagated(found.task, found.member, found.coefficients, found.variance, scales.length)
-    several = len(parts) > 1
     measured = np.concatenate([part.measured[part.rows] for part in parts])
-    fitted = np.concatenate(
-        [model[part.rows] for part, model in zip(parts, found.fitted, strict=True)]
-    )
     data, time = result.data, result.time
-    if several or measured.size != result.measured.size:
+    if len(parts) > 1 or measured.size != result.measured.size:
         command = np.concatenate([part.command[part.rows] for part in parts])
-        span = sum(part.rows.size for part in parts) * result.dt
-        data = bare_data(measured, command, result.dt, found.sigma, span)
+        sigma, span = float(np.std(found.residual)), measured.size * result.dt
+        data = bare_data(measured, command, result.dt, sigma, span)
         time = result.dt * np.arange(measured.size, dtype=np.float64)
-    estimate = _estimate(result, found, errors, (measured, fitted))
-    actuator = _actuator_fit(result, found, errors)
+    estimate = _estimate(result, scales, found, measured)
+    actuator = _actuator_fit(result, found)
     replaced = replace(
         result,
         estimate=estimate,
@@ -207,7 +188,9 @@ def _replaced(
         flags=(),
         actuator=actuator,
     )
-    flags = [flag for flag in result.flags if of_the_record(flag.code)]
+    flags = [
+        flag for flag in result.flags if of_the_record(flag.code, load=result.data.load is not None)
+    ]
     of_model = model_flags(estimate, result.dt, scales.length, None)
     flags += [flag for flag in of_model if flag is not None]
     if actuator.unresolved:
@@ -218,38 +201,34 @@ def _replaced(
 
 
 def _estimate(
-    result: OutputErrorFit,
-    found: ActuatedFit,
-    errors: Errors,
-    shown: tuple[FloatArray, FloatArray],
+    result: OutputErrorFit, scales: Scales, found: ActuatedFit, measured: FloatArray
 ) -> OutputErrorEstimate:
-    measured, fitted = shown
     member, structure = found.member, found.member.family.structure
-    low, high = found.dead_time_ends
-    low, high = min(low, member.dead_time), max(high, member.dead_time)
+    static, parameters = propagated(member, found.variance, scales.length)
+    fitted = member.family.records.output - found.residual
+    low, high = found.ends[0]
+    dead_time = float(member.x[0])
+    low, high = min(low, dead_time), max(high, dead_time)
     complete = float(fit_percent(measured[None], fitted[None])[0])
-    stepped = np.isfinite(result.onset) and len(result.records) == 1
-    if stepped:
-        noise = result.data.sigma
-        free = max(found.task.records.data.size - member.parameters, 1)
-        normalized_rms = float(np.sqrt(member.cost / free)) / noise
+    if np.isfinite(result.onset) and len(result.records) == 1:
+        free = max(measured.size - member.parameters, 1)
+        normalized_rms = float(np.sqrt(member.cost / free)) / result.data.sigma
         adequate = normalized_rms <= ADEQUATE * max(result.data.colour, 1.0)
     else:
         normalized_rms, adequate = float(np.sqrt(found.correlation)), found.correlation <= WHITE
     row = StructureFit(
-        structure, member.dead_time, errors.static.total, 0.0, (low, high), found.poles,
-        errors.static.gain,
+        structure, dead_time, static.total, 0.0, (low, high), member.poles, static.gain
     )  # fmt: skip
-    profile = (np.array([low, member.dead_time, high]), np.array([3.84, 0.0, 3.84]))
+    profile = (np.array([low, dead_time, high]), np.array([CHI2_95, 0.0, CHI2_95]))
     return replace(
         result.estimate,
-        dead_time=member.dead_time,
+        dead_time=dead_time,
         low=low,
         high=high,
-        std=found.std,
+        std=(high - low) / (2 * Z_95),
         structure=structure,
-        poles=found.poles,
-        numerator=found.numerator,
+        poles=member.poles,
+        numerator=static.gain * np.prod(-member.poles).real * np.ones(1),
         adequate=bool(adequate),
         residual=Residual(mad_sigma(measured - fitted), normalized_rms, found.correlation),
         structures=(row,),
@@ -259,35 +238,39 @@ def _estimate(
         profile=profile,
         open_start=False,
         distributed=DistributedLags(),
-        static=errors.static,
+        static=static,
         alike=(),
         others=None,
         close=(),
-        process=result.estimate.process._replace(parameters=errors.parameters),
+        process=result.estimate.process._replace(parameters=parameters),
         unweighted=None,
+        load=result.data.load,
     )
 
 
-def _actuator_fit(result: OutputErrorFit, found: ActuatedFit, errors: Errors) -> ActuatorFit:
-    member, family = found.member, found.member.family
-    start = float(member.starts[0]) if member.starts.size else 0.0
-    shown = SHOWN[family.kind]
-    shown_as = Found(member.values, start, family.levels, result.input_unit)
-    timed = shown.unit == "u/s"
-    unit = shown.unit and shown_as.unit and shown_as.unit + shown.unit[1:]
-    parameters = []
-    for name, value, std, ends in zip(
-        shown.names(shown_as), member.values, errors.value_std, found.value_ends, strict=True
-    ):
-        number, low, high = (shown.number(shown_as, one) for one in (value, *ends))
-        # Their scale may differ, by which the error does as well.
-        away = shown.number(shown_as, value + std) - number
-        parameters.append(Parameter(name, number, away, low, high, False, unit, -1 if timed else 0))
+def _actuator_fit(result: OutputErrorFit, found: ActuatedFit) -> ActuatorFit:
+    member, family, motion = found.member, found.member.family, found.member.motion
+    travel, timed = family.kind == "saturation", family.kind.startswith("slew")
+    unit = "" if family.kind == "characteristic" else result.input_unit
+    unit += "/s" if unit and timed else ""
+    parameters, vague = [], []
+    for name, value, ends in zip(family.names, motion.values, found.ends[1:], strict=True):
+        if travel and (ends.low <= 0 or ends.high >= 1):
+            continue  # an end that the commands do not reach
+        number, low, high = value, *ends
+        if travel:
+            number, low, high = at_parts(motion.levels, (value, *ends)).tolist()
+        std, times = (high - low) / (2 * Z_95), -1 if timed else 0
+        parameters.append(Parameter(name, number, std, low, high, False, unit, times))
+        # Parts of the range are measured by it, anything else by itself.
+        size = (ends.low + ends.high) / 2 if family.properties.logged else 1 / 2
+        if not ends.high - ends.low <= 2 * _WELL * size:
+            vague.append(unresolved(parameters[-1], alternative_of(family.kind).test))
     return ActuatorFit(
-        model=shown.model(shown_as),
+        model=model_of(motion, float(member.starts[0]) if member.starts.size else 0.0),
         actuator_at=family.place,
         parameters=tuple(parameters),
         starts=tuple(member.starts.tolist()),
         evidence=found.evidence,
-        unresolved=unresolved(parameters, family, found.value_ends),
+        unresolved=tuple(vague),
     )

@@ -33,10 +33,9 @@ class ActuatorFit:
     parameters : tuple of Parameter
         Estimates with standard errors and 95 % intervals (profile likelihood): ``"slew_rate"`` per
         second, or ``"slew_rate_opening"`` and ``"slew_rate_closing"``; ``"dead_band"``;
-        ``"resolution"``; ``"S"`` and ``"J"``; ``"travel_low"``, ``"travel_high"`` or both;
-        ``"rangeability"`` over 0 to 100 % (over the range of the commands if they have another
-        unit, or cover less than a fifth); or, from 0 at the lowest to 1 at the highest command,
-        ``"flow_at_40"``, ... at those between.
+        ``"resolution"``; ``"S"`` and ``"J"``; ``"travel_low"``, ``"travel_high"`` or both; or, from
+        0 at the lowest to 1 at the highest command, ``"flow_at_40"``, ... at those between. The
+        standard error is half of the interval over 1.96.
     starts : tuple of float
         Place within play or friction at the beginning of each record, from -1 (came from above) to
         1 (from below); empty where it does not matter.

@@ -6,36 +6,20 @@ from collections.abc import Sequence
 
 from ...._parameters import Parameter
 from ...._wording import plainly
-from ....numerics.actuated.family import Family
-from ....numerics.actuated.intervals import Ends
 from ....results import Flag
-from .alternatives import ALTERNATIVES, SHOWN
+from .alternatives import ALTERNATIVES
 
-_OF_THE_RECORD = frozenset(
-    {
-        "hum",
-        "drift",
-        "load_disturbance",
-        "no_rest",
-        "not_at_rest",
-        "coarse_quantisation",
-        "outliers",
-        "stuck_output",
-        "held_output",
-        "output_at_limit",
-        "onset_in_gap",
-        "cut",
-        "noncausal",
-        "feedback",
-    }
-)
+_OF_THE_RECORD = frozenset({
+    "hum", "drift", "no_rest", "not_at_rest", "coarse_quantisation", "outliers",
+    "stuck_output", "held_output", "output_at_limit", "onset_in_gap", "cut", "noncausal",
+    "feedback",
+})  # fmt: skip
 """Flags about a record, whatever the model is."""
-_WELL = 0.25  # relative half width of an interval up to which a parameter is resolved
 
 
-def of_the_record(code: str) -> bool:
+def of_the_record(code: str, *, load: bool) -> bool:
     """Whether a flag of a linear fit remains, if a model with an actuator takes its place."""
-    return code in _OF_THE_RECORD
+    return code in _OF_THE_RECORD or (load and code == "load_disturbance")
 
 
 def missing_tests(names: Sequence[str]) -> str:
@@ -63,21 +47,12 @@ def not_needed(names: Sequence[str], evidence: float) -> str:
     )
 
 
-def unresolved(
-    parameters: Sequence[Parameter], family: Family, ends: Sequence[Ends]
-) -> tuple[str, ...]:
-    """List the parameters that the records determine badly, with a test that would help."""
-    better = SHOWN[family.kind].better
-    found = []
-    for one, (low, high) in zip(parameters, ends, strict=True):
-        # Parts of the range are measured by it, anything else by itself.
-        size = (low + high) / 2 if family.form.logged else 1 / 2
-        if not high - low <= 2 * _WELL * size:
-            found.append(
-                f"{one.label} lies between {one.low:.3g} and {one.high:.3g}, and the records do "
-                f"not determine it more closely; {better} would"
-            )
-    return tuple(found)
+def unresolved(parameter: Parameter, test: str) -> str:
+    """Say that the records determine a parameter badly, and which test would help."""
+    return (
+        f"{parameter.label} lies between {parameter.low:.3g} and {parameter.high:.3g}, and the "
+        f"records do not determine it more closely; {test} would"
+    )
 
 
 def not_told(sentences: Sequence[str]) -> Flag:
