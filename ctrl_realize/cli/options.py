@@ -10,13 +10,9 @@ from typing import Annotated, Any, TypeAlias
 
 import typer
 
-_OPTION = typer.Option
+from .arguments import choice, option_of, options_of
 
-SPELLED = {
-    "output": "--output-column", "start": "--from", "stop": "--to", "header": "--no-header",
-    "band_hz": "--band",
-}  # fmt: skip
-"""Options that are not spelled like their argument: ``--output`` is the folder."""
+_OPTION = typer.Option
 
 
 class Method(str, Enum):  # noqa: UP042  # typer shows the values of a plain str Enum
@@ -25,33 +21,6 @@ class Method(str, Enum):  # noqa: UP042  # typer shows the values of a plain str
     output_error = "output_error"
     scan = "scan"
     paper = "paper"
-
-
-class Gains(str, Enum):  # noqa: UP042
-    """Gains of several records that are fitted together."""
-
-    common = "common"
-    own = "own"
-
-
-class ActuatorKind(str, Enum):  # noqa: UP042
-    """What is fitted beside the linear part."""
-
-    auto = "auto"
-    slew_rate = "slew_rate"
-    dead_band = "dead_band"
-    stiction = "stiction"
-    resolution = "resolution"
-    saturation = "saturation"
-    characteristic = "characteristic"
-
-
-class Missing(str, Enum):  # noqa: UP042
-    """Treatment of missing samples."""
-
-    refuse = "refuse"
-    keep = "keep"
-    hold = "hold"
 
 
 class LoopKind(str, Enum):  # noqa: UP042
@@ -87,40 +56,12 @@ MethodOption = Annotated[
     Method, _OPTION("--method", help="output_error fits the raw record; scan and paper use "
                     "realization."),
 ]  # fmt: skip
-Order = Annotated[
-    int | None, _OPTION(min=1, help="Model order without the delay. Default: estimated.")
-]
-MaxDelay = Annotated[int | None, _OPTION(min=1, help="Largest delay to consider, in samples.")]
-Structures = Annotated[
-    list[str] | None, _OPTION(help="Process model: P1D, P2DZ, FOPDT, SOPDT, ...; repeatable.")
-]
-Samples = Annotated[
-    int | None, _OPTION(min=1, help="scan, paper: number of samples of the impulse response.")
-]
-CutoffHz = Annotated[float | None, _OPTION(help="scan, paper: cutoff of the filter, in Hz.")]
 Frf = Annotated[Path | None, _OPTION(help="Measured frequency response to compare the model with.")]
 Joint = Annotated[
     bool, _OPTION("--joint", help="Fit one model to all records, and to the --frf if given.")
 ]
-GainsOption = Annotated[
-    Gains | None,
-    _OPTION("--gains", help="own: each record of a joint fit has its own gain. Implies --joint."),
-]
-ActuatorOption = Annotated[
-    ActuatorKind | None,
-    _OPTION(
-        "--actuator",
-        help="Fit the limits of a valve or drive as well; auto: choose by information criterion.",
-    ),
-]
 Separate = Annotated[
     bool, _OPTION("--separate", help="Treat the records as different plants: one folder each.")
-]
-By = Annotated[
-    str | None, _OPTION(help="A file holds several tests: the column that separates them.")
-]
-Split = Annotated[
-    bool, _OPTION("--split", help="A file holds several tests: split it where its time jumps.")
 ]
 Jobs = Annotated[
     int | None,
@@ -131,16 +72,6 @@ NoReport = Annotated[
 ]
 
 # how to judge a valve
-CommandRange = Annotated[
-    tuple[float, float] | None,
-    _OPTION(metavar="CLOSED OPEN", help="Command of the closed and the open valve. Default: 0 100 "
-            "for %, 4 20 for mA, otherwise the range of the records."),
-]  # fmt: skip
-TravelRange = Annotated[
-    tuple[float, float] | None,
-    _OPTION(metavar="CLOSED OPEN", help="Position of the closed and the open valve. Default: 0 100 "
-            "for %, otherwise such that the gain of the larger steps is one."),
-]  # fmt: skip
 Limit = Annotated[
     list[str] | None,
     _OPTION(help="Permitted values, such as t86=0.5, gain=0.9:1.1, t86@2=0.4 (steps of 2 %); "
@@ -155,79 +86,7 @@ SetPoint = Annotated[
     str | None, _OPTION("--set-point", help="Column of the set point, if it moves.")
 ]
 
-# how to read records
-Time = Annotated[str | None, _OPTION(help="Time column, name or number from 0.")]
-Input = Annotated[
-    list[str] | None, _OPTION("--input", help="Input column or tag, name or number; repeatable.")
-]
-OutputColumn = Annotated[
-    list[str] | None,
-    _OPTION("--output-column", "--response", help="Output column or tag; repeatable."),
-]
-Dt = Annotated[float | None, _OPTION(help="Sample time in s, where there is no time column.")]
-TimeUnit = Annotated[str | None, _OPTION(help="s, ms, us, ns, min, h or day.")]
-TimeFormat = Annotated[
-    str | None, _OPTION(help="Format of dates, such as '%d.%m.%Y %H:%M:%S'. Default: detected.")
-]
-TimeZone = Annotated[
-    str | None, _OPTION(help="Zone of a clock that has summer time, such as Europe/Berlin.")
-]
-Wrap = Annotated[
-    float | None, _OPTION(help="Number of values of a counter that starts again: its turns join.")
-]
-From = Annotated[str | None, _OPTION("--from", help="First time to use, in s or as a date.")]
-To = Annotated[str | None, _OPTION("--to", help="Last time to use, in s or as a date.")]
-MissingOption = Annotated[
-    Missing | None,
-    _OPTION(
-        "--missing",
-        help="keep: use records with bad cells, gaps or irregular times as they are; hold: the "
-        "input holds its last value meanwhile.",
-    ),
-]
-NaValues = Annotated[
-    list[str] | None, _OPTION(help="Further word or number without a value; repeatable.")
-]
-Quality = Annotated[str | None, _OPTION(help="Column of the quality; none: ignore qualities.")]
-Good = Annotated[list[str] | None, _OPTION(help="Good quality; repeatable. Default: not Bad.")]
-Resample = Annotated[
-    bool, _OPTION("--resample", help="Resample jittering samples onto a uniform time axis.")
-]
-Rest = Annotated[
-    tuple[float, float] | None,
-    _OPTION(metavar="INPUT OUTPUT", help="Steady state before a record that begins with its step."),
-]
-
-# how to read any file
-Delimiter = Annotated[str | None, _OPTION(help="Column separator: ',' ';' tab. Default: detected.")]
-Decimal = Annotated[str | None, _OPTION(help="'.' or ','. Default: detected.")]
-Encoding = Annotated[str | None, _OPTION(help="Encoding of text. Default: detected.")]
-Comment = Annotated[str | None, _OPTION(help="Sign that begins comments. Default: detected.")]
-NoHeader = Annotated[bool, _OPTION("--no-header", help="The first line holds no names.")]
-SkipRows = Annotated[int | None, _OPTION(min=0, help="Lines to skip at the start.")]
-Variable = Annotated[
-    str | None, _OPTION(help="Variable of a .mat or .npz file, group, or sheet of a workbook.")
-]
-MaxBytes = Annotated[float | None, _OPTION(help="Largest file, packed or not. Default: 2 GiB.")]
-
-# how to read frequency responses
-Frequency = Annotated[str | None, _OPTION(help="Column of the frequency.")]
-Magnitude = Annotated[str | None, _OPTION(help="Column of the magnitude.")]
-Phase = Annotated[str | None, _OPTION(help="Column of the phase.")]
-Real = Annotated[str | None, _OPTION(help="Column of the real part.")]
-Imag = Annotated[str | None, _OPTION(help="Column of the imaginary part.")]
-FrequencyUnit = Annotated[str | None, _OPTION(help="Hz, kHz, MHz or rad/s.")]
-MagnitudeUnit = Annotated[str | None, _OPTION(help="abs or dB.")]
-PhaseUnit = Annotated[str | None, _OPTION(help="deg or rad.")]
-
 # comparison
-MinCoherence = Annotated[
-    float | None, _OPTION(help="Smallest coherence of a trusted point. Default: 0.95.")
-]
-Band = Annotated[
-    tuple[float, float] | None,
-    _OPTION("--band", metavar="LOW HIGH", help="Compare in this band, in Hz."),
-]
 HoldOption = Annotated[
     Hold,
     _OPTION(
@@ -239,33 +98,76 @@ HoldOption = Annotated[
 Given: TypeAlias = dict[str, Any]
 """Arguments of Python for the options of a group that were given, see `files.with_options`."""
 
-_FREQUENCY_RESPONSE: dict[str, Any] = {
-    "frequency": Frequency, "magnitude": Magnitude, "phase": Phase, "real": Real, "imag": Imag,
-    "frequency_unit": FrequencyUnit, "magnitude_unit": MagnitudeUnit, "phase_unit": PhaseUnit,
-}  # fmt: skip
-_ANY_FILE: dict[str, Any] = {
-    "delimiter": Delimiter, "decimal": Decimal, "encoding": Encoding, "comment": Comment,
-    "no_header": NoHeader, "skip_rows": SkipRows, "variable": Variable, "max_bytes": MaxBytes,
-}  # fmt: skip
-_RECORD: dict[str, Any] = {
-    "time": Time, "input": Input, "output": OutputColumn, "dt": Dt, "time_unit": TimeUnit,
-    "time_format": TimeFormat, "time_zone": TimeZone, "start": From, "stop": To,
-    "missing": MissingOption, "na_values": NaValues, "quality": Quality, "good": Good,
-    "wrap": Wrap, "resample": Resample, "rest": Rest, **_ANY_FILE,
-}  # fmt: skip
+
+def _asked(kind: Any, said: str, *names: str, **limits: Any) -> Any:
+    return Annotated[kind if kind is bool else kind | None, _OPTION(*names, help=said, **limits)]
+
+
+_OF_TEXT = [
+    "delimiter",
+    "decimal",
+    "encoding",
+    "comment",
+    "no_header",
+    "skip_rows",
+    "variable",
+    "max_bytes",
+]
+_RECORD = options_of("io/records.py", "read_record", "name")
+_FREQUENCY_RESPONSE = options_of(
+    "io/frf.py", "read_frf", " ".join(["response coherence std name header", *_OF_TEXT])
+)
+_PAIR = tuple[float, float]
 GROUPS: dict[str, dict[str, Any]] = {
     "chosen": {
-        "order": Order, "max_delay": MaxDelay, "structures": Structures, "samples": Samples,
-        "cutoff_hz": CutoffHz, "gains": GainsOption, "actuator": ActuatorOption,
+        "order": _asked(int, "Model order without the delay. Default: estimated.", min=1),
+        "max_delay": _asked(int, "Largest delay to consider, in samples.", min=1),
+        "structures": _asked(
+            list[str], "Process model: P1D, P2DZ, FOPDT, SOPDT, ...; repeatable."
+        ),
+        "samples": _asked(
+            int, "scan, paper: number of samples of the impulse response.", min=1
+        ),
+        "cutoff_hz": _asked(float, "scan, paper: cutoff of the filter, in Hz."),
+        "gains": _asked(
+            choice("common", "own"),
+            "own: each record of a joint fit has its own gain. Implies --joint.",
+        ),
+        "actuator": _asked(
+            choice("auto", "slew_rate", "dead_band", "stiction", "resolution", "saturation",
+                   "characteristic"),
+            "Fit the limits of a valve or drive as well; auto: choose by information criterion.",
+        ),
     },
-    "tests": {"by": By, "split": Split},
+    "tests": {
+        "by": _asked(str, "A file holds several tests: the column that separates them."),
+        "split": _asked(
+            bool, "A file holds several tests: split it where its time jumps.", "--split"
+        ),
+    },
     "record": _RECORD,
-    "valve_test": {name: one for name, one in _RECORD.items() if name != "missing"},
-    "trend": {name: one for name, one in _RECORD.items() if name not in ("missing", "rest")},
+    "valve_test": {name: option for name, option in _RECORD.items() if name != "missing"},
+    "trend": {
+        name: option for name, option in _RECORD.items() if name not in ("missing", "rest")
+    },
     "response": _FREQUENCY_RESPONSE,
-    "response_file": {**_FREQUENCY_RESPONSE, **_ANY_FILE},
-    "trusted": {"min_coherence": MinCoherence, "band_hz": Band},
-    "ranges": {"command_range": CommandRange, "travel_range": TravelRange},
+    "response_file": {**_FREQUENCY_RESPONSE, **{name: _RECORD[name] for name in _OF_TEXT}},
+    "trusted": {
+        "min_coherence": _asked(float, "Smallest coherence of a trusted point. Default: 0.95."),
+        "band_hz": _asked(
+            _PAIR, "Compare in this band, in Hz.", "--band", metavar="LOW HIGH"
+        ),
+    },
+    "ranges": {
+        "command_range": _asked(
+            _PAIR, "Command of the closed and the open valve. Default: 0 100 for %, 4 20 for mA, "
+            "otherwise the range of the records.", metavar="CLOSED OPEN",
+        ),
+        "travel_range": _asked(
+            _PAIR, "Position of the closed and the open valve. Default: 0 100 for %, otherwise "
+            "such that the gain of the larger steps is one.", metavar="CLOSED OPEN",
+        ),
+    },
 }  # fmt: skip
 """Options that several commands share, or that go together to one function of Python."""
 
@@ -327,11 +229,6 @@ def _spelled(found: re.Match[str]) -> str:
         return option
     plain = value[1:-1] if value[0] in "'\"" else value
     return f"{option} {plain if _BARE.fullmatch(plain) else value}"
-
-
-def option_of(argument: str) -> str:
-    """Option of an argument."""
-    return SPELLED.get(argument, f"--{argument.replace('_', '-')}")
 
 
 def words_of(keywords: Mapping[str, Any]) -> list[str]:

@@ -72,10 +72,21 @@ def read_frf(
     ----------
     path : path-like
         The file; its type is determined from its first bytes.
-    frequency, magnitude, phase, real, imag, response, coherence, std : str or int, optional
-        Columns, by name or by number from 0. The response is given by magnitude and phase, by real
-        and imaginary part, or by one complex array. `std` is the standard deviation of the complex
-        response, in its unit.
+    frequency : str or int, optional
+        Column of the frequency, by name or by number from 0.
+    magnitude : str or int, optional
+        Column of the magnitude.
+    phase : str or int, optional
+        Column of the phase.
+    real : str or int, optional
+        Column of the real part.
+    imag : str or int, optional
+        Column of the imaginary part.
+    response : str or int, optional
+        A complex array, in place of magnitude and phase, or real and imaginary part.
+    coherence, std : str or int, optional
+        Columns of the coherence, and of the standard deviation of the complex response, in its
+        unit.
     frequency_unit : str, optional
         ``"Hz"``, ``"kHz"``, ``"MHz"`` or ``"rad/s"``.
     magnitude_unit : str, optional

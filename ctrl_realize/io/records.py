@@ -5,9 +5,9 @@ from __future__ import annotations
 import inspect
 import os
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any, Literal
 
 import numpy as np
@@ -60,9 +60,9 @@ def read_record(
     start: Any = None,
     stop: Any = None,
     missing: Literal["refuse", "keep", "hold"] = "refuse",
-    na_values: Any = None,
+    na_values: str | float | Sequence[str | float] | None = None,
     quality: str | int | None = "auto",
-    good: Any = None,
+    good: str | float | Sequence[str | float] | None = None,
     wrap: float | None = None,
     resample: bool = False,
     rest: Sequence[Any] | None = None,
@@ -82,55 +82,65 @@ def read_record(
     path : path-like
         The file; its type is determined from its first bytes.
     time : str or int, optional
-        Time column, by name or by number from 0: numbers, dates or times of day (with their date in
-        a column of its own, too).
-    input, output : str, int or sequence of them, optional
-        Columns (or tags) of the signals; several make a record of several channels. Columns of
-        ``ON`` and ``OFF`` are 1 and 0; ``12.5 %`` is 12.5.
+        Time column, by name or by number from 0. It holds numbers, dates or times of day (with
+        their date in a column of its own, too).
+    input : str, int or sequence of them, optional
+        Input column or tag, by name or by number from 0.
+    output : str, int or sequence of them, optional
+        Output column or tag. Several make a record of several channels. Columns of ``ON`` and
+        ``OFF`` are 1 and 0; ``12.5 %`` is 12.5.
     dt : float, optional
-        Sample time in s, instead of a time column.
+        Sample time in s, where there is no time column.
     time_unit : str, optional
-        ``"s"``, ``"ms"``, ``"us"``, ``"ns"``, ``"min"``, ``"h"`` or ``"day"``; ``"auto"``: that of
+        ``"s"``, ``"ms"``, ``"us"``, ``"ns"``, ``"min"``, ``"h"`` or ``"day"``. ``"auto"``: that of
         the header, or s. For a clock such as ``12:34`` it is the unit of the first number.
     time_format : str, optional
-        Format of dates, as for `datetime.strptime`. Default: ISO 8601 or, where the cells tell, the
-        order of day and month.
+        Format of dates, such as ``%d.%m.%Y %H:%M:%S``, see `datetime.strptime`. Default: ISO 8601
+        or, where the cells tell, the order of day and month.
     time_zone : str, optional
-        Zone of a clock that has summer time, such as ``"Europe/Berlin"``: the hour that comes twice
+        Zone of a clock that has summer time, such as ``"Europe/Berlin"``. The hour that comes twice
         and the one that is left out are put right. Dates in `start` and `stop` are of that zone.
-    delimiter, decimal, encoding, comment : str, optional
-        Format of text; ``"auto"``: determined from the first lines.
+    delimiter : str, optional
+        Column separator, such as ``,`` or ``;`` or tab; ``"auto"``: detected.
+    decimal : str, optional
+        Decimal sign, ``.`` or ``,``; ``"auto"``: detected.
+    encoding : str, optional
+        Encoding of text; ``"auto"``: detected.
+    comment : str or None, optional
+        Sign that begins comments; ``"auto"``: detected.
     header : bool or "auto", optional
-        Whether the first line contains the names.
+        False: The first line holds no names.
     skip_rows : int, optional
-        Number of lines to skip at the start.
+        Lines to skip at the start.
     variable : str, optional
         Matrix or struct of a ``.mat`` or ``.npz`` file, group of an HDF5 or TDMS file, or sheet of
         a workbook to use.
-    start, stop : float, str or datetime, optional
-        First and last time to read: in s, or a date and time where the file has dates.
+    start : float, str or datetime, optional
+        First time to use, in s or as a date.
+    stop : float, str or datetime, optional
+        Last time to use, in s or as a date.
     missing : {"refuse", "keep", "hold"}, optional
-        Treatment of cells without a value (empty, ``NaN``, ``Bad``, ``I/O Timeout``, ...), of bad
-        qualities, gaps, and repeated or irregular time stamps: an error, or missing samples of the
-        record. With ``"hold"``, the input holds its last value where it was not stored, as
-        historians mean it; with gaps and irregular stamps it always does, see
-        `Record.from_samples`.
+        Bad cells, gaps and irregular times are refused, kept as missing samples, or kept with an
+        input that holds its last value meanwhile. Bad cells have no value (empty, ``NaN``, ``Bad``,
+        ``I/O Timeout``, ...), or a bad quality; times are irregular if their stamps repeat, too.
+        ``"hold"`` is for inputs that were only stored when they changed, as historians do; with
+        gaps and irregular stamps it is always done, see `Record.from_samples`.
     na_values : str, float or sequence of them, optional
-        Further words and numbers that stand for a missing value, such as -9999.
+        Further words and numbers without a value, such as -9999.
     quality : str or int, optional
-        Column of the quality; ``"auto"``: ``Quality``, ``Status``, ``Good``, ..., and
-        ``TIC101/PV.quality`` or a second ``Quality`` for the signal of that name or to its left.
-        None: qualities are ignored.
+        Column of the quality; none: qualities are ignored. ``"auto"``: ``Quality``, ``Status``,
+        ``Good``, ..., and ``TIC101/PV.quality`` or a second ``Quality`` for the signal of that name
+        or to its left.
     good : str, float or sequence of them, optional
         Good qualities. Default: all but ``Bad...`` and the bad codes of OPC DA (below 64), OPC UA
         (bit 31), Ignition (500, ...) and AVEVA PI (states such as 246).
     wrap : float, optional
-        Number of values of a counter that starts again, such as 4096 for 12 bits or 360 for an
-        angle: the turns of the output are joined, as by `numpy.unwrap`.
+        Number of values of a counter that starts again, whose turns are joined. Such as 4096 for
+        12 bits or 360 for an angle; the turns of the output are joined as by `numpy.unwrap`.
     resample : bool, optional
-        Resample samples with time jitter onto a uniform time axis, see `Record.resampled`.
+        Resample jittering samples onto a uniform time axis, see `Record.resampled`.
     rest : (float, float), optional
-        Input and output in the steady state before a record that begins with its step; see
+        Input and output in the steady state before a record that begins with its step. See
         `Record.with_baseline`.
     name : str, optional
         Name of the record; default: the file's, without its ending.
@@ -170,6 +180,7 @@ def read_record(
     --------
     >>> import tempfile
     >>> from pathlib import Path
+    from types import SimpleNamespace
     >>> import ctrl_realize as cr
     >>> with tempfile.TemporaryDirectory() as folder:
     ...     file = Path(folder) / "valve.csv"
@@ -178,14 +189,7 @@ def read_record(
     >>> record
     <Record 'valve': 3 samples of 0.01 s, 1 input, 1 output>
     """
-    how = _Reading(
-        time=time, input=input, output=output, dt=dt, time_unit=time_unit,
-        time_format=time_format, time_zone=time_zone, delimiter=delimiter, decimal=decimal,
-        encoding=encoding, comment=comment, header=header, skip_rows=skip_rows,
-        variable=variable, start=start, stop=stop, missing=missing, na_values=na_values,
-        quality=quality, good=good, wrap=wrap, resample=resample, rest=rest, name=name,
-        max_bytes=max_bytes,
-    )  # fmt: skip
+    how = _Reading(**{key: value for key, value in locals().items() if key != "path"})
     table = read_table(path, how.text, variable=variable, max_bytes=max_bytes)
     return _record(table, how, Path(path).stem if name is None else name)
 
@@ -222,6 +226,7 @@ def read_records(
     --------
     >>> import tempfile
     >>> from pathlib import Path
+    from types import SimpleNamespace
     >>> import ctrl_realize as cr
     >>> with tempfile.TemporaryDirectory() as folder:
     ...     file = Path(folder) / "tests.csv"
@@ -243,37 +248,11 @@ def read_records(
     ]
 
 
-@dataclass(frozen=True)
-class _Reading:
-    """Arguments of `read_record`, checked."""
+class _Reading(SimpleNamespace):
+    """Arguments of `read_record` by their names, checked."""
 
-    time: str | int | None
-    input: Selector | None
-    output: Selector | None
-    dt: float | None
-    time_unit: str
-    time_format: str | None
-    time_zone: str | None
-    delimiter: str
-    decimal: str
-    encoding: str
-    comment: str | None
-    header: bool | str
-    skip_rows: int
-    variable: str | None
-    start: Any
-    stop: Any
-    missing: str
-    na_values: Any
-    quality: str | int | None
-    good: Any
-    wrap: float | None
-    resample: bool
-    rest: Sequence[Any] | None
-    name: str | None
-    max_bytes: float
-
-    def __post_init__(self) -> None:
+    def __init__(self, **given: Any) -> None:
+        super().__init__(**given)
         if self.dt is not None:
             positive(self.dt, "dt", "sample time in s")
         if self.wrap is not None:
@@ -292,7 +271,8 @@ class _Reading:
     @property
     def treatment(self) -> str:
         """How missing samples are treated."""
-        return one_of(self.missing, "missing", ("refuse", "keep", "hold"))
+        treatment: str = one_of(self.missing, "missing", ("refuse", "keep", "hold"))
+        return treatment
 
     @property
     def clock(self) -> Clock:
