@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import shutil
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -36,27 +37,13 @@ def write_record_files(
     with_report: bool = True,
 ) -> bool:
     """Write model, report and figures of one model; return whether they were written as asked."""
-    files = list(dict.fromkeys(files))  # several tests may be in one
-    names = ", ".join(file.name for file in files)
-    save_model(folder / "model.json", system, settings=settings, note=f"from {names}")
-    if comparison is not None:
-        write_csv(folder / "frf_comparison.csv", comparison.table(), index=False)
-    if not with_report:
-        return True
-    with told_if_it_fails(folder, "the model") as written:
-        report.write_identification(
-            folder / "report.html",
-            system,
-            record,
-            files=files,
-            frf=frf,
-            comparison=comparison,
-            settings=settings,
-            calls=calls,
-            figures=folder / "figures",
-        )
-        written.append("report.html")
-    return bool(written)
+    names = ", ".join(dict.fromkeys(file.name for file in files))
+    return _write_files(
+        folder, system, f"from {names}",
+        partial(report.write_identification, system=system, record=record),
+        files=files, frf=frf, comparison=comparison, settings=settings, calls=calls,
+        with_report=with_report,
+    )  # fmt: skip
 
 
 def write_campaign_files(
@@ -71,28 +58,40 @@ def write_campaign_files(
     with_report: bool = True,
 ) -> bool:
     """Write table, models, report and figures of many records; return if all were written."""
-    files = list(dict.fromkeys(files))
-    system = campaign.system
-    note = f"from {len(campaign.good)} of {len(campaign.rows)} records"
-    save_model(folder / "model.json", system, settings=settings, note=note)
     write_csv(folder / "records.csv", campaign.table(), index=True)
     save_models(folder, campaign, settings)
+    return _write_files(
+        folder, campaign.system, f"from {len(campaign.good)} of {len(campaign.rows)} records",
+        partial(report.write_campaign, campaign=campaign,
+                title=f"Campaign of {len(campaign.rows)} records"),
+        files=files, frf=frf, comparison=comparison, settings=settings, calls=calls,
+        with_report=with_report,
+    )  # fmt: skip
+
+
+def _write_files(
+    folder: Path,
+    system: DelayedStateSpace,
+    note: str,
+    write: Callable[..., Path],
+    *,
+    files: Sequence[Path],
+    comparison: FRFComparison | None,
+    settings: Mapping[str, Any],
+    with_report: bool,
+    **shown: Any,
+) -> bool:
+    save_model(folder / "model.json", system, settings=settings, note=note)
     if comparison is not None:
         write_csv(folder / "frf_comparison.csv", comparison.table(), index=False)
     if not with_report:
         return True
+    files = list(dict.fromkeys(files))  # several tests may be in one
     with told_if_it_fails(folder, "the model") as written:
-        report.write_campaign(
-            folder / "report.html",
-            campaign,
-            files=files,
-            frf=frf,
-            comparison=comparison,
-            settings=settings,
-            calls=calls,
-            title=f"Campaign of {len(campaign.rows)} records",
-            figures=folder / "figures",
-        )
+        write(
+            folder / "report.html", files=files, comparison=comparison, settings=settings,
+            figures=folder / "figures", **shown,
+        )  # fmt: skip
         written.append("report.html")
     return bool(written)
 

@@ -6,7 +6,7 @@ import math
 import sys
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
-from typing import Any, TypeVar, cast, get_args
+from typing import Any, get_args
 
 import numpy as np
 
@@ -26,16 +26,7 @@ _METHODS = {
     "Realization": "approximate realization",
 }
 """The methods behind stored fits, in words."""
-_KEPT = (
-    "delay", "order", "dead_time", "dead_time_interval", "interval", "delay_interval",
-    "total_delay", "total_delay_interval", "gain", "gain_interval", "gain_std_given_structure",
-    "onset", "interval_kind", "residual_std", "sampling", "integrators",
-    "input_unit", "output_unit",
-)  # fmt: skip
-"""Attributes that are stored if the fit has them."""
 _MAX_ROWS = 200
-
-Value = TypeVar("Value")
 
 
 def _text(value: Plain) -> str | None:
@@ -96,15 +87,6 @@ def _closed(value: Plain) -> tuple[float, float] | None:
     return ends if ends is not None and np.isfinite(ends).all() else None
 
 
-def _kept(key: str, read: Callable[[Plain], Value], meaning: str) -> Value:
-    """Make a property of the value stored under a key, if it is valid."""
-
-    def value(summary: FitSummary) -> Value:
-        return read(summary._value(key))
-
-    return cast("Value", property(value, doc=meaning))
-
-
 @dataclass(frozen=True, eq=False, repr=False)
 class FitSummary(ModelFit):
     """Report of a fit without its curves, as stored in a model file.
@@ -146,70 +128,9 @@ class FitSummary(ModelFit):
     def __getitem__(self, key: str) -> Plain:
         return dict(self.values)[key]
 
-    dead_time = _kept("dead_time", _time, "Dead time in s; None if the fit had none.")
-    dead_time_interval = _kept(
-        "dead_time_interval", _closed, "Interval of the dead time in s; None if it is open."
-    )
-    interval = _kept("interval", _times, "Interval as the fit had it, in s; None if it had none.")
-    delay = _kept("delay", _time, "Dead time in samples.")
-    delay_interval = _kept("delay_interval", _times, "Interval of the dead time in samples.")
-    total_delay = _kept("total_delay", _number, "Delay at zero frequency in s.")
-    total_delay_interval = _kept(
-        "total_delay_interval", _pair, "95 % interval of the total delay in s."
-    )
-    onset = _kept("onset", _number, "First motion after a step of the input, in s.")
-    order = _kept("order", _count, "States of the core.")
-    gain = _kept("gain", _number, "Gain at zero frequency.")
-    gain_interval = _kept("gain_interval", _pair, "95 % interval of the gain.")
-    gain_std_given_structure = _kept(
-        "gain_std_given_structure",
-        _number,
-        "Standard error of the gain if the chosen structure is the plant's.",
-    )
-    residual_std = _kept(
-        "residual_std", _time, "Standard deviation of what the model leaves of its one output."
-    )
-    sampling = _kept(
-        "sampling", _text, "How the impulse response was sampled that the model was realized from."
-    )
-
-    @property
-    def parameters(self) -> tuple[Parameter, ...]:
-        """Parameters of the process model; empty if the file does not contain them."""
-        rows = self._value("parameters")
-        found = [_parameter(row) for row in rows] if isinstance(rows, tuple) else []
-        return tuple(one for one in found if one is not None)
-
-    @property
-    def actuator(self) -> ActuatorFit | None:
-        """Actuator that was estimated with the model; None if there was none."""
-        stored = self._value("actuator")
-        return None if stored is None else _actuator(stored)
-
     @property
     def _record_unit(self) -> str:
         return _text(self._value("time_unit")) or "s"
-
-    @property
-    def input_unit(self) -> str:
-        """Unit of the input; empty if it is not known."""
-        return _text(self._value("input_unit")) or ""
-
-    @property
-    def output_unit(self) -> str:
-        """Unit of the output; empty if it is not known."""
-        return _text(self._value("output_unit")) or ""
-
-    @property
-    def integrators(self) -> int:
-        """Number of poles at zero."""
-        return _count(self._value("integrators")) or 0
-
-    @property
-    def interval_kind(self) -> IntervalKind | None:
-        """Kind of `interval`; None if the file does not contain it."""
-        value = self._value("interval_kind")
-        return next((kind for kind in get_args(IntervalKind) if kind == value), None)
 
     @property
     def interval_label(self) -> str:
@@ -237,12 +158,45 @@ class FitSummary(ModelFit):
         return list(self.rows)
 
 
+def _interval_kind(value: Plain) -> IntervalKind | None:
+    return next((kind for kind in get_args(IntervalKind) if kind == value), None)
+
+
+def _parameters(value: Plain) -> tuple[Parameter, ...]:
+    read = [_parameter(row) for row in value] if isinstance(value, tuple) else []
+    return tuple(parameter for parameter in read if parameter is not None)
+
+
+_KEPT: dict[str, Callable[[Plain], object]] = {
+    "delay": _time, "order": _count, "dead_time": _time, "dead_time_interval": _closed,
+    "interval": _times, "delay_interval": _times, "total_delay": _number,
+    "total_delay_interval": _pair, "gain": _number, "gain_interval": _pair,
+    "gain_std_given_structure": _number, "onset": _number, "interval_kind": _interval_kind,
+    "residual_std": _time, "sampling": _text, "integrators": lambda value: _count(value) or 0,
+    "input_unit": lambda value: _text(value) or "", "output_unit": lambda value: _text(value) or "",
+    "parameters": _parameters, "actuator": lambda value: None if value is None else _actuator(value),
+}  # fmt: skip
+"""Attributes of a `ModelFit` that are stored -> what accepts the value in a file."""
+
+
+def _stored(key: str, read: Callable[[Plain], object]) -> property:
+    return property(
+        lambda summary: read(summary._value(key)), doc=f"`ModelFit.{key}`, as the file has it."
+    )
+
+
+for _key, _read in _KEPT.items():
+    setattr(FitSummary, _key, _stored(_key, _read))
+
+
 def summary_of(fit: ModelFit | None) -> FitSummary | None:
     """Reduce any fit to plain numbers and text."""
     if fit is None or isinstance(fit, FitSummary):
         return fit
     # all are attributes of a ModelFit; the list is also that of the keys in the file
-    values = {key: _plain(getattr(fit, key)) for key in _KEPT}
+    values = {
+        key: _plain(getattr(fit, key)) for key in _KEPT if key not in ("parameters", "actuator")
+    }
     values["std_given_structure"] = _plain(fit._std())
     values["time_unit"] = fit._record_unit
     values["fit_percent"] = _plain(getattr(fit, "fit_percent", None))

@@ -2,24 +2,15 @@
 
 from .build import write_campaign, write_comparison, write_identification
 from .loops import write_loop_report
-from .page import Column, Page, Row, Table, pairs, write_page
-from .sketches import Sketch
 from .valves import write_valve_report
 from .verdict import verdict_of
 
 __all__ = [
-    "Column",
-    "Page",
-    "Row",
-    "Sketch",
-    "Table",
-    "pairs",
     "verdict_of",
     "write_campaign",
     "write_comparison",
     "write_identification",
     "write_loop_report",
-    "write_page",
     "write_valve_report",
 ]
 

@@ -142,8 +142,6 @@ def write_campaign(
     comparison: FRFComparison | None = None,
     settings: Mapping[str, Any] | None = None,
     calls: Sequence[tuple[str, str]] = (),
-    more_tables: Sequence[Table] = (),
-    more_sketches: Sequence[Sketch] = (),
     title: str = "Campaign",
     truth: float | None = None,
     simulated: bool = False,
@@ -161,8 +159,6 @@ def write_campaign(
         The records, for their checksums if there are no files.
     frf, comparison, settings, calls, simulated, figures
         As for `write_identification`; the comparison is that of ``campaign.system``.
-    more_tables, more_sketches : sequence, optional
-        Further tables and figures, after those of the campaign.
     title : str, optional
     truth : float, optional
         Known delay in samples of simulated data, drawn with the estimates.
@@ -202,11 +198,10 @@ def write_campaign(
             title=title,
             subtitle=f"{len(campaign.rows)} records, method {campaign.method}",
             verdict=campaign_verdict(campaign, comparison=comparison),
-            sketches=[*sketches, *more_sketches],
+            sketches=sketches,
             tables=[
                 campaign_table(campaign),
                 amplitude_table(campaign),
-                *more_tables,
                 *comparison_tables(comparison),
                 *fit_tables(system.fit),
                 model_table(system),

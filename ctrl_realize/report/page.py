@@ -45,8 +45,8 @@ class Column:
 
     Examples
     --------
-    >>> from ctrl_realize import report
-    >>> report.Column("dead time [ms]", "number")
+    >>> from ctrl_realize.report.page import Column
+    >>> Column("dead time [ms]", "number")
     Column(name='dead time [ms]', kind='number')
     """
 
@@ -66,8 +66,8 @@ class Row:
 
     Examples
     --------
-    >>> from ctrl_realize import report
-    >>> report.Row(("valve_16mA_05", "37.1"), "best")
+    >>> from ctrl_realize.report.page import Row
+    >>> Row(("valve_16mA_05", "37.1"), "best")
     Row(cells=('valve_16mA_05', '37.1'), kind='best')
     """
 
@@ -95,10 +95,10 @@ class Table:
 
     Examples
     --------
-    >>> from ctrl_realize import report
-    >>> columns = (report.Column("record", "name"), report.Column("delay [samples]", "number"))
-    >>> rows = (report.Row(("valve_1", "37.1"), "best"), report.Row(("valve_2", "38.0")))
-    >>> table = report.Table("Delays", rows, columns, note="two of forty")
+    >>> from ctrl_realize.report.page import Column, Row, Table
+    >>> columns = (Column("record", "name"), Column("delay [samples]", "number"))
+    >>> rows = (Row(("valve_1", "37.1"), "best"), Row(("valve_2", "38.0")))
+    >>> table = Table("Delays", rows, columns, note="two of forty")
     >>> table.kind_of(1), len(table.rows)
     ('number', 2)
     """
@@ -141,10 +141,11 @@ class Page:
     --------
     >>> import ctrl_realize as cr
     >>> from ctrl_realize import report
+    >>> from ctrl_realize.report.page import Page, pairs
     >>> system = cr.identify(cr.bench.valve().step_record(16, rng=5), method="scan")
-    >>> bench = report.pairs("Bench", [("shaker", "4.2 kg")])
+    >>> bench = pairs("Bench", [("shaker", "4.2 kg")])
     >>> verdict = report.verdict_of(system)
-    >>> page = report.Page(
+    >>> page = Page(
     ...     "Valve 7", "before the overhaul", verdict, cr.__version__, tables=[bench]
     ... )
     >>> print(page.title, "-", page.verdict.headline[:17])
@@ -182,8 +183,8 @@ def pairs(
 
     Examples
     --------
-    >>> from ctrl_realize import report
-    >>> table = report.pairs("Bench", [("shaker", "4.2 kg"), ("room", "21 °C")])
+    >>> from ctrl_realize.report.page import pairs
+    >>> table = pairs("Bench", [("shaker", "4.2 kg"), ("room", "21 °C")])
     >>> [row.cells for row in table.rows]
     [('shaker', '4.2 kg'), ('room', '21 °C')]
     """
@@ -241,14 +242,15 @@ def write_page(path: str | os.PathLike[str], page: Page) -> Path:
     >>> from pathlib import Path
     >>> import ctrl_realize as cr
     >>> from ctrl_realize import report
+    >>> from ctrl_realize.report.page import Page, pairs, write_page
     >>> system = cr.identify(cr.bench.valve().step_record(16, rng=5), method="scan")
-    >>> bench = report.pairs("Bench", [("shaker", "4.2 kg")])
+    >>> bench = pairs("Bench", [("shaker", "4.2 kg")])
     >>> verdict = report.verdict_of(system)
-    >>> page = report.Page(
+    >>> page = Page(
     ...     "Valve 7", "before the overhaul", verdict, cr.__version__, tables=[bench]
     ... )
     >>> with tempfile.TemporaryDirectory() as folder:
-    ...     html = report.write_page(Path(folder) / "valve.html", page).read_text()
+    ...     html = write_page(Path(folder) / "valve.html", page).read_text()
     >>> print(html[html.index("<h1"):html.index("</h1>") + 5])
     <h1>Valve 7</h1>
     """

@@ -52,10 +52,10 @@ class Sketch:
 
     Examples
     --------
-    >>> from ctrl_realize import report
+    >>> from ctrl_realize.report.sketches import Sketch
     >>> def draw(figure):
     ...     figure.add_subplot(ylabel="room [°C]").plot([20.5, 21.0, 20.8])
-    >>> sketch = report.Sketch("room", "Room", "Temperature of the day.", draw)
+    >>> sketch = Sketch("room", "Room", "Temperature of the day.", draw)
     >>> sketch.figure.axes[0].get_ylabel()
     'room [°C]'
     """
