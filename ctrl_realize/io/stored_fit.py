@@ -174,7 +174,8 @@ _KEPT: dict[str, Callable[[Plain], object]] = {
     "gain_std_given_structure": _number, "onset": _number, "interval_kind": _interval_kind,
     "residual_std": _time, "sampling": _text, "integrators": lambda value: _count(value) or 0,
     "input_unit": lambda value: _text(value) or "", "output_unit": lambda value: _text(value) or "",
-    "parameters": _parameters, "actuator": lambda value: None if value is None else _actuator(value),
+    "parameters": _parameters,
+    "actuator": lambda value: None if value is None else _actuator(value),
 }  # fmt: skip
 """Attributes of a `ModelFit` that are stored -> what accepts the value in a file."""
 
