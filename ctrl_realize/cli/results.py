@@ -11,6 +11,7 @@ from typing import Any
 
 import control as ct
 import numpy as np
+import pandas as pd
 
 from .. import report
 from .._wording import in_digits, time_unit
@@ -21,7 +22,9 @@ from ..identification.campaign.campaign import Campaign
 from ..io import save_model
 from ..io.text.csv_files import write_csv
 from ..report.tables import dead_time_cells
-from .terminal import complain, one_line, printable, table, working
+from .manifest import Run
+from .staging import appearing
+from .terminal import complain, one_line, printable, say, table, working
 
 
 def write_record_files(
@@ -94,6 +97,29 @@ def _write_files(
         )  # fmt: skip
         written.append("report.html")
     return bool(written)
+
+
+def write_results(
+    output: Path,
+    run: Run,
+    tables: Mapping[str, tuple[pd.DataFrame, bool]],
+    write: Callable[..., Path] | None,
+    result: str,
+) -> int:
+    """Write tables, by name and with or without their index, and a report; return the exit code.
+
+    `result` names what is written even if the report fails.
+    """
+    written: list[str] = []
+    with appearing(output, run) as folder:
+        for name, (table, index) in tables.items():
+            write_csv(folder / name, table, index=index)
+        if write is not None:
+            with told_if_it_fails(folder, result) as written:
+                write(folder / "report.html", figures=folder / "figures")
+                written.append("report.html, figures/")
+    say(f"\nwritten to {printable(str(output))}: {', '.join([*tables, *written])}")
+    return 0 if written or write is None else 1
 
 
 @contextmanager

@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 from ...errors import OptionError
-from ...io.text.csv_files import write_csv
 from ...report.valves import write_valve_report
-from ...valves import ValveReport, valve_report
+from ...valves import valve_report
 from ..inputs import Reading, python_keywords, typed_call
 from ..manifest import Run, refuse_other_results
 from ..options import words_of
-from ..results import told_if_it_fails
-from ..staging import appearing
+from ..results import write_results
 from ..terminal import printable, say
 
 
@@ -46,30 +45,21 @@ def run_valve(
         say(printable(f"{source.file}: {record!r}"))
     result = valve_report(records, **options)
     say(result.report())
-    names = ["metrics.csv", "sizes.csv", "steps.csv"]
     words += ["--output", str(output)]
     calls = [
         ("In a terminal", typed_call("valve", words)),
         ("In Python", _in_python(files, how, options)),
     ]
-    written: list[str] = []
-    with appearing(output, run) as folder:
-        _write_tables(folder, result)
-        if report:
-            with told_if_it_fails(folder, "the table of metrics") as written:
-                write_valve_report(
-                    folder / "report.html", result, files=list(dict.fromkeys(files)),
-                    settings=options, calls=calls, figures=folder / "figures",
-                )  # fmt: skip
-                written.append("report.html, figures/")
-    say(f"\nwritten to {printable(str(output))}: {', '.join([*names, *written])}")
-    return 0 if written or not report else 1
-
-
-def _write_tables(folder: Path, result: ValveReport) -> None:
-    write_csv(folder / "metrics.csv", result.metric_table(), index=True)
-    write_csv(folder / "sizes.csv", result.table(), index=False)
-    write_csv(folder / "steps.csv", result.step_table(), index=False)
+    tables = {
+        "metrics.csv": (result.metric_table(), True),
+        "sizes.csv": (result.table(), False),
+        "steps.csv": (result.step_table(), False),
+    }
+    write = partial(
+        write_valve_report, result=result, files=list(dict.fromkeys(files)), settings=options,
+        calls=calls,
+    )  # fmt: skip
+    return write_results(output, run, tables, write if report else None, "the table of metrics")
 
 
 def _limits(given: Sequence[str]) -> dict[str, Any]:

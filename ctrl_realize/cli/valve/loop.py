@@ -3,21 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 from ...data import Record
 from ...errors import OptionError
 from ...io import read_record
-from ...io.text.csv_files import write_csv
 from ...report.loops import write_loop_report
 from ...valves.loops.diagnose import diagnose_loop
 from ...valves.loops.methods import LoopProcess
 from ..inputs import python_keywords, typed_call
 from ..manifest import Run, refuse_other_results
 from ..options import words_of
-from ..results import told_if_it_fails
-from ..staging import appearing
+from ..results import write_results
 from ..terminal import printable, say
 
 
@@ -53,18 +52,9 @@ def run_loop(
     calls = [("In a terminal", typed_call("loop", words))]
     if set_point is None:
         calls.append(("In Python", _in_python(files[0], reading, choices)))
-    written: list[str] = []
-    with appearing(output, run) as folder:
-        write_csv(folder / "methods.csv", result.table(), index=True)
-        if report:
-            with told_if_it_fails(folder, "the table of methods") as written:
-                write_loop_report(
-                    folder / "report.html", result, files=files, settings=choices, calls=calls,
-                    figures=folder / "figures",
-                )  # fmt: skip
-                written.append("report.html, figures/")
-    say(f"\nwritten to {printable(str(output))}: {', '.join(['methods.csv', *written])}")
-    return 0 if written or not report else 1
+    write = partial(write_loop_report, diagnosis=result, files=files, settings=choices, calls=calls)
+    tables = {"methods.csv": (result.table(), True)}
+    return write_results(output, run, tables, write if report else None, "the table of methods")
 
 
 def _with_set_point(file: Path, set_point: str, reading: Mapping[str, Any]) -> Record:
