@@ -21,19 +21,11 @@ from .robustness import delay_robustness_plot, robustness_plot, uncertainty_plot
 from .scans import delay_plot, order_plot, singular_value_plot
 from .tuning import hankel_plot, pid_comparison_plot, process_model_plot
 from .valves.loops import (
-    loop_correlation_plot,
     loop_diagnosis_plot,
-    loop_phase_plot,
-    loop_shape_plot,
-    loop_trend_plot,
 )
 from .valves.tests import (
-    valve_loop_plot,
     valve_plan_plot,
     valve_plot,
-    valve_signature_plot,
-    valve_sizes_plot,
-    valve_steps_plot,
 )
 
 __all__ = [
@@ -55,11 +47,7 @@ __all__ = [
     "impulse_estimate_plot",
     "impulse_plot",
     "joint_fit_plot",
-    "loop_correlation_plot",
     "loop_diagnosis_plot",
-    "loop_phase_plot",
-    "loop_shape_plot",
-    "loop_trend_plot",
     "margins_plot",
     "mimo_realization_plot",
     "model_comparison_plot",
@@ -78,12 +66,8 @@ __all__ = [
     "track_plot",
     "truth_plot",
     "uncertainty_plot",
-    "valve_loop_plot",
     "valve_plan_plot",
     "valve_plot",
-    "valve_signature_plot",
-    "valve_sizes_plot",
-    "valve_steps_plot",
 ]
 
 

@@ -110,26 +110,26 @@ def _sketches(diagnosis: LoopDiagnosis) -> list[Sketch]:
             "trend",
             "Trends",
             "Controller output and process value, each scaled to its standard deviation.",
-            lambda figure: plots.loop_trend_plot(diagnosis, ax=figure),
+            lambda figure: plots.loop_diagnosis_plot(diagnosis, panel="trend", ax=figure),
         ),
         Sketch(
             "phase",
             "PV over OP",
             "With the ellipse of the fundamentals; its width in the direction of OP is the "
             "apparent stiction, if the valve sticks.",
-            lambda figure: plots.loop_phase_plot(diagnosis, ax=figure),
+            lambda figure: plots.loop_diagnosis_plot(diagnosis, panel="phase", ax=figure),
         ),
         Sketch(
             "correlation",
             "Cross-correlation",
             "Odd about lag zero for stiction in a self-regulating loop, even otherwise.",
-            lambda figure: plots.loop_correlation_plot(diagnosis, ax=figure),
+            lambda figure: plots.loop_diagnosis_plot(diagnosis, panel="correlation", ax=figure),
         ),
         Sketch(
             "shapes",
             "Half cycles",
             "Triangles for stiction, sines for tuning or an external oscillation.",
-            lambda figure: plots.loop_shape_plot(diagnosis, ax=figure),
+            lambda figure: plots.loop_diagnosis_plot(diagnosis, panel="shapes", ax=figure),
         ),
     ]
 

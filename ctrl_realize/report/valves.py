@@ -119,38 +119,38 @@ def _sketches(result: ValveReport) -> list[Sketch]:
             "Responses to steps",
             "Each scaled to its own change, on one another; closing steps are dashed. Dotted: "
             "63.2 and 86.5 %.",
-            lambda figure: plots.valve_steps_plot(result, ax=figure),
+            lambda figure: plots.valve_plot(result, panel="steps", ax=figure),
         ),
         Sketch(
             "t86",
             "T86 against step size",
             "With 95 % intervals. Small steps late: friction or dead band; large steps late: the "
             "rate is limited.",
-            lambda figure: plots.valve_sizes_plot(result, ax=figure),
+            lambda figure: plots.valve_plot(result, panel="sizes", ax=figure),
         ),
         Sketch(
             "dead_time",
             "Dead time against step size",
             "First motion, with 95 % intervals.",
-            lambda figure: plots.valve_sizes_plot(result, metric="dead_time", ax=figure),
+            lambda figure: plots.valve_plot(result, panel="sizes", metric="dead_time", ax=figure),
         ),
         Sketch(
             "gain",
             "Travel gain against step size",
             "Change of the position over that of the command, with 95 % intervals.",
-            lambda figure: plots.valve_sizes_plot(result, metric="gain", ax=figure),
+            lambda figure: plots.valve_plot(result, panel="sizes", metric="gain", ax=figure),
         ),
         Sketch(
             "loop",
             "Position over command",
             "All records.",
-            lambda figure: plots.valve_loop_plot(result, ax=figure),
+            lambda figure: plots.valve_plot(result, panel="loop", ax=figure),
         ),
         Sketch(
             "signature",
             "Signature",
             "Position minus command at rest: from the slow ramp, or from the levels of the steps.",
-            lambda figure: plots.valve_signature_plot(result, ax=figure),
+            lambda figure: plots.valve_plot(result, panel="signature", ax=figure),
         ),
     ]
 

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Callable
+from typing import Any, Literal
 
 import control as ct
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
+from ..._checks import one_of
 from ...numerics.oscillation.half_cycles import POINTS, HalfCycles
 from ...valves.loops.result import LoopDiagnosis
 from .. import style
@@ -17,162 +19,7 @@ from ..shared_docs import documented
 _CYCLES = 10
 """Of the trends that are shown: more cannot be distinguished."""
 _MOST_SHAPES = 40
-
-
-@documented("Axes, sequence of Axes")
-def loop_diagnosis_plot(
-    diagnosis: LoopDiagnosis,
-    *,
-    ax: style.AxesLike = None,
-    title: str | None = None,
-    **kwargs: Any,
-) -> ct.ControlPlot:
-    """Draw an oscillating loop: trends, PV over OP, cross-correlation, half cycles.
-
-    The four are `loop_trend_plot`, `loop_phase_plot`, `loop_correlation_plot` and
-    `loop_shape_plot`.
-
-    Parameters
-    ----------
-    diagnosis : LoopDiagnosis
-    **kwargs
-        Line properties of the measured curves.
-
-    Examples
-    --------
-    >>> import ctrl_realize as cr
-    >>> loop = cr.bench.valve_loop(cr.actuators.Stiction(5, 2), noise=0.1).simulate(1200.0, rng=1)
-    >>> cplt = cr.valves.diagnose_loop(loop.record).plot()
-    >>> cplt.axes.shape
-    (2, 2)
-    """
-    with style.canvas(
-        ax, 2, columns=2, sharex=False, size=(11.0, 8.0), title=title,
-        default_title=diagnosis.verdict,
-    ) as axes:  # fmt: skip
-        lines = [
-            _draw_trend(axes[0], diagnosis, kwargs),
-            _draw_phase(axes[1], diagnosis, kwargs),
-            _draw_correlation(axes[2], diagnosis, kwargs),
-            _draw_shapes(axes[3], diagnosis, kwargs),
-        ]
-        return style.finished(axes, lines, columns=2, legends=(0, 1, 3), loc="best")
-
-
-@documented()
-def loop_trend_plot(
-    diagnosis: LoopDiagnosis,
-    *,
-    ax: style.AxesLike = None,
-    title: str | None = None,
-    **kwargs: Any,
-) -> ct.ControlPlot:
-    """Draw controller output and process value over time, both scaled to their standard deviation.
-
-    At most ten cycles from the middle of the record.
-
-    Parameters
-    ----------
-    diagnosis : LoopDiagnosis
-    **kwargs
-        Line properties.
-
-    Examples
-    --------
-    >>> import ctrl_realize as cr
-    >>> loop = cr.bench.valve_loop(cr.actuators.Stiction(5, 2), noise=0.1).simulate(1200.0, rng=1)
-    >>> cplt = cr.plots.loop_trend_plot(cr.valves.diagnose_loop(loop.record))
-    >>> [text.get_text() for text in cplt.figure.axes[0].get_legend().get_texts()]
-    ['OP', 'PV']
-    """
-    with style.canvas(ax, title=title, default_title=diagnosis.verdict, size=(11.0, 4.2)) as axes:
-        return style.finished(axes, [_draw_trend(axes[0], diagnosis, kwargs)])
-
-
-@documented()
-def loop_phase_plot(
-    diagnosis: LoopDiagnosis,
-    *,
-    ax: style.AxesLike = None,
-    title: str | None = None,
-    **kwargs: Any,
-) -> ct.ControlPlot:
-    """Draw the process value over the controller output, and the ellipse of their fundamentals.
-
-    Parameters
-    ----------
-    diagnosis : LoopDiagnosis
-    **kwargs
-        Line properties.
-
-    Examples
-    --------
-    >>> import ctrl_realize as cr
-    >>> loop = cr.bench.valve_loop(cr.actuators.Stiction(5, 2), noise=0.1).simulate(1200.0, rng=1)
-    >>> cplt = cr.plots.loop_phase_plot(cr.valves.diagnose_loop(loop.record))
-    >>> cplt.figure.axes[0].get_xlabel()
-    'controller output OP'
-    """
-    with style.canvas(ax, title=title, default_title="PV over OP") as axes:
-        return style.finished(axes, [_draw_phase(axes[0], diagnosis, kwargs)])
-
-
-@documented()
-def loop_correlation_plot(
-    diagnosis: LoopDiagnosis,
-    *,
-    ax: style.AxesLike = None,
-    title: str | None = None,
-    **kwargs: Any,
-) -> ct.ControlPlot:
-    """Draw the cross-correlation function of controller output and process value.
-
-    Parameters
-    ----------
-    diagnosis : LoopDiagnosis
-    **kwargs
-        Line properties.
-
-    Examples
-    --------
-    >>> import ctrl_realize as cr
-    >>> loop = cr.bench.valve_loop(cr.actuators.Stiction(5, 2), noise=0.1).simulate(1200.0, rng=1)
-    >>> cplt = cr.plots.loop_correlation_plot(cr.valves.diagnose_loop(loop.record))
-    >>> cplt.figure.axes[0].get_xlabel()
-    'lag [s]'
-    """
-    with style.canvas(ax, title=title, default_title="cross-correlation of OP and PV") as axes:
-        return style.finished(axes, [_draw_correlation(axes[0], diagnosis, kwargs)])
-
-
-@documented()
-def loop_shape_plot(
-    diagnosis: LoopDiagnosis,
-    *,
-    ax: style.AxesLike = None,
-    title: str | None = None,
-    **kwargs: Any,
-) -> ct.ControlPlot:
-    """Draw the half cycles on one another, with their mean, a sine and a triangle.
-
-    Those of the controller output, or of the process value if the process is integrating.
-
-    Parameters
-    ----------
-    diagnosis : LoopDiagnosis
-    **kwargs
-        Line properties of the half cycles.
-
-    Examples
-    --------
-    >>> import ctrl_realize as cr
-    >>> loop = cr.bench.valve_loop(cr.actuators.Stiction(5, 2), noise=0.1).simulate(1200.0, rng=1)
-    >>> cplt = cr.plots.loop_shape_plot(cr.valves.diagnose_loop(loop.record))
-    >>> [text.get_text() for text in cplt.figure.axes[0].get_legend().get_texts()]
-    ['mean', 'sine', 'triangle']
-    """
-    with style.canvas(ax, title=title, default_title="half cycles") as axes:
-        return style.finished(axes, [_draw_shapes(axes[0], diagnosis, kwargs)])
+_SIZE = (8.0, 4.6)
 
 
 def _shown(diagnosis: LoopDiagnosis) -> slice:
@@ -260,3 +107,73 @@ def _draw_shapes(axes: Axes, diagnosis: LoopDiagnosis, looks: dict[str, Any]) ->
         fitted = shape * (shape @ mean) / (shape @ shape)
         lines += axes.plot(inside, fitted, color=colour, linestyle=dash, label=label)
     return list(lines)
+
+
+_PANELS: dict[str, tuple[Callable[..., list[Line2D]], str, tuple[float, float]]] = {
+    "trend": (_draw_trend, "", (11.0, 4.2)),
+    "phase": (_draw_phase, "PV over OP", _SIZE),
+    "correlation": (_draw_correlation, "cross-correlation of OP and PV", _SIZE),
+    "shapes": (_draw_shapes, "half cycles", _SIZE),
+}
+"""Panel -> what draws it, its title (without one the verdict), its size."""
+
+
+@documented("Axes, sequence of Axes")
+def loop_diagnosis_plot(
+    diagnosis: LoopDiagnosis,
+    *,
+    panel: Literal["trend", "phase", "correlation", "shapes"] | None = None,
+    ax: style.AxesLike = None,
+    title: str | None = None,
+    **kwargs: Any,
+) -> ct.ControlPlot:
+    """Draw an oscillating loop: trends, PV over OP, cross-correlation, half cycles.
+
+    Parameters
+    ----------
+    diagnosis : LoopDiagnosis
+    panel : {"trend", "phase", "correlation", "shapes"}, optional
+        One panel alone. ``"trend"``: controller output and process value over time, both scaled to
+        their standard deviation, at most ten cycles from the middle of the record. ``"phase"``: the
+        process value over the controller output, and the ellipse of their fundamentals.
+        ``"correlation"``: the cross-correlation function of the two. ``"shapes"``: the half cycles
+        of the controller output, or of the process value if the process is integrating, on one
+        another, with their mean, a sine and a triangle.
+    **kwargs
+        Line properties of the measured curves.
+
+    Raises
+    ------
+    OptionError
+        There is no such panel.
+
+    Examples
+    --------
+    >>> import ctrl_realize as cr
+    >>> loop = cr.bench.valve_loop(cr.actuators.Stiction(5, 2), noise=0.1).simulate(1200.0, rng=1)
+    >>> diagnosis = cr.valves.diagnose_loop(loop.record)
+    >>> diagnosis.plot().axes.shape
+    (2, 2)
+    >>> for panel in ("trend", "shapes"):
+    ...     axes = diagnosis.plot(panel=panel).figure.axes[0]
+    ...     print([text.get_text() for text in axes.get_legend().get_texts()])
+    ['OP', 'PV']
+    ['mean', 'sine', 'triangle']
+    >>> for panel in ("phase", "correlation"):
+    ...     print(diagnosis.plot(panel=panel).figure.axes[0].get_xlabel())
+    controller output OP
+    lag [s]
+    """
+    if panel is not None:
+        draw, name, size = _PANELS[one_of(panel, "panel", tuple(_PANELS))]
+        with style.canvas(
+            ax, title=title, default_title=name or diagnosis.verdict, size=size
+        ) as axes:
+            return style.finished(axes, [draw(axes[0], diagnosis, kwargs)])
+    with style.canvas(
+        ax, 2, columns=2, sharex=False, size=(11.0, 8.0), title=title,
+        default_title=diagnosis.verdict,
+    ) as axes:  # fmt: skip
+        drawn = zip(axes, _PANELS.values(), strict=True)
+        lines = [draw(axis, diagnosis, kwargs) for axis, (draw, *_) in drawn]
+        return style.finished(axes, lines, columns=2, legends=(0, 1, 3), loc="best")

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Any
+from collections.abc import Callable, Sequence
+from functools import partial
+from typing import Any, Literal, TypeAlias
 
 import control as ct
 import numpy as np
@@ -11,7 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 from scipy.ndimage import median_filter
 
-from ...errors import OptionError
+from ..._checks import one_of
 from ...valves.definitions import DEFINITIONS
 from ...valves.plan import ValveTestPlan
 from ...valves.result import ValveReport
@@ -25,201 +26,6 @@ _MOST_STEPS = 60
 _MOST_POINTS = 4000
 _SIZE = (8.0, 4.8)
 _WAYS = {"opening": (style.MEASURED, "o", "-"), "closing": (style.MODEL, "s", "--")}
-
-
-@documented("Axes, sequence of Axes")
-def valve_plot(
-    report: ValveReport, *, ax: style.AxesLike = None, title: str | None = None, **kwargs: Any
-) -> ct.ControlPlot:
-    """Draw a valve test: responses, T86 against step size, loops, signature.
-
-    The four are `valve_steps_plot`, `valve_sizes_plot`, `valve_loop_plot` and
-    `valve_signature_plot`.
-
-    Parameters
-    ----------
-    report : ValveReport
-    **kwargs
-        Line properties of the measured curves.
-
-    Examples
-    --------
-    >>> import ctrl_realize as cr
-    >>> records = cr.bench.valve().step_campaign(1, amplitudes=(16.0, 4.0), repeats=3)
-    >>> report = cr.valves.valve_report(records, command_range=(4, 20), fit=False)
-    >>> cplt = cr.plots.valve_plot(report)
-    >>> cplt.axes.shape
-    (2, 2)
-    """
-    with style.canvas(
-        ax, 2, columns=2, sharex=False, size=(11.0, 8.0), title=title, default_title="valve test"
-    ) as axes:
-        lines = [
-            _draw_steps(axes[0], report, kwargs),
-            _draw_sizes(axes[1], report, "t86", kwargs),
-            _draw_loop(axes[2], report, kwargs),
-            _draw_signature(axes[3], report, kwargs),
-        ]
-        return style.finished(axes, lines, columns=2, legends=(0, 1, 2, 3), loc="best")
-
-
-@documented()
-def valve_steps_plot(
-    report: ValveReport, *, ax: style.AxesLike = None, title: str | None = None, **kwargs: Any
-) -> ct.ControlPlot:
-    """Draw the responses to all steps on one another, each scaled to 0 before and 1 after.
-
-    One colour for each step size; closing steps are dashed. Steps that did not move the valve have
-    no curve.
-
-    Parameters
-    ----------
-    report : ValveReport
-    **kwargs
-        Line properties.
-
-    Examples
-    --------
-    >>> import ctrl_realize as cr
-    >>> records = cr.bench.valve().step_campaign(1, amplitudes=(16.0, 4.0), repeats=3)
-    >>> report = cr.valves.valve_report(records, command_range=(4, 20), fit=False)
-    >>> cplt = cr.plots.valve_steps_plot(report)
-    >>> [text.get_text() for text in cplt.figure.axes[0].get_legend().get_texts()]
-    ['25 %', '100 %']
-    """
-    with style.canvas(ax, title=title, default_title="responses to steps", size=_SIZE) as axes:
-        return style.finished(axes, [_draw_steps(axes[0], report, kwargs)], loc="lower right")
-
-
-@documented()
-def valve_sizes_plot(
-    report: ValveReport,
-    *,
-    metric: str = "t86",
-    ax: style.AxesLike = None,
-    title: str | None = None,
-    **kwargs: Any,
-) -> ct.ControlPlot:
-    """Draw a metric against step size and direction, with its 95 % interval.
-
-    Parameters
-    ----------
-    report : ValveReport
-    metric : str, default "t86"
-        One of ``"dead_time"``, ``"t63"``, ``"t86"``, ``"t98"``, ``"settling_time"``,
-        ``"overshoot"``, ``"gain"``, ``"slew_rate"``.
-    **kwargs
-        Line properties of the points.
-
-    Raises
-    ------
-    OptionError
-        A metric that single steps do not have.
-
-    Examples
-    --------
-    >>> import ctrl_realize as cr
-    >>> records = cr.bench.valve().step_campaign(1, amplitudes=(16.0, 4.0), repeats=3)
-    >>> report = cr.valves.valve_report(records, command_range=(4, 20), fit=False)
-    >>> cplt = cr.plots.valve_sizes_plot(report, metric="gain")
-    >>> cplt.figure.axes[0].get_ylabel()
-    'travel gain [%/%]'
-    """
-    if metric not in STEP_METRICS:
-        raise OptionError(f"metric={metric!r}; choose one of {', '.join(STEP_METRICS)}")
-    with style.canvas(ax, title=title, default_title="step size", size=_SIZE) as axes:
-        return style.finished(axes, [_draw_sizes(axes[0], report, metric, kwargs)], loc="best")
-
-
-@documented()
-def valve_loop_plot(
-    report: ValveReport, *, ax: style.AxesLike = None, title: str | None = None, **kwargs: Any
-) -> ct.ControlPlot:
-    """Draw the position over the command, for all records.
-
-    Parameters
-    ----------
-    report : ValveReport
-    **kwargs
-        Line properties.
-
-    Examples
-    --------
-    >>> import ctrl_realize as cr
-    >>> records = cr.bench.valve().step_campaign(1, amplitudes=(16.0, 4.0), repeats=3)
-    >>> report = cr.valves.valve_report(records, command_range=(4, 20), fit=False)
-    >>> cr.plots.valve_loop_plot(report).figure.axes[0].get_xlabel()
-    'command [% of span]'
-    """
-    with style.canvas(ax, title=title, default_title="position over command", size=_SIZE) as axes:
-        return style.finished(axes, [_draw_loop(axes[0], report, kwargs)], loc="best")
-
-
-@documented()
-def valve_signature_plot(
-    report: ValveReport, *, ax: style.AxesLike = None, title: str | None = None, **kwargs: Any
-) -> ct.ControlPlot:
-    """Draw the signature: position minus command at rest, opening and closing.
-
-    The distance of the two curves is the hysteresis with the dead band, their bend the linearity.
-
-    Parameters
-    ----------
-    report : ValveReport
-    **kwargs
-        Line properties.
-
-    Examples
-    --------
-    >>> import ctrl_realize as cr
-    >>> records = cr.bench.valve().step_campaign(1, amplitudes=(16.0, 4.0), repeats=3)
-    >>> report = cr.valves.valve_report(records, command_range=(4, 20), fit=False)
-    >>> cr.plots.valve_signature_plot(report).figure.axes[0].get_ylabel()
-    'position - command [%]'
-    """
-    with style.canvas(ax, title=title, default_title="signature", size=_SIZE) as axes:
-        return style.finished(axes, [_draw_signature(axes[0], report, kwargs)], loc="best")
-
-
-@documented()
-def valve_plan_plot(
-    plan: ValveTestPlan, *, ax: style.AxesLike = None, title: str | None = None, **kwargs: Any
-) -> ct.ControlPlot:
-    """Draw the command of a test plan, and name its parts.
-
-    Parameters
-    ----------
-    plan : ValveTestPlan
-    **kwargs
-        Line properties.
-
-    Examples
-    --------
-    >>> import ctrl_realize as cr
-    >>> plan = cr.valves.valve_test_plan(dead_time=0.3, time_constant=0.5)
-    >>> cr.plots.valve_plan_plot(plan).figure.axes[0].get_ylabel()
-    'command'
-    """
-    with style.canvas(ax, title=title, default_title=repr(plan)[1:-1], size=(11.0, 4.2)) as axes:
-        unit, name = style.axis_time_unit(plan.duration, axes[0])
-        looks = {"color": style.INPUT, "linewidth": 1.2, **kwargs}
-        lines = list(axes[0].plot(plan.time * unit, plan.command, **looks))
-        bottom, top = axes[0].get_ylim()
-        axes[0].set_ylim(bottom, top + 0.5 * (top - bottom))
-        for k, (word, start, stop) in enumerate(plan.sections):
-            if k % 2:
-                axes[0].axvspan(
-                    start * unit, stop * unit, color=style.NOISE, alpha=0.15, linewidth=0
-                )
-            narrow = stop - start < 0.09 * plan.duration
-            axes[0].text(
-                0.5 * (start + stop) * unit, top + (0.26 if narrow else 0.4) * (top - bottom), word,
-                ha="center", va="center" if narrow else "top", fontsize=9,
-                rotation=90 if narrow else 0,
-            )  # fmt: skip
-        axes[0].set(xlabel=f"time [{name}]", ylabel="command")
-        axes[0].set_xlim(0, plan.duration * unit)
-        return style.finished(axes, [lines])
 
 
 def _draw_steps(axes: Axes, report: ValveReport, looks: dict[str, Any]) -> list[Line2D]:
@@ -259,7 +65,7 @@ def _draw_steps(axes: Axes, report: ValveReport, looks: dict[str, Any]) -> list[
 
 
 def _draw_sizes(
-    axes: Axes, report: ValveReport, metric: str, looks: dict[str, Any]
+    axes: Axes, report: ValveReport, looks: dict[str, Any], metric: str = "t86"
 ) -> list[Line2D]:
     known = [one for one in report.groups if one.estimates[metric].is_known]
     definition = DEFINITIONS.get(metric, DEFINITIONS["slew_rate_opening"])
@@ -336,3 +142,117 @@ def _colours(count: int) -> Sequence[Any]:
     """Colours of ordered sizes: Okabe and Ito's first, then again."""
     base = (style.OTHERS[3], style.MEASURED, style.TRUTH, style.BAND, style.MODEL, style.OTHERS[0])
     return [base[k % len(base)] for k in range(max(count, 1))]
+
+
+_Panel: TypeAlias = tuple[Callable[..., list[Line2D]], str, str]
+_PANELS: dict[str, _Panel] = {
+    "steps": (_draw_steps, "responses to steps", "lower right"),
+    "sizes": (_draw_sizes, "step size", "best"),
+    "loop": (_draw_loop, "position over command", "best"),
+    "signature": (_draw_signature, "signature", "best"),
+}
+"""Panel -> what draws it, its title, the place of its legend."""
+
+
+@documented("Axes, sequence of Axes")
+def valve_plot(
+    report: ValveReport,
+    *,
+    panel: Literal["steps", "sizes", "loop", "signature"] | None = None,
+    metric: str = "t86",
+    ax: style.AxesLike = None,
+    title: str | None = None,
+    **kwargs: Any,
+) -> ct.ControlPlot:
+    """Draw a valve test: responses, a metric against step size, loops, signature.
+
+    Parameters
+    ----------
+    report : ValveReport
+    panel : {"steps", "sizes", "loop", "signature"}, optional
+        One panel alone. ``"steps"``: the responses to all steps on one another, each scaled to 0
+        before and 1 after, one colour for each step size; closing steps are dashed, and steps that
+        did not move the valve have no curve. ``"sizes"``: `metric` against step size and direction,
+        with its 95 % interval. ``"loop"``: the position over the command, for all records.
+        ``"signature"``: position minus command at rest, opening and closing; the distance of the
+        two curves is the hysteresis with the dead band, their bend the linearity.
+    metric : str, default "t86"
+        One of ``"dead_time"``, ``"t63"``, ``"t86"``, ``"t98"``, ``"settling_time"``,
+        ``"overshoot"``, ``"gain"``, ``"slew_rate"``.
+    **kwargs
+        Line properties of the measured curves.
+
+    Raises
+    ------
+    OptionError
+        There is no such panel, or single steps do not have this metric.
+
+    Examples
+    --------
+    >>> import ctrl_realize as cr
+    >>> records = cr.bench.valve().step_campaign(1, amplitudes=(16.0, 4.0), repeats=3)
+    >>> report = cr.valves.valve_report(records, command_range=(4, 20), fit=False)
+    >>> report.plot().axes.shape
+    (2, 2)
+    >>> [text.get_text() for text in report.plot(panel="steps").figure.axes[0].get_legend().texts]
+    ['25 %', '100 %']
+    >>> report.plot(panel="sizes", metric="gain").figure.axes[0].get_ylabel()
+    'travel gain [%/%]'
+    >>> report.plot(panel="loop").figure.axes[0].get_xlabel()
+    'command [% of span]'
+    >>> report.plot(panel="signature").figure.axes[0].get_ylabel()
+    'position - command [%]'
+    """
+    sized = partial(_draw_sizes, metric=one_of(metric, "metric", STEP_METRICS))
+    panels: dict[str, _Panel] = {**_PANELS, "sizes": (sized, *_PANELS["sizes"][1:])}
+    if panel is not None:
+        draw, name, place = panels[one_of(panel, "panel", tuple(panels))]
+        with style.canvas(ax, title=title, default_title=name, size=_SIZE) as axes:
+            return style.finished(axes, [draw(axes[0], report, kwargs)], loc=place)
+    with style.canvas(
+        ax, 2, columns=2, sharex=False, size=(11.0, 8.0), title=title, default_title="valve test"
+    ) as axes:
+        drawn = zip(axes, panels.values(), strict=True)
+        lines = [draw(axis, report, kwargs) for axis, (draw, *_) in drawn]
+        return style.finished(axes, lines, columns=2, legends=(0, 1, 2, 3), loc="best")
+
+
+@documented()
+def valve_plan_plot(
+    plan: ValveTestPlan, *, ax: style.AxesLike = None, title: str | None = None, **kwargs: Any
+) -> ct.ControlPlot:
+    """Draw the command of a test plan, and name its parts.
+
+    Parameters
+    ----------
+    plan : ValveTestPlan
+    **kwargs
+        Line properties.
+
+    Examples
+    --------
+    >>> import ctrl_realize as cr
+    >>> plan = cr.valves.valve_test_plan(dead_time=0.3, time_constant=0.5)
+    >>> cr.plots.valve_plan_plot(plan).figure.axes[0].get_ylabel()
+    'command'
+    """
+    with style.canvas(ax, title=title, default_title=repr(plan)[1:-1], size=(11.0, 4.2)) as axes:
+        unit, name = style.axis_time_unit(plan.duration, axes[0])
+        looks = {"color": style.INPUT, "linewidth": 1.2, **kwargs}
+        lines = list(axes[0].plot(plan.time * unit, plan.command, **looks))
+        bottom, top = axes[0].get_ylim()
+        axes[0].set_ylim(bottom, top + 0.5 * (top - bottom))
+        for k, (word, start, stop) in enumerate(plan.sections):
+            if k % 2:
+                axes[0].axvspan(
+                    start * unit, stop * unit, color=style.NOISE, alpha=0.15, linewidth=0
+                )
+            narrow = stop - start < 0.09 * plan.duration
+            axes[0].text(
+                0.5 * (start + stop) * unit, top + (0.26 if narrow else 0.4) * (top - bottom), word,
+                ha="center", va="center" if narrow else "top", fontsize=9,
+                rotation=90 if narrow else 0,
+            )  # fmt: skip
+        axes[0].set(xlabel=f"time [{name}]", ylabel="command")
+        axes[0].set_xlim(0, plan.duration * unit)
+        return style.finished(axes, [lines])
