@@ -40,9 +40,10 @@ def write_record_files(
     with_report: bool = True,
 ) -> bool:
     """Write model, report and figures of one model; return whether they were written as asked."""
-    names = ", ".join(dict.fromkeys(file.name for file in files))
+    names = ", ".join(file.name for file in dict.fromkeys(files))
+    save_model(folder / "model.json", system, settings=settings, note=f"from {names}")
     return _write_files(
-        folder, system, f"from {names}",
+        folder,
         partial(report.write_identification, system=system, record=record),
         files=files, frf=frf, comparison=comparison, settings=settings, calls=calls,
         with_report=with_report,
@@ -61,10 +62,12 @@ def write_campaign_files(
     with_report: bool = True,
 ) -> bool:
     """Write table, models, report and figures of many records; return if all were written."""
+    note = f"from {len(campaign.good)} of {len(campaign.rows)} records"
+    save_model(folder / "model.json", campaign.system, settings=settings, note=note)
     write_csv(folder / "records.csv", campaign.table(), index=True)
     save_models(folder, campaign, settings)
     return _write_files(
-        folder, campaign.system, f"from {len(campaign.good)} of {len(campaign.rows)} records",
+        folder,
         partial(report.write_campaign, campaign=campaign,
                 title=f"Campaign of {len(campaign.rows)} records"),
         files=files, frf=frf, comparison=comparison, settings=settings, calls=calls,
@@ -74,8 +77,6 @@ def write_campaign_files(
 
 def _write_files(
     folder: Path,
-    system: DelayedStateSpace,
-    note: str,
     write: Callable[..., Path],
     *,
     files: Sequence[Path],
@@ -84,7 +85,6 @@ def _write_files(
     with_report: bool,
     **shown: Any,
 ) -> bool:
-    save_model(folder / "model.json", system, settings=settings, note=note)
     if comparison is not None:
         write_csv(folder / "frf_comparison.csv", comparison.table(), index=False)
     if not with_report:
