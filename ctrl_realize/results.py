@@ -445,3 +445,7 @@ class FractionalDelayFit(ModelFit):
     def delay_interval(self) -> tuple[float, float]:
         """Interval of the dead time in samples."""
         return self.interval[0] / self.dt, self.interval[1] / self.dt
+
+
+def __dir__() -> list[str]:
+    return __all__
