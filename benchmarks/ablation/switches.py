@@ -364,7 +364,7 @@ SWITCHES = (
     Switch(
         "profiles swept",
         {f"{ENGINE}.profile:_SWEEPS": value(0)},
-        (f"{ENGINE}.profile:polish",),
+        (f"{ENGINE}.profile:descend",),
         called=True,
     ),
     Switch(

@@ -17,11 +17,12 @@ from __future__ import annotations
 import numpy as np
 
 from ctrl_realize.numerics.arrays import ComplexArray, FloatArray
+from ctrl_realize.numerics.engine.modal import respond
 from ctrl_realize.numerics.engine.poles import parameters_from_poles
+from ctrl_realize.numerics.engine.problem import KnownFactor, Problem, Structure
 from ctrl_realize.numerics.engine.profile import dead_time_error
 from ctrl_realize.numerics.engine.responses import StepSequence
 from ctrl_realize.numerics.engine.structures import Candidate
-from ctrl_realize.numerics.engine.varpro import KnownFactor, Problem, Structure, respond
 
 
 def dead_time_bound(

@@ -6,7 +6,7 @@ import control as ct
 import numpy as np
 
 import ctrl_realize as cr
-from ctrl_realize.numerics.engine.varpro import KnownFactor
+from ctrl_realize.numerics.engine.problem import KnownFactor
 from tests import rigs
 
 from .cramer_rao import dead_time_bound

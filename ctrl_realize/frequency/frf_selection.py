@@ -11,8 +11,8 @@ from .._wording import plainly
 from ..delayed import DelayedStateSpace, delayed_ss
 from ..numerics.arrays import locked, read_only
 from ..numerics.constants import Z_95
+from ..numerics.engine.problem import Structure
 from ..numerics.engine.structures import Candidate
-from ..numerics.engine.varpro import Structure
 from ..numerics.rational.frf_data import (
     FRFData,
     modal_state_space,

@@ -9,7 +9,7 @@ from typing import Any, TypeAlias
 
 from .._checks import band, real
 from ..errors import OptionError, OrderError
-from ..numerics.engine.varpro import Structure
+from ..numerics.engine.problem import Structure
 from ..numerics.families.process_form import ProcessForm
 
 MOST_ORDER = 8  # higher orders suffer from rounding in the partial fractions

@@ -19,7 +19,7 @@ from ...frequency.frf_fit import FRFFit
 from ...numerics.arrays import ComplexArray, FloatArray
 from ...numerics.blas_threads import single_threaded
 from ...numerics.constants import SMALLEST
-from ...numerics.engine.varpro import Structure
+from ...numerics.engine.problem import Structure
 from ...numerics.joint.fit import joint_fit
 from ...numerics.joint.frf_rows import MeasuredPoints
 from ...numerics.joint.own_effects import EffectKey, with_random_effects

@@ -14,7 +14,7 @@ from ...data.given import as_records, check_input
 from ...errors import DataError, NoStepError, UnsuitableSystemError
 from ...numerics.arrays import FloatArray
 from ...numerics.constants import SMALLEST
-from ...numerics.engine.varpro import KnownFactor
+from ...numerics.engine.problem import KnownFactor
 from ...numerics.output_error.step_data import StepData, step_data
 from ...numerics.signals.edges import despike, difference_noise
 from ..step.steps import found_step

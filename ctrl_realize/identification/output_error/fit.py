@@ -18,7 +18,7 @@ from ...delayed import DelayedStateSpace
 from ...errors import DataError, OptionError
 from ...numerics.arrays import FloatArray
 from ...numerics.blas_threads import single_threaded
-from ...numerics.engine.varpro import KnownFactor, Structure
+from ...numerics.engine.problem import KnownFactor, Structure
 from ...numerics.families.process_form import ProcessForm
 from ...numerics.output_error.result import OutputErrorEstimate
 from ...numerics.output_error.step_data import own_regressors, step_data

@@ -20,6 +20,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..arrays import FloatArray
+from ..engine.problem import Structure
 from ..engine.structures import (
     LEAST_CHARGE,
     PLAUSIBLE,
@@ -29,7 +30,6 @@ from ..engine.structures import (
     parameter_charge,
 )
 from ..engine.structures import search as search_linear
-from ..engine.varpro import Structure
 from ..signals.noise import correlation_time, mad_sigma
 from .commands import knots
 from .family import Family, Member

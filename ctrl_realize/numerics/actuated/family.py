@@ -25,10 +25,11 @@ from scipy.signal import lfilter
 
 from ..arrays import BoolArray, ComplexArray, FloatArray
 from ..constants import SMALLEST
+from ..engine.modal import partial_fractions
 from ..engine.poles import poles_from_parameters
+from ..engine.problem import Structure
 from ..engine.responses import TOGETHER
 from ..engine.structures import Scales, parameter_bounds
-from ..engine.varpro import Structure, partial_fractions
 from ..regression.marquardt import Damping, damped_step, descend
 from .motions import KINDS, Kind, Motion, Place, Properties, Size
 from .records import Records

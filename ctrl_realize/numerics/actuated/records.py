@@ -19,8 +19,8 @@ import numpy as np
 from scipy.linalg import block_diag
 
 from ..arrays import FloatArray, IntArray
+from ..engine.problem import KnownFactor, Problem
 from ..engine.responses import SampledInput, SeveralInputs
-from ..engine.varpro import KnownFactor, Problem
 from ..signals.excitation import lively_start
 from ..signals.step_sequence import input_moves
 

@@ -14,8 +14,8 @@ import numpy as np
 
 from ..arrays import FloatArray
 from ..engine.poles import parameters_from_poles
+from ..engine.problem import Structure
 from ..engine.structures import Candidate, neighbour_starts, pattern_starts
-from ..engine.varpro import Structure
 from .family import Family, Member
 
 _QUICK = 0.2  # of the visible rise: the lags of the response are longer than those of the plant

@@ -16,10 +16,11 @@ from dataclasses import replace
 import numpy as np
 
 from ..arrays import FloatArray
-from .compressed import eliminate
+from .descend import descend
+from .eliminate import eliminate
 from .newton import settle
 from .poles import parameters_from_poles
-from .polish import polish
+from .problem import Bounds, Family, Problem, Structure
 from .structures import (
     PLAUSIBLE,
     Candidate,
@@ -35,7 +36,6 @@ from .structures import (
     pattern_starts,
     plausible,
 )
-from .varpro import Bounds, Family, Problem, Structure
 
 REACH = 3 * PLAUSIBLE
 """Excess of the criterion up to which structures are followed to their minima. Of measured records
@@ -168,7 +168,7 @@ def _near_minimum(
             near = cost[promising] <= old.cost * (1 + _PROMISING / problem.data.size)
             more = more[promising[near]]
         starts = [old.parameters, *more]
-    ends, costs = polish(problem, structure, np.array(starts), bounds, scales.dt)
+    ends, costs = descend(problem, structure, np.array(starts), bounds, scales.dt)
     order = np.argsort(costs)
     close = order[costs[order] <= costs[order[0]] * (1 + _CLOSE / problem.data.size)]
     others = apart(ends[close])[:_OTHERS]
@@ -187,7 +187,7 @@ def at_dead_time(
     structure, bounds = candidate.structure, parameter_bounds(candidate.structure, scales)
     starts = np.array([candidate.parameters, *pattern_starts(structure, scales)])
     starts[:, 0] = dead_time
-    fixed, costs = polish(problem, structure, starts, bounds, scales.dt, dead_time_fixed=True)
+    fixed, costs = descend(problem, structure, starts, bounds, scales.dt, dead_time_fixed=True)
     near = fixed[costs <= costs.min() * (1 + _CLOSE / problem.data.size)]
     fits = [
         settle(problem, structure, start, bounds, scales.dt, dead_time_fixed=True) for start in near

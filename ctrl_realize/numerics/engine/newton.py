@@ -21,12 +21,10 @@ from typing import TypeAlias
 import numpy as np
 
 from ..arrays import BoolArray, FloatArray
-from .compressed import compress
-from .sample_kinks import beside_a_sample, cell, leaving, other_side, snapped
-from .varpro import Bounds, Problem, Structure
+from .descend import IN_ROUNDING, beside_a_sample, cell, leaving, other_side, snapped
+from .eliminate import compress
+from .problem import Bounds, Problem, Structure
 
-IN_ROUNDING = 1e-11
-"""Part of the sum of squares: whether so little is a decrease, rounding decides."""
 _CONVERGED = 1e-14
 """Predicted decrease over the sum of squares at which a fit has converged. What is d variances
 above a minimum is sqrt(d) standard errors from it: with 1000 samples, three millionths of one."""

@@ -21,11 +21,12 @@ import numpy as np
 
 from ..arrays import FloatArray
 from ..constants import CHI2_95
+from .descend import descend
+from .eliminate import evaluate
 from .newton import solve_level
-from .polish import polish
+from .problem import Bounds, Problem
 from .profile_ends import bracket_ends, root_of
 from .structures import Candidate, Scales, parameter_bounds
-from .varpro import Bounds, Problem, evaluate
 
 _EDGE = float(np.sqrt(CHI2_95))
 _SOLVED = 1e-6  # standard errors, and samples, to which an end is solved
@@ -93,7 +94,7 @@ def profile_points(
     level = candidate.cost + CHI2_95 * variance
 
     def followed(starts: FloatArray) -> tuple[FloatArray, FloatArray]:
-        return polish(
+        return descend(
             problem, structure, starts, bounds, scales.dt, dead_time_fixed=True, level=level
         )
 
@@ -211,7 +212,7 @@ def _end(
         starts[:, 0] = inside.dead_time + below / (below - above) * (
             outside.dead_time - inside.dead_time
         )
-        x, cost = polish(problem, structure, starts, bounds, dt, dead_time_fixed=True)
+        x, cost = descend(problem, structure, starts, bounds, dt, dead_time_fixed=True)
         best = int(np.argmin(cost))
         point = Candidate(structure, x[best], float(cost[best]))
         found.append(point)

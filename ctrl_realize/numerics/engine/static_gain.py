@@ -20,10 +20,11 @@ from scipy.special import ndtr, ndtri
 
 from ..arrays import ComplexArray, FloatArray
 from ..constants import SMALLEST, Z_95
-from .compressed import eliminate
+from .eliminate import eliminate
+from .modal import partial_fractions, responses
 from .poles import lag_sum, poles_from_parameters
+from .problem import Family, Problem
 from .structures import Candidate
-from .varpro import Family, Problem, partial_fractions, responses
 
 INTEGRATOR = 5e-3
 """Poles slower than this, times the length of the record, cannot be distinguished from integrators:

@@ -28,7 +28,10 @@ from ..constants import HUBER, SMALLEST
 from ..signals.bins import Bins
 from ..signals.noise import correlation_of_noise, correlation_time, is_coarse, mad_sigma
 from .compared_fits import converged, on_new_data, settled
+from .eliminate import evaluate
 from .local_terms import Segments
+from .modal import respond
+from .problem import Problem, Structure
 from .responses import HeldInput
 from .static_gain import StaticGain, static_gain
 from .structures import (
@@ -41,7 +44,6 @@ from .structures import (
     parameter_charge,
     search,
 )
-from .varpro import Problem, Structure, evaluate, respond
 
 _PASSES = 2  # of modified residuals; see `fit_window`
 _RAMP = 0.1

@@ -26,11 +26,11 @@ import numpy as np
 
 from ..arrays import FloatArray
 from ..constants import Z_95
-from ..engine.compressed import eliminate
+from ..engine.eliminate import eliminate
 from ..engine.poles import lag_sum
+from ..engine.problem import Bounds, Problem, Structure
 from ..engine.profile import dead_time_error
 from ..engine.structures import Candidate, Scales
-from ..engine.varpro import Bounds, Problem, Structure
 from .shaped import LagFamily, Mapped, lowest, paired
 
 SHORTEST, LONGEST = 4, 8

@@ -19,10 +19,11 @@ from functools import partial
 import numpy as np
 
 from ..arrays import ComplexArray, FloatArray
-from ..engine.compressed import eliminate
+from ..engine.eliminate import eliminate
+from ..engine.modal import moved_amplitudes, partial_fractions
+from ..engine.problem import Bounds, KnownFactor, Problem
 from ..engine.responses import StepSequence
 from ..engine.structures import PLAUSIBLE, Candidate, Scales
-from ..engine.varpro import Bounds, KnownFactor, Problem, moved_amplitudes, partial_fractions
 from .equal_lags import time_moments
 from .residence import flow_modes
 from .shaped import ShapedFamily, UnitResponse, lowest

@@ -20,9 +20,9 @@ import numpy as np
 
 from ..arrays import FloatArray
 from ..constants import SMALLEST
+from ..engine.problem import Bounds, Problem
 from ..engine.static_gain import INTEGRATOR, LocalErrors
 from ..engine.structures import FASTEST, SLOWEST, Candidate, Scales
-from ..engine.varpro import Bounds, Problem
 from .physical import ProcessParameter
 from .process_form import ProcessForm
 from .shaped import LagFamily, Mapped, lowest, paired

@@ -22,9 +22,9 @@ import numpy as np
 
 from ..arrays import ComplexArray, FloatArray
 from ..engine.poles import poles_from_parameters
+from ..engine.problem import Problem
 from ..engine.static_gain import INTEGRATOR, local_errors
 from ..engine.structures import Candidate
-from ..engine.varpro import Problem
 
 _REAL = 1e-9  # relative imaginary part that is rounding
 

@@ -15,9 +15,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from ..engine.problem import Structure
 from ..engine.static_gain import INTEGRATOR
 from ..engine.structures import Candidate
-from ..engine.varpro import Structure
 
 
 @dataclass(frozen=True)

@@ -27,12 +27,13 @@ import numpy as np
 
 from ..arrays import ComplexArray, FloatArray
 from ..constants import SMALLEST
+from ..engine.descend import descend
 from ..engine.local_terms import solve_upper
+from ..engine.modal import moved_amplitudes, partial_fractions
 from ..engine.newton import settle
 from ..engine.poles import poles_from_parameters
-from ..engine.polish import polish
+from ..engine.problem import Evaluation, Family, Problem
 from ..engine.structures import Candidate, apart
-from ..engine.varpro import Evaluation, Family, Problem, moved_amplitudes, partial_fractions
 
 _CLOSE, _OTHERS = 1.0, 1
 """Variances by which ends differ that are both followed to their minimum, and how many others."""
@@ -139,6 +140,7 @@ class ShapedFamily(Family):
         """Eliminate the linear terms at parameters (B, k)."""
         models = [self.linearised(problem, x) for x in parameters]
         return Evaluation(
+            cost=np.array([model.residual @ model.residual for model in models]),
             residual=np.stack([model.residual for model in models]),
             jacobian=np.stack([model.jacobian for model in models]),
             sensitivity=np.stack([model.sensitivity for model in models]),
@@ -229,7 +231,7 @@ def lowest(
 
     Models with more than `enough` are not followed to their minimum.
     """
-    ends, costs = polish(problem, family, starts, family.bounds, dt)
+    ends, costs = descend(problem, family, starts, family.bounds, dt)
     order = np.argsort(costs)
     best, least = ends[order[0]], float(costs[order[0]])
     if least > enough:

@@ -21,8 +21,9 @@ from scipy.stats import chi2
 
 from ..arrays import BoolArray, FloatArray
 from ..engine.compared_fits import settled
+from ..engine.eliminate import evaluate
+from ..engine.problem import Problem, Structure
 from ..engine.structures import Candidate
-from ..engine.varpro import Problem, Structure, evaluate
 from .frf_rows import MeasuredPoints
 from .own_effects import OwnKey, chance_of, freed
 from .record_part import RecordPart

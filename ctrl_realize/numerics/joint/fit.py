@@ -18,11 +18,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..arrays import ComplexArray, FloatArray
-from ..engine.batch_search import fit_batch
 from ..engine.compared_fits import converged
+from ..engine.descend import descend
+from ..engine.modal import respond
 from ..engine.poles import parameters_from_poles
+from ..engine.problem import KnownFactor, Problem, Structure
 from ..engine.structures import Candidate, Scales, neighbour_starts, parameter_bounds, search
-from ..engine.varpro import KnownFactor, Problem, Structure, respond
 from ..engine.window import Window, WindowFit
 from ..output_error.interval import likelihood_fit
 from ..output_error.result import Followed, OutputErrorEstimate
@@ -114,7 +115,7 @@ def _starting_fits(
     for structure in sorted(starts, key=lambda s: (s.order, s.zeros)):
         tried = [*_parameters(starts[structure]), from_points[structure].parameters]
         tried += neighbour_starts(structure, scales, found)
-        parameters, cost = fit_batch(
+        parameters, cost = descend(
             problem, structure, np.array(tried), parameter_bounds(structure, scales)
         )
         order = np.argsort(cost)

@@ -18,8 +18,8 @@ import numpy as np
 
 from ..arrays import ComplexArray, FloatArray
 from ..engine.local_terms import Segments
+from ..engine.problem import KnownFactor, Problem
 from ..engine.responses import HeldInput, Modes
-from ..engine.varpro import KnownFactor, Problem
 from ..signals.sines import Sines, stacked_parts
 
 _LATE = 1e200
@@ -80,7 +80,6 @@ class MeasuredPoints:
             Sines(self.omega),
             np.empty((2 * self.omega.size, 0)),
             KnownFactor(),
-            real=False,  # at a point, the modes of conjugate poles are not conjugate
         )
 
 
@@ -117,5 +116,4 @@ def with_rows(record: Problem, more: Problem) -> Problem:
         drive=Beside((record.drive, more.drive)),
         regressors=np.concatenate([record.regressors, more.regressors]),
         segments=segments,
-        real=record.real and more.real,
     )

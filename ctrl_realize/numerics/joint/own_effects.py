@@ -27,10 +27,12 @@ from scipy.stats import f as f_distribution
 
 from ..arrays import ComplexArray, FloatArray
 from ..engine.compared_fits import settled
+from ..engine.eliminate import evaluate
+from ..engine.modal import respond
 from ..engine.poles import parameters_from_poles
+from ..engine.problem import KnownFactor, Problem
 from ..engine.responses import HeldInput, Modes
 from ..engine.structures import Candidate, Scales
-from ..engine.varpro import KnownFactor, Problem, evaluate, respond
 from ..output_error.result import OutputErrorEstimate
 from ..signals.sines import stacked_parts
 from .frf_rows import MeasuredPoints, both_together, with_rows

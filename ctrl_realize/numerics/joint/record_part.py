@@ -19,11 +19,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..arrays import FloatArray
+from ..engine.eliminate import evaluate
 from ..engine.local_terms import Segments
+from ..engine.modal import respond
 from ..engine.poles import parameters_from_poles, poles_from_parameters
+from ..engine.problem import KnownFactor, Problem
 from ..engine.responses import HeldInput
 from ..engine.structures import Scales
-from ..engine.varpro import KnownFactor, Problem, evaluate, respond
 from ..engine.window import weighted_correlation
 from ..output_error.any_input.data import SampledData, cut
 from ..output_error.result import OutputErrorEstimate

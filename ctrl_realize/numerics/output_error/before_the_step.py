@@ -18,8 +18,10 @@ from dataclasses import replace
 
 import numpy as np
 
+from ..engine.eliminate import evaluate
+from ..engine.modal import respond
+from ..engine.problem import Structure
 from ..engine.structures import PLAUSIBLE, SIMPLE_STRUCTURES, needless_parameters
-from ..engine.varpro import Structure, evaluate, respond
 from ..engine.window import WindowFit
 from .step_data import StepData
 

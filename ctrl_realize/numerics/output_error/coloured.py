@@ -18,11 +18,11 @@ from dataclasses import replace
 import numpy as np
 
 from ..arrays import FloatArray
-from ..engine.batch_search import fit_batch
 from ..engine.compared_fits import converged
-from ..engine.compressed import eliminate
+from ..engine.descend import descend
+from ..engine.eliminate import eliminate
+from ..engine.problem import Problem, Structure
 from ..engine.structures import Candidate, Scales, choose, neighbour_starts, parameter_bounds
-from ..engine.varpro import Problem, Structure
 from ..engine.window import WindowFit
 from ..signals.noise import correlation_time, mad_sigma
 from ..signals.noise_model import noise_covariance, whitener
@@ -88,7 +88,7 @@ def _fitted_again(fits: WindowFit, problem: Problem) -> dict[Structure, Candidat
         starts = _dead_times_near(problem, fits.candidates[structure], fits.scales)
         starts += neighbour_starts(structure, fits.scales, found)
         bounds = parameter_bounds(structure, fits.scales)
-        parameters, cost = fit_batch(problem, structure, np.array(starts), bounds)
+        parameters, cost = descend(problem, structure, np.array(starts), bounds)
         order = np.argsort(cost)
         best = order[0]
         found[structure] = Candidate(

@@ -21,12 +21,12 @@ from dataclasses import replace
 import numpy as np
 
 from ..constants import CHI2_95
+from ..engine.descend import descend
 from ..engine.newton import settle
 from ..engine.poles import parameters_from_poles, poles_from_parameters
-from ..engine.polish import polish
+from ..engine.problem import Family, KnownFactor, Structure
 from ..engine.static_gain import StaticGain
 from ..engine.structures import Candidate, parameter_bounds
-from ..engine.varpro import Family, KnownFactor, Structure
 from ..engine.window import WindowFit
 
 _FASTEST = 4.0  # over the length of the record: 2 % of such a mode are left at its end
@@ -64,7 +64,7 @@ def least_extrapolating(
     while rate > np.abs(poles[slow]):
         factor = KnownFactor(np.append(problem.known.poles, -rate), problem.known.numerator)
         held = replace(problem, known=factor)
-        near, _ = polish(
+        near, _ = descend(
             held, rest, start[None], bounds, scales.dt, dead_time_fixed=dead_time_fixed
         )
         x, cost = settle(held, rest, near[0], bounds, scales.dt, dead_time_fixed=dead_time_fixed)

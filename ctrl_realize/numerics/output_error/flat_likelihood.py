@@ -20,8 +20,9 @@ import numpy as np
 
 from ..constants import SMALLEST, Z_95
 from ..engine.compared_fits import at_dead_time
+from ..engine.eliminate import evaluate
+from ..engine.problem import Structure
 from ..engine.profile import dead_time_error
-from ..engine.varpro import Structure, evaluate
 from ..engine.window import WindowFit
 from ..families.physical import process_parameters
 from .extrapolation import least_extrapolating

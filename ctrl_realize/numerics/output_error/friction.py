@@ -23,10 +23,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..engine.polish import polish
+from ..engine.descend import descend
+from ..engine.problem import Structure
 from ..engine.profile_ends import profile_limits
 from ..engine.structures import LEAST_CHARGE, PLAUSIBLE, Candidate, parameter_bounds
-from ..engine.varpro import Structure
 from ..engine.window import WindowFit
 
 _S_AND_J = 2  # parameters of friction; behind a single lag the dead time takes the place of one
@@ -58,7 +58,7 @@ def latest_slip(fits: WindowFit, lags: Candidate) -> float | None:
     starts = np.tile(lags.parameters, (count, 1))
     starts[:, 0] = grid
     box = parameter_bounds(slips, scales)
-    costs = polish(fits.problem, slips, starts, box, scales.dt, dead_time_fixed=True)[1]
+    costs = descend(fits.problem, slips, starts, box, scales.dt, dead_time_fixed=True)[1]
     gained = (lags.cost - costs.min()) / fits.variance
     charge = max(slips.zeros, _S_AND_J) * max(LEAST_CHARGE, fits.penalty)
     if charge - gained <= PLAUSIBLE:

@@ -22,10 +22,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from ..constants import Z_95
+from ..engine.problem import Structure
 from ..engine.profile import Points
 from ..engine.profile_ends import profile_limits
 from ..engine.structures import LEAST_CHARGE, PLAUSIBLE, Scales, charged, plausible
-from ..engine.varpro import Structure
 from ..engine.window import WindowFit
 from ..families.equal_lags import (
     FREE_IN_A_CHAIN,

@@ -32,8 +32,10 @@ import numpy as np
 
 from ..arrays import FloatArray
 from ..constants import SMALLEST
-from ..engine.compressed import eliminate
-from ..engine.polish import polish
+from ..engine.descend import descend
+from ..engine.eliminate import eliminate, evaluate
+from ..engine.modal import partial_fractions
+from ..engine.problem import Problem, Structure
 from ..engine.static_gain import local_errors
 from ..engine.structures import (
     PLAUSIBLE,
@@ -43,7 +45,6 @@ from ..engine.structures import (
     parameter_bounds,
     pattern_starts,
 )
-from ..engine.varpro import Problem, Structure, evaluate, partial_fractions
 from ..engine.window import WindowFit
 from ..signals.load_step import LoadStep
 from ..signals.noise import correlation_time, mad_sigma
@@ -290,7 +291,7 @@ def _followed(
     for _ in range(_TURNS):
         _, load = _scan(fits, candidate, clock, times, shapes, load)
         own = _beside(fits, load.columns(clock)[:, :1])
-        x, cost = polish(own, structure, starts, bounds, dt)
+        x, cost = descend(own, structure, starts, bounds, dt)
         lowest = int(np.argmin(cost))
         candidate = Candidate(structure, x[lowest], float(cost[lowest]))
         starts = x[lowest][None]

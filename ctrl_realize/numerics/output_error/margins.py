@@ -10,8 +10,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal, TypeAlias
 
+from ..engine.problem import Structure
 from ..engine.structures import PLAUSIBLE, charged, needless_parameters, plausible
-from ..engine.varpro import Structure
 from ..engine.window import WindowFit
 
 CLOSE = 1e-3

@@ -14,6 +14,7 @@ from collections.abc import Callable
 from dataclasses import replace
 
 from ..engine.compared_fits import SLACK, converged, on_new_data, settled
+from ..engine.problem import Structure
 from ..engine.profile_ends import profile_limits
 from ..engine.structures import (
     ALL_STRUCTURES,
@@ -25,7 +26,6 @@ from ..engine.structures import (
     plausible,
     search,
 )
-from ..engine.varpro import Structure
 from ..engine.window import WindowFit
 from .profiles import profile_of
 from .result import OtherStructures, StructureFit

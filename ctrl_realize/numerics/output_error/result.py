@@ -16,12 +16,13 @@ from typing import Literal, NamedTuple, TypeAlias
 import numpy as np
 
 from ..arrays import ComplexArray, FloatArray
-from ..engine.compressed import eliminate
+from ..engine.eliminate import eliminate, evaluate
+from ..engine.modal import respond
 from ..engine.poles import lag_sum
+from ..engine.problem import Structure
 from ..engine.profile_ends import profile_limits
 from ..engine.static_gain import StaticGain, averaged_ends
 from ..engine.structures import Candidate, Scales, needless_parameters
-from ..engine.varpro import Structure, evaluate, respond
 from ..engine.window import WindowFit
 from ..families.equal_lags import LagChain
 from ..families.flow import DispersedFlow

@@ -22,8 +22,10 @@ from scipy.special import log_ndtr
 
 from ..arrays import FloatArray
 from ..constants import Z_95
+from ..engine.eliminate import evaluate
+from ..engine.modal import respond
+from ..engine.problem import Structure
 from ..engine.structures import Candidate, parameter_bounds
-from ..engine.varpro import Structure, evaluate, respond
 from ..engine.window import WindowFit
 from ..families.physical import fitted_parameters
 from ..signals.noise import correlation_time

@@ -22,8 +22,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+from ..engine.problem import Structure
 from ..engine.structures import PLAUSIBLE, Candidate, choose, needless_parameters, search
-from ..engine.varpro import Structure
 from ..engine.window import WindowFit
 from ..families.equal_lags import FREE_IN_A_CHAIN, LagChain, fit_chains, fit_diffusion
 from ..families.flow import DispersedFlow, fit_flows

@@ -16,9 +16,9 @@ import numpy as np
 
 from ..arrays import ComplexArray, FloatArray, IntArray
 from ..engine.local_terms import Segments, local_columns
+from ..engine.problem import KnownFactor, Problem
 from ..engine.responses import StepSequence
 from ..engine.structures import Scales
-from ..engine.varpro import KnownFactor, Problem
 from ..engine.window import Window
 from ..signals.baseline import noise_about_a_motion, relaxation
 from ..signals.bins import Bins, response_bins

@@ -64,13 +64,15 @@ import numpy as np
 
 from ..constants import Z_95
 from ..engine.compared_fits import at_dead_time
+from ..engine.eliminate import evaluate
+from ..engine.modal import respond
+from ..engine.problem import KnownFactor, Structure
 from ..engine.structures import (
     ALL_STRUCTURES,
     SIMPLE_STRUCTURES,
     Candidate,
     choose,
 )
-from ..engine.varpro import KnownFactor, Structure, evaluate, respond
 from ..engine.window import WindowFit, among, fit_window, with_noise_of_residual
 from ..families.equal_lags import LagChain
 from ..families.flow import DispersedFlow

@@ -21,8 +21,8 @@ from dataclasses import replace
 import numpy as np
 
 from ..arrays import FloatArray
+from ..engine.problem import Structure
 from ..engine.structures import Candidate
-from ..engine.varpro import Structure
 from .frf_data import FRFData
 from .search import (
     MISSING,

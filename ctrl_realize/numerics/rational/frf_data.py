@@ -23,21 +23,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import ComplexArray, FloatArray
-from ..engine.batch_search import fit_batch
+from ..engine.descend import descend
+from ..engine.eliminate import evaluate
+from ..engine.modal import partial_fractions
 from ..engine.poles import poles_from_parameters
-from ..engine.polish import polish
+from ..engine.problem import Bounds, Evaluation, KnownFactor, Problem, Structure
 from ..engine.profile import Points, profile_curve, with_ends
 from ..engine.profile_ends import bracket_ends, profile_limits
 from ..engine.structures import Candidate, Scales, parameter_bounds
-from ..engine.varpro import (
-    Bounds,
-    Evaluation,
-    KnownFactor,
-    Problem,
-    Structure,
-    evaluate,
-    partial_fractions,
-)
 from ..signals.sines import Sines, stacked_parts
 
 _FIRST_ITERATIONS = 10  # after which the starts are compared, and the best ones go on
@@ -93,7 +86,6 @@ class FRFData:
             Sines(self.omega),
             np.empty((2 * self.s.size, 0)),
             KnownFactor(),
-            real=False,  # at a point, the modes of conjugate poles are not conjugate
         )
 
     @cached_property
@@ -126,11 +118,11 @@ def refined(
 ) -> list[Candidate]:
     """Refine several starts: all of them a little, the best few to the end; the best first."""
     bounds = parameter_bounds(structure, data.scales)
-    x, cost = fit_batch(
+    x, cost = descend(
         data.problem, structure, np.array(starts), bounds, most_iterations=_FIRST_ITERATIONS
     )
     best = np.argsort(cost, kind="stable")[:kept]
-    x, cost = polish(data.problem, structure, x[best], bounds, data.scales.dt)
+    x, cost = descend(data.problem, structure, x[best], bounds, data.scales.dt)
     return [Candidate(structure, x[k], float(cost[k])) for k in np.argsort(cost, kind="stable")]
 
 

@@ -21,8 +21,8 @@ import numpy as np
 from ..arrays import ComplexArray, FloatArray
 from ..engine.compared_fits import settled
 from ..engine.poles import parameters_from_poles
+from ..engine.problem import Structure
 from ..engine.structures import Candidate
-from ..engine.varpro import Structure
 from .frf_data import FRFData, refined
 from .starts import delay_grid, grown_starts, starting_points
 

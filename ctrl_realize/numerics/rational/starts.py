@@ -22,10 +22,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import ComplexArray, FloatArray
-from ..engine.compressed import eliminate
+from ..engine.eliminate import eliminate
 from ..engine.poles import parameters_from_poles
+from ..engine.problem import Structure
 from ..engine.structures import Candidate, parameter_bounds
-from ..engine.varpro import Structure
 from ..signals.sines import stacked_parts
 from .frf_data import FRFData
 from .phase import phase_roughness

@@ -1,8 +1,8 @@
 """Damped least squares of one start: steps of Levenberg and Marquardt until nothing is gained.
 
 What is minimised, and how a step is kept within bounds, is the caller's; here is when a step is
-taken and how the damping follows [1]_, [2]_. Many starts of one problem at once are moved by
-`engine.batch_search`, to their very minima by `engine.polish`.
+taken and how the damping follows [1]_, [2]_. Many starts of one separable problem
+at once are moved by `engine.descend`.
 
 References
 ----------

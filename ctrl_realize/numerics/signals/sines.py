@@ -1,6 +1,6 @@
 r"""Points of a frequency response as rows of a separable least-squares problem.
 
-In `engine.varpro` a model is a sum of modes of an input. A point of a frequency response is the
+In `engine.modal` a model is a sum of modes of an input. A point of a frequency response is the
 response to another input, :math:`e^{j \omega t}`: with the residues r_j of ``G(s) / s`` at its
 poles p_j and its static gain g, G has
 

@@ -5,6 +5,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from ctrl_realize.numerics.engine.poles import parameters_from_poles, poles_from_parameters
+from ctrl_realize.numerics.engine.problem import Structure
 from ctrl_realize.numerics.engine.responses import StepSequence
 from ctrl_realize.numerics.engine.structures import (
     PLAUSIBLE,
@@ -13,7 +14,6 @@ from ctrl_realize.numerics.engine.structures import (
     needless_parameters,
     plausible,
 )
-from ctrl_realize.numerics.engine.varpro import Structure
 
 
 def ordered(poles):

@@ -6,15 +6,15 @@ import numpy as np
 import pytest
 from scipy.optimize import least_squares
 
-from ctrl_realize.numerics.engine.batch_search import fit_batch
 from ctrl_realize.numerics.engine.compared_fits import at_dead_time, converged, on_new_data
+from ctrl_realize.numerics.engine.descend import descend
+from ctrl_realize.numerics.engine.eliminate import evaluate
 from ctrl_realize.numerics.engine.newton import settle, solve_level
 from ctrl_realize.numerics.engine.poles import parameters_from_poles
-from ctrl_realize.numerics.engine.polish import polish
+from ctrl_realize.numerics.engine.problem import KnownFactor, Structure
 from ctrl_realize.numerics.engine.profile import dead_time_error, dead_time_profile
 from ctrl_realize.numerics.engine.profile_ends import profile_limits
 from ctrl_realize.numerics.engine.structures import Candidate, parameter_bounds, search
-from ctrl_realize.numerics.engine.varpro import KnownFactor, Structure, evaluate
 from ctrl_realize.numerics.output_error.step_data import step_data, step_scales, window
 
 SIGMA, DEAD, LAGS = 0.01, 20.3, (12.0, 30.0)
@@ -42,7 +42,7 @@ def found():
     problem, scales = problem_of()
     structure = Structure(2, 2)
     bounds = parameter_bounds(structure, scales)
-    parameters, cost = fit_batch(problem, structure, start(DEAD, *LAGS)[None], bounds)
+    parameters, cost = descend(problem, structure, start(DEAD, *LAGS)[None], bounds)
     return problem, Candidate(structure, parameters[0], float(cost[0])), scales
 
 
@@ -90,7 +90,7 @@ def test_a_dead_time_that_crosses_a_hundred_samples_ends_where_one_beside_it_doe
     structure = Structure(2, 2)
     bounds = parameter_bounds(structure, scales)
     starts = np.array([start(at, 30.0, 60.0) for at in (140.0, 40.0)])
-    near, far = (polish(problem, structure, one[None], bounds, scales.dt) for one in starts)
+    near, far = (descend(problem, structure, one[None], bounds, scales.dt) for one in starts)
     # within the decrease at which Newton's method takes over, 0.05 variances
     assert far[1][0] - near[1][0] < 0.1 * SIGMA**2
     assert abs(far[0][0, 0] - near[0][0, 0]) < 0.1
@@ -102,7 +102,7 @@ def test_at_the_minimum_nothing_slopes(order, degree):
     structure = Structure(order, degree)
     bounds = parameter_bounds(structure, scales)
     first = start(20.0, *np.linspace(8, 35, order))[None]
-    near = polish(problem, structure, first, bounds, scales.dt)[0][0]
+    near = descend(problem, structure, first, bounds, scales.dt)[0][0]
     x, _ = settle(problem, structure, near, bounds, scales.dt)
     state = evaluate(problem, structure, x[None])
     slope = state.jacobian[0].T @ state.residual[0]
@@ -118,7 +118,7 @@ def test_a_minimum_in_a_kink_is_at_the_sample_and_both_of_its_sides_rise():
     for seed in range(20):
         problem, scales = problem_of((3.0,), seed=seed, dead_time=20.0)
         bounds = parameter_bounds(structure, scales)
-        near = polish(problem, structure, start(20.0, 3.0)[None], bounds, scales.dt)[0][0]
+        near = descend(problem, structure, start(20.0, 3.0)[None], bounds, scales.dt)[0][0]
         x, cost = settle(problem, structure, near, bounds, scales.dt)
         beside = np.tile(x, (2, 1))
         beside[:, 0] += [-1e-4, 1e-4]
@@ -132,7 +132,7 @@ def test_a_level_is_met_by_the_least_cost_at_that_dead_time(order, degree):
     problem, scales = problem_of()
     structure = Structure(order, degree)
     bounds = parameter_bounds(structure, scales)
-    near = polish(problem, structure, start(20.0, 10.0, 30.0)[None], bounds, scales.dt)[0][0]
+    near = descend(problem, structure, start(20.0, 10.0, 30.0)[None], bounds, scales.dt)[0][0]
     x, cost = settle(problem, structure, near, bounds, scales.dt)
     goal = cost + 3.84 * SIGMA**2
     aside = x.copy()
@@ -142,7 +142,7 @@ def test_a_level_is_met_by_the_least_cost_at_that_dead_time(order, degree):
     assert found[0] < x[0]
     held = found[None].copy()
     held[:, 1:] = x[1:]
-    again, _ = polish(problem, structure, held, bounds, scales.dt, dead_time_fixed=True)
+    again, _ = descend(problem, structure, held, bounds, scales.dt, dead_time_fixed=True)
     least = settle(problem, structure, again[0], bounds, scales.dt, dead_time_fixed=True)[1]
     assert least == pytest.approx(goal, abs=1e-5 * SIGMA**2)
 
@@ -178,5 +178,5 @@ def test_no_random_start_beats_the_model_at_a_dead_time_far_from_the_best(dead_t
     box = parameter_bounds(structure, scales)
     starts = np.random.default_rng(9).uniform(box.low, box.high, size=(30, 4))
     starts[:, 0] = dead_time
-    cost = fit_batch(problem, structure, starts, box, dead_time_fixed=True, most_iterations=60)[1]
+    cost = descend(problem, structure, starts, box, dead_time_fixed=True, most_iterations=60)[1]
     assert at_dead_time(problem, best, scales, dead_time).cost <= cost.min()

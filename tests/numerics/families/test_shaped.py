@@ -7,8 +7,8 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy.special import gammainc
 
+from ctrl_realize.numerics.engine.problem import KnownFactor, Structure
 from ctrl_realize.numerics.engine.structures import Candidate
-from ctrl_realize.numerics.engine.varpro import KnownFactor, Structure
 from ctrl_realize.numerics.families.equal_lags import fit_chains
 from ctrl_realize.numerics.families.flow import fit_flows
 from ctrl_realize.numerics.families.form_fit import fit_form, form_family

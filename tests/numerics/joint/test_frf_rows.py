@@ -5,17 +5,12 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from ctrl_realize.numerics.engine.compressed import compress
+from ctrl_realize.numerics.engine.eliminate import compress, evaluate
 from ctrl_realize.numerics.engine.local_terms import Segments
+from ctrl_realize.numerics.engine.modal import respond
 from ctrl_realize.numerics.engine.poles import parameters_from_poles
+from ctrl_realize.numerics.engine.problem import KnownFactor, Problem, Structure
 from ctrl_realize.numerics.engine.responses import SampledInput
-from ctrl_realize.numerics.engine.varpro import (
-    KnownFactor,
-    Problem,
-    Structure,
-    evaluate,
-    respond,
-)
 from ctrl_realize.numerics.joint.frf_rows import MeasuredPoints, both_together
 
 OMEGA = np.geomspace(0.1, 50.0, 12)

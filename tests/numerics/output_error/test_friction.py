@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize
 
-from ctrl_realize.numerics.engine.varpro import KnownFactor, Structure
+from ctrl_realize.numerics.engine.problem import KnownFactor, Structure
 from ctrl_realize.numerics.engine.window import fit_window
 from ctrl_realize.numerics.output_error.friction import latest_slip
 from ctrl_realize.numerics.output_error.step_data import step_data, step_scales, window

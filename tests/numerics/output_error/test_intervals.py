@@ -7,8 +7,9 @@ import pytest
 
 from benchmarks.accuracy.cramer_rao import dead_time_bound
 from ctrl_realize.identification.output_error.flags import sampled_flags
+from ctrl_realize.numerics.engine.eliminate import evaluate
+from ctrl_realize.numerics.engine.problem import KnownFactor, Structure
 from ctrl_realize.numerics.engine.structures import PLAUSIBLE, Scales, needless_parameters
-from ctrl_realize.numerics.engine.varpro import KnownFactor, Structure, evaluate
 from ctrl_realize.numerics.engine.window import WindowFit, fit_window
 from ctrl_realize.numerics.output_error.interval import likelihood_fit
 from ctrl_realize.numerics.output_error.margins import CLOSE, close_to

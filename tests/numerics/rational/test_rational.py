@@ -6,8 +6,8 @@ from numpy.testing import assert_allclose
 from scipy import signal
 
 from ctrl_realize.numerics.engine.poles import parameters_from_poles
+from ctrl_realize.numerics.engine.problem import Structure
 from ctrl_realize.numerics.engine.structures import Candidate
-from ctrl_realize.numerics.engine.varpro import Structure
 from ctrl_realize.numerics.rational.frf_data import FRFData, modal_state_space
 from ctrl_realize.numerics.rational.sines import fit_sines
 from ctrl_realize.numerics.rational.spectra import independent_segments

@@ -17,8 +17,8 @@ from ....numerics.actuated.records import FEW_MOVES, ActuatedRecord, actuated_re
 from ....numerics.arrays import FloatArray, IntArray
 from ....numerics.constants import CHI2_95, Z_95
 from ....numerics.engine.local_terms import Segments, local_columns
+from ....numerics.engine.problem import Structure
 from ....numerics.engine.structures import PLAUSIBLE, Scales
-from ....numerics.engine.varpro import Structure
 from ....numerics.output_error.any_input.stretch import WHITE
 from ....numerics.output_error.result import (
     DistributedLags,

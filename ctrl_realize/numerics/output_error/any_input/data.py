@@ -14,8 +14,8 @@ from scipy.signal import lfilter
 
 from ...arrays import FloatArray, IntArray
 from ...engine.local_terms import Segments
+from ...engine.problem import KnownFactor, Problem
 from ...engine.responses import HeldInput, SampledInput, SeveralInputs, StepSequence
-from ...engine.varpro import KnownFactor, Problem
 from ...signals.excitation import lively_start
 from .averaged_input import AveragedInput
 

@@ -15,8 +15,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from ...arrays import FloatArray
+from ...engine.modal import respond
 from ...engine.poles import parameters_from_poles, poles_from_parameters
-from ...engine.varpro import KnownFactor, respond
+from ...engine.problem import KnownFactor
 from ...signals.correlation import fit_percent
 from ...signals.noise import correlation_time
 from ...validation.own_response import OwnResponse

@@ -12,8 +12,8 @@ from typing import TypeAlias
 import numpy as np
 
 from ...arrays import FloatArray
+from ...engine.problem import KnownFactor, Structure
 from ...engine.structures import Candidate
-from ...engine.varpro import KnownFactor, Structure
 from ...engine.window import WindowFit
 from ..result import UnweightedModel
 from .condensed import MOST_LAGS

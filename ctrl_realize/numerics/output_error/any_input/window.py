@@ -21,10 +21,12 @@ import numpy as np
 
 from ...arrays import FloatArray, without_gaps
 from ...engine.compared_fits import settled
+from ...engine.eliminate import evaluate
+from ...engine.modal import respond
 from ...engine.poles import poles_from_parameters
+from ...engine.problem import KnownFactor, Problem, Structure
 from ...engine.static_gain import StaticGain
 from ...engine.structures import Candidate, Scales, search
-from ...engine.varpro import KnownFactor, Problem, Structure, evaluate, respond
 from ...engine.window import Window, WindowFit, fit_window
 from ...signals.noise import quantisation_step, winsorised_sigma
 from ...signals.noise_model import noise_lags, whitening_filter

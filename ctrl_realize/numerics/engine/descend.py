@@ -1,10 +1,13 @@
-r"""Follow separable least squares close to the minimum, so that criteria can be compared.
+r"""Damped least squares of many starts at once, with bounds and with kinks at samples.
 
-A search ends when a step gains little. The remaining difference depends on rounding, and would
-affect the comparison of structures and the ends of intervals. Here every step is a
-Levenberg-Marquardt step from an orthogonal factorisation (the normal equations square the condition
-number), with a damping that depends on the ratio of actual to predicted decrease [1]_, [2]_.
-Newton's method continues from there (`newton`); sample times are kinks (`sample_kinks`).
+Every step is a Levenberg-Marquardt step from an orthogonal factorisation (the normal equations
+square the condition number), with a damping that depends on the ratio of actual to predicted
+decrease [1]_, [2]_. Newton's method continues from there (`newton`).
+
+As a function of the dead time the sum of squares has a kink where the response starts at a sample.
+Between two samples it is smooth, so a step ends at the next sample and continues on its other side;
+a kink is a minimum if the cost decreases towards it on both sides. That is our own rule. A search
+that compares starts does without: it ends when a step gains little.
 
 References
 ----------
@@ -16,34 +19,48 @@ References
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from ..arrays import BoolArray, FloatArray, IntArray
-from .compressed import compress, triangle
-from .newton import IN_ROUNDING
-from .sample_kinks import beside_a_sample, cell, leaving, other_side, snapped
-from .varpro import Bounds, Problem, Structure
+from .eliminate import compress, triangle
+from .problem import Bounds, Problem, Structure
 
+IN_ROUNDING = 1e-11
+"""Part of the sum of squares: whether so little is a decrease, rounding decides."""
+BESIDE = 1e-8
+"""Distance in samples from a sample at which a dead time counts as being on one side of it."""
 _NEAR = 0.05  # variances: predicted decrease at which Newton's steps take over
+_ROUGHLY = 1e-4  # of the cost: decrease by a step at which a start of a search ends
 _NO_WAY = 0.03  # of the distance to a level, as predicted decrease, at which it is not reached
-_DAMPING = 1e-4  # of the first step, in squared columns of the Jacobian
-_LONGEST_STEP = 1.0  # of a logarithmic parameter
-_MOST_TURNS = 100
+_DAMPING = 1e-4, 1e-2  # of the first step, in squared columns of the Jacobian; in a search
+_RISE, _FALL = (2.0, 8.0), 0.2
+"""Of the damping after a step that gains nothing, in a search too, where it falls as fast however
+well a step was predicted: valleys of starts bend."""
+_LONGEST_STEP = 1.0, 1.5  # of a logarithmic parameter; in a search
+_WHOLE = 1 - 1e-9  # of that, up to which a step was not shortened
+_MOST_TURNS = 100, 30
+_MOST_FAILURES = 4  # of a start in a row, before a search gives it up
+_TURNS_FOR_ALL, _HOPELESS = 8, 1.5
+"""Iterations of a search, after which starts are given up whose cost is so many times the least."""
 _NOTHING = 1e-10  # of the largest column of the Jacobian: a direction of rounding
 _MOST_PINS = 3
 
 
-def polish(
+def descend(
     problem: Problem,
     structure: Structure,
     starts: FloatArray,
     bounds: Bounds,
-    dt: float,
+    dt: float | None = None,
     *,
     dead_time_fixed: bool = False,
     level: float | None = None,
+    tolerance: float | None = None,
+    most_iterations: int | None = None,
 ) -> tuple[FloatArray, FloatArray]:
-    """Follow every start until it is near its minimum; `newton.settle` does the rest.
+    """Follow every start downhill, until it is near its minimum or roughly; the rest is Newton's.
 
     Starts of one structure compete: those that cannot reach the best are abandoned.
 
@@ -54,18 +71,26 @@ def polish(
     starts : ndarray, shape (B, 1 + n)
         Dead time in s and pole parameters.
     bounds : Bounds
-    dt : float
-        Sample time in s.
+    dt : float, optional
+        Sample time in s. Without it kinks at samples are left aside, and starts end roughly.
     dead_time_fixed : bool, optional
         Keep the first column as it is (profile likelihood).
     level : float, optional
         A cost; it is only tested whether a minimum lies below it.
+    tolerance : float, optional
+        A start ends when a step is predicted to lower its cost by less than this part.
+    most_iterations : int, optional
+        Limit for all starts together.
 
     Returns
     -------
     parameters : ndarray, shape (B, 1 + n)
     cost : ndarray, shape (B,)
     """
+    searching = dt is None
+    if dt is None:
+        bounds, dt = replace(bounds, smooth=True), np.inf
+    near = tolerance or (_ROUGHLY if searching else _NEAR / problem.data.size)
     x = np.clip(starts, bounds.low, bounds.high)
     if dead_time_fixed:
         x[:, 0] = starts[:, 0]
@@ -74,7 +99,9 @@ def polish(
     state = compress(problem, structure, x)
     residual, jacobian, cost = state.residual, state.jacobian, state.cost
     count = len(x)
-    damping, growth = np.full(count, _DAMPING), np.full(count, 2.0)
+    rise, longest = _RISE[searching], _LONGEST_STEP[searching]
+    damping, growth = np.full(count, _DAMPING[searching]), np.full(count, rise)
+    failures = np.zeros(count, dtype=np.int64)
     # A fixed dead time: given, or at a kink towards which the cost decreases on both sides.
     pinned = np.full(count, dead_time_fixed)
     crossed = np.zeros(count, dtype=np.bool_)
@@ -83,7 +110,7 @@ def polish(
     # A dead time that has crossed samples one after the other may cross several at once.
     reach, heading = np.zeros(count), np.zeros(count, dtype=np.int64)
     active: IntArray = np.arange(count)
-    for _ in range(_MOST_TURNS):
+    for turns in range(most_iterations or _MOST_TURNS[searching]):
         at = x[active]
         low, high = cell(at, bounds, dt, pinned[active], reach[active])
         downhill = np.einsum("bmp,bm->bp", jacobian[active], residual[active])
@@ -91,7 +118,7 @@ def polish(
         free = ~((at <= low) & (downhill < 0) | (at >= high) & (downhill > 0) | (low >= high))
         step, predicted = _step_to(
             residual[active], jacobian[active], free, damping[active], low[:, 0] - at[:, 0],
-            high[:, 0] - at[:, 0],
+            high[:, 0] - at[:, 0], longest,
         )  # fmt: skip
         trial = np.clip(at + step, low, high)
         wide = reach[active] > 0
@@ -116,19 +143,29 @@ def polish(
         residual[up], jacobian[up] = moved.residual[better], moved.jacobian[better]
         usual = better & ~turn
         ratio = gained[usual] / np.maximum(predicted[usual], 1e-300)
-        ease = np.clip(1 - (2 * np.clip(ratio, 0.0, 1.0) - 1) ** 3, 1 / 9, 2.0)
+        ease = (
+            _FALL if searching else np.clip(1 - (2 * np.clip(ratio, 0.0, 1.0) - 1) ** 3, 1 / 9, 2.0)
+        )
         damping[active[usual]] = np.maximum(damping[active[usual]] * ease, 1e-12)
-        growth[active[usual]] = 2.0
+        growth[active[usual]] = rise
         damping[down] *= growth[down]
-        growth[down] *= 2.0
+        growth[down] *= 1.0 if searching else rise
+        failures[up] = 0
+        failures[down] += 1
         crossed[active] = turn
         pinned[active[kink]], at_kink[active[kink]] = True, cost[active[kink]]
-        enough = _NEAR / problem.data.size * cost[active]
+        enough = near * cost[active]
         if dead_time_fixed and level is not None:
             enough = np.maximum(enough, _NO_WAY * np.abs(cost[active] - level))
-        elif not dead_time_fixed:
+        elif not (dead_time_fixed or searching):
             enough = np.maximum(enough, _NO_WAY * (cost[active] - cost.min()))
         done = ~turn & ~kink & (better | ~wide) & (predicted <= enough)
+        if searching:
+            # A shortened step gains little where there is far to go.
+            whole = np.abs(step[:, 1:]).max(axis=1, initial=0.0) < _WHOLE * longest
+            done = (better & whole & (gained < enough)) | (failures[active] >= _MOST_FAILURES)
+            if turns >= _TURNS_FOR_ALL and not dead_time_fixed:
+                done |= cost[active] > _HOPELESS * cost.min()
         # Where the other parameters have changed since, the kink is tested once more.
         again = done & pinned[active] & (pins[active] < _MOST_PINS)
         again &= at_kink[active] - cost[active] > enough
@@ -137,7 +174,7 @@ def polish(
         active = active[~((done & ~again) | (damping[active] > 1e12))]
         if not active.size:
             break
-    if not dead_time_fixed:
+    if not (dead_time_fixed or bounds.smooth):
         x[:, 0] = np.clip(snapped(x[:, 0], dt), bounds.low[0], bounds.high[0])
     return x, cost
 
@@ -149,16 +186,19 @@ def _step_to(
     damping: FloatArray,
     low: FloatArray,
     high: FloatArray,
+    longest: float,
 ) -> tuple[FloatArray, FloatArray]:
     """Damped step; where the dead time would leave its bounds, the best one with it at a bound."""
-    step, predicted = _step(residual, jacobian, free, damping)
+    step, predicted = _step(residual, jacobian, free, damping, longest)
     reached = np.clip(step[:, 0], low, high)
     cut = free[:, 0] & (reached != step[:, 0])
     if cut.any():
         move = reached[cut, None] * jacobian[cut, :, 0]
         others = free[cut]
         others[:, 0] = False
-        step[cut], gained = _step(residual[cut] - move, jacobian[cut], others, damping[cut])
+        step[cut], gained = _step(
+            residual[cut] - move, jacobian[cut], others, damping[cut], longest
+        )
         step[cut, 0] = reached[cut]
         gained += np.einsum("bm,bm->b", move, 2 * residual[cut] - move)
         predicted[cut] = np.maximum(gained, 0.0)
@@ -170,6 +210,7 @@ def _step(
     jacobian: FloatArray,
     free: BoolArray,
     damping: FloatArray,
+    longest: float,
 ) -> tuple[FloatArray, FloatArray]:
     """Damped step in the free directions, and the decrease of the linear model."""
     columns = jacobian * free[:, None]
@@ -188,8 +229,63 @@ def _step(
     r = triangle(whole)
     step = np.linalg.solve(r[:, :count, :count], r[:, :count, count:])[:, :, 0]
     step = np.where(moving & free, step / size, 0.0)
-    longest = np.maximum(np.abs(step[:, 1:]).max(axis=1, initial=0.0) / _LONGEST_STEP, 1.0)
-    step = step / longest[:, None]
+    excess = np.maximum(np.abs(step[:, 1:]).max(axis=1, initial=0.0) / longest, 1.0)
+    step = step / excess[:, None]
     change = np.einsum("bmp,bp->bm", columns, step)
     predicted = np.einsum("bm,bm->b", change, 2 * residual - change)
     return step, np.maximum(predicted, 0.0)
+
+
+def cell(
+    at: FloatArray, bounds: Bounds, dt: float, pinned: BoolArray, beyond: FloatArray | float = 0.0
+) -> tuple[FloatArray, FloatArray]:
+    """Bounds of every row; those of its dead time are `beyond` samples from the neighbouring."""
+    low, high = (np.tile(bound, (len(at), 1)) for bound in (bounds.low, bounds.high))
+    if bounds.smooth:
+        low[pinned, 0] = high[pinned, 0] = at[pinned, 0]
+        return low, high
+    sample = np.ceil(at[:, 0] / dt)
+    low[:, 0] = np.maximum(low[:, 0], (sample - 1 - beyond + BESIDE) * dt)
+    high[:, 0] = np.minimum(high[:, 0], (sample + beyond - BESIDE) * dt)
+    held = pinned | (low[:, 0] > high[:, 0])
+    low[held, 0] = high[held, 0] = at[held, 0]
+    return low, high
+
+
+def beside_a_sample(dead_time: FloatArray, bounds: Bounds, dt: float) -> FloatArray:
+    """Dead times (B,) within their bounds that do not coincide with a sample."""
+    if bounds.smooth:
+        return dead_time
+    sample = np.round(dead_time / dt)
+    at_one = np.abs(dead_time / dt - sample) < BESIDE
+    earlier, later = (sample - BESIDE) * dt, (sample + BESIDE) * dt
+    moved = np.where(earlier >= bounds.low[0], earlier, np.minimum(later, bounds.high[0]))
+    return np.where(at_one, moved, dead_time)
+
+
+def leaving(
+    at: FloatArray,
+    downhill: FloatArray,
+    low: FloatArray,
+    high: FloatArray,
+    bounds: Bounds,
+    pinned: BoolArray,
+) -> IntArray:
+    """-1 or 1 for rows with a dead time at a sample beyond which the cost decreases."""
+    dead_time, way = at[:, 0], downhill[:, 0]
+    later = (dead_time >= high[:, 0]) & (way > 0) & (high[:, 0] < bounds.high[0])
+    earlier = (dead_time <= low[:, 0]) & (way < 0) & (low[:, 0] > bounds.low[0])
+    return np.where(pinned, 0, later.astype(np.int64) - earlier.astype(np.int64))
+
+
+def other_side(dead_time: FloatArray, way: IntArray, dt: float) -> FloatArray:
+    """Dead times (B,) beyond the sample that is reached, -1 (earlier) or 1 (later)."""
+    sample = np.round(dead_time / dt)
+    return np.asarray((sample + way * BESIDE) * dt)
+
+
+def snapped(dead_time: FloatArray, dt: float) -> FloatArray:
+    """Remove the offset of a dead time from a sample."""
+    sample = np.round(dead_time / dt)
+    # Adding zero avoids a negative zero.
+    return np.where(np.abs(dead_time / dt - sample) <= 2 * BESIDE, sample * dt + 0.0, dead_time)

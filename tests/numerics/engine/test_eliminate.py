@@ -1,28 +1,30 @@
 """The separable fit: responses, derivatives, optimum; batches of starts against closed forms."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from ctrl_realize.numerics.engine.batch_search import fit_batch
-from ctrl_realize.numerics.engine.compressed import compress
+from ctrl_realize.numerics.engine.descend import descend
+from ctrl_realize.numerics.engine.eliminate import compress, eliminate, evaluate
 from ctrl_realize.numerics.engine.local_terms import Segments
+from ctrl_realize.numerics.engine.modal import respond
 from ctrl_realize.numerics.engine.poles import parameters_from_poles
+from ctrl_realize.numerics.engine.problem import KnownFactor, Problem, Structure
 from ctrl_realize.numerics.engine.responses import SampledInput, SeveralInputs, StepSequence
 from ctrl_realize.numerics.engine.structures import Scales, parameter_bounds, search
-from ctrl_realize.numerics.engine.varpro import (
-    KnownFactor,
-    Problem,
-    Structure,
-    evaluate,
-    respond,
-)
+from ctrl_realize.numerics.joint.frf_rows import with_rows
+from ctrl_realize.numerics.signals.sines import Sines
 from tests import rigs
+from tests.oracles.varpro import evaluate as oracle
 
 ONES = np.ones(300, dtype=np.int64)
 TRAIN = StepSequence(np.arange(300.0), ONES, 1.0, np.array([0.0, 50.0]), np.array([1.0, 0.5]))
+STEP = StepSequence(np.arange(300.0), ONES, 1.0, np.array([3.0]), np.array([0.7]))
 RANDOM = SampledInput(np.random.default_rng(0).normal(size=30).repeat(10), 1.0)
 KNOWN = KnownFactor(np.array([-0.3 + 0j]), np.array([0.2, 0.3]))
+PAIR = KnownFactor(np.array([-0.3, -0.2 + 0.4j, -0.2 - 0.4j]), np.array([0.1, 0.06]))
 THETA = {
     1: [np.log(0.03)],
     2: np.log([0.05, 0.7]),
@@ -106,12 +108,61 @@ def test_compression_changes_no_products_of_residual_and_jacobian(n, r, drive, c
         assert_allclose(mine, theirs, rtol=0, atol=1e-9 * np.abs(theirs).max())
 
 
+def product(state, size, squared):
+    """Product of Jacobian with itself or the residual, its columns in units of a size (B, p)."""
+    columns = state.jacobian / size[:, None]
+    other = columns if squared else state.residual[:, :, None]
+    return np.einsum("bmp,bmq->bpq", columns, other)
+
+
 def products(state):
     """Squares and products of residual and Jacobian, the latter in columns of one size."""
     size = np.sqrt(np.einsum("bmp,bmp->bp", state.jacobian, state.jacobian))
     columns = state.jacobian / size[:, None]
     downhill = np.einsum("bmp,bm->bp", columns, state.residual)
     return state.cost, size, downhill, np.einsum("bmp,bmq->bpq", columns, columns)
+
+
+def several(data, weight):
+    """Two records and points of a frequency response below one another, behind known dynamics."""
+    record = replace(two_records(data, weight), known=KNOWN, regressors=np.ones((300, 1)))
+    sines = Problem(
+        data[:80], weight[:80], Sines(np.geomspace(0.01, 2.0, 40)), np.ones((80, 1)), KNOWN
+    )
+    return with_rows(record, sines)
+
+
+def points(data, weight):
+    return Problem(data, weight, Sines(np.geomspace(0.01, 2.0, 150)), np.ones((300, 1)), PAIR)
+
+
+@pytest.mark.parametrize(
+    "made",
+    [behind_known(TRAIN), behind_known(RANDOM), behind_known(STEP), two_records, several, points],
+    ids=["steps", "random", "step", "own", "several", "points"],
+)
+@pytest.mark.parametrize(("n", "r"), [(1, 0), (1, 1), (2, 1), (3, 0), (3, 3), (4, 2), (5, 2)])
+def test_all_ways_of_elimination_agree_with_one_basis_of_all_terms(n, r, made):
+    rng = np.random.default_rng(10 * n + r)
+    x = np.tile(np.concatenate([[22.3], THETA[n]]), (3, 1))
+    x += 0.1 * rng.normal(size=x.shape)
+    if n > 1:
+        x[1, -1] = np.log(1.7)  # two lags beside pairs of conjugates, in one batch
+    given = made(rng.normal(size=300).cumsum(), rng.uniform(0.5, 2.0, 300))
+    slow = oracle(given, Structure(n, r), x)
+    rows, short, bare = (way(given, Structure(n, r), x) for way in (evaluate, compress, eliminate))
+    # Without a jump of its own a dead time is no direction: its column is rounding.
+    scale = slow.sensitivity[:, None]
+    assert_allclose(rows.residual, slow.residual, rtol=0, atol=1e-10 * np.abs(slow.residual).max())
+    assert_allclose(rows.jacobian / scale, slow.jacobian / scale, rtol=0, atol=1e-10)
+    assert_allclose(rows.sensitivity, slow.sensitivity, rtol=1e-9)
+    assert_allclose(rows.regression, slow.regression, rtol=1e-8, atol=1e-10)
+    for squared in (True, False):
+        mine, theirs = (product(one, slow.sensitivity, squared) for one in (short, slow))
+        assert_allclose(mine, theirs, rtol=0, atol=1e-10 * np.abs(theirs).max())
+    for other in (rows, short, bare):
+        assert_allclose(other.cost, slow.cost, rtol=1e-10)
+        assert_allclose(other.numerator, slow.numerator, rtol=1e-8)
 
 
 def test_the_response_is_the_closed_form_at_any_fraction_of_a_sample():
@@ -139,7 +190,7 @@ def test_no_random_start_beats_the_few_that_are_tried():
         found = search(problem, [Structure(3, 3)], scales)[Structure(3, 3)]
         box = parameter_bounds(Structure(3, 3), scales)
         starts = rng.uniform(box.low, box.high, size=(30, 4))
-        _, cost = fit_batch(problem, Structure(3, 3), starts, box, most_iterations=60)
+        _, cost = descend(problem, Structure(3, 3), starts, box, most_iterations=60)
         worse += found.cost > cost.min() * (1 + 1e-4)
     assert worse == 0
 

@@ -1,0 +1,247 @@
+"""Eliminate what enters linearly: residual and Jacobian of a batch of dead times and poles.
+
+Numerator, regressors and local terms enter linearly and are eliminated (variable projection [2]_,
+[3]_); for dead time and poles Kaufman's Jacobian [1]_ is used. A whole batch of models is evaluated
+by the same array operations.
+
+Response, derivatives, regressors and data of a delayed transfer function lie in the space of the
+static part, the modes exp(p t) and their derivatives t exp(p t), the regressors and the data.
+`compress` takes the rows of a record, hundreds or thousands, to as many as these columns are, by an
+orthogonal transformation [4]_: squares and products of residual and Jacobian, all that a search
+needs, do not change. `evaluate` leaves the rows as they are.
+
+References
+----------
+.. [1] L. Kaufman, A variable projection method for solving separable nonlinear least squares
+   problems, BIT 15 (1975) 49-57, doi:10.1007/BF01932995.
+.. [2] G. H. Golub and V. Pereyra, The differentiation of pseudo-inverses and nonlinear least
+   squares problems whose variables separate, SIAM J. Numer. Anal. 10 (1973) 413-432,
+   doi:10.1137/0710036.
+.. [3] G. Golub and V. Pereyra, Separable nonlinear least squares: the variable projection method
+   and its applications, Inverse Problems 19 (2003) R1-R26, doi:10.1088/0266-5611/19/2/201.
+.. [4] G. H. Golub and C. F. Van Loan, Matrix Computations, 4th ed., Johns Hopkins 2013, section
+   5.3 (the full-rank least squares problem).
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import numpy as np
+
+from ..arrays import FloatArray
+from ..signals.sines import Sines
+from .local_terms import solve_upper
+from .modal import RealModes, moved_amplitudes, partial_fractions
+from .poles import poles_from_parameters
+from .problem import Compressed, Eliminated, Evaluation, Family, Problem, Structure
+from .responses import StepSequence
+
+
+def eliminate(problem: Problem, structure: Structure, parameters: FloatArray) -> Eliminated:
+    """Eliminate the linear terms at parameters (B, 1 + n), and leave derivatives aside."""
+    if isinstance(structure, Family):
+        return structure.evaluate(problem, parameters)
+    models, q = _Models(problem, structure, parameters), problem.regressors.shape[1]
+    columns = models.columns(slopes=False)
+    if models.local is None:
+        linear = models.linear(triangle(columns)[:, q:, q:])
+    else:
+        linear = models.local.without(models.linear(columns, q))
+    residual, weights, _ = _eliminated(linear)
+    numerator = weights[:, : structure.zeros + 1]
+    return Eliminated(np.add.reduce(residual * residual, axis=1), numerator)
+
+
+def compress(problem: Problem, structure: Structure, parameters: FloatArray) -> Compressed:
+    """Eliminate the linear terms at parameters (B, 1 + n), in as few rows as can be.
+
+    Free responses have other derivatives for every segment: with local terms all rows remain.
+    """
+    if problem.segments is not None or isinstance(structure, Family):
+        return evaluate(problem, structure, parameters)
+    models, q = _Models(problem, structure, parameters), problem.regressors.shape[1]
+    left = triangle(models.columns())[:, q:, q:]
+    residual, numerator, basis = _eliminated(models.linear(left))
+    jacobian = _orthogonal(left[:, :, :-1] @ models.slopes(numerator), basis)
+    return Compressed(np.add.reduce(residual * residual, axis=1), numerator, residual, jacobian)
+
+
+def evaluate(problem: Problem, structure: Structure, parameters: FloatArray) -> Evaluation:
+    """Eliminate the linear terms at parameters (B, 1 + n), in the rows of the problem."""
+    if isinstance(structure, Family):
+        return structure.evaluate(problem, parameters)
+    models, q = _Models(problem, structure, parameters), problem.regressors.shape[1]
+    columns, count = models.columns(), structure.zeros + 1
+    linear = models.linear(columns, q)
+    left = linear if models.local is None else models.local.without(linear)
+    residual, weights, basis = _eliminated(left)
+    derivative = columns[:, :, q:-1] @ models.slopes(weights[:, :count])
+    if models.local is not None:
+        remainder = linear[:, :, -1] - (linear[:, :, :-1] @ weights[:, :, None])[:, :, 0]
+        derivative[:, :, 1:] += models.local.moved(remainder, models.dfree)
+    sensitivity = np.sqrt(np.einsum("bmp,bmp->bp", derivative, derivative))
+    if models.local is not None:
+        derivative = models.local.without(derivative)
+    return Evaluation(
+        np.add.reduce(residual * residual, axis=1),
+        weights[:, :count],
+        residual,
+        _orthogonal(derivative, basis),
+        sensitivity,
+        weights[:, count:],
+    )
+
+
+class _Models:
+    """Models of a structure at parameters (B, 1 + n), and the columns that they consist of.
+
+    ``weights`` (B, 1 + J, n - r + 1) of static part and modes make the responses to one power of s
+    in the numerator each.
+    """
+
+    def __init__(self, problem: Problem, structure: Structure, parameters: FloatArray) -> None:
+        self._problem, self._tau = problem, parameters[:, 0]
+        self._free, self.dfree = poles_from_parameters(parameters[:, 1:])
+        self._poles = np.concatenate(
+            [self._free, np.tile(problem.known.poles, (len(parameters), 1))], axis=1
+        )
+        self._modes = RealModes(self._poles, structure.order)
+        residues, gain, self._dresidues = partial_fractions(
+            self._poles, problem.known.numerator, structure.zeros + 1
+        )
+        self._residues, self._gain = residues, gain
+        self.weights = np.zeros((len(residues), 1 + residues.shape[1], residues.shape[2]))
+        self.weights[:, 0, 0] = gain
+        self.weights[:, 1:] = self._modes.weights(residues)
+        jumps = structure.relative_degree == 0
+        self._sines = problem.drive if jumps and isinstance(problem.drive, Sines) else None
+        self.local = None if problem.segments is None else problem.local_terms(self._free)
+
+    def columns(self, *, slopes: bool = True) -> FloatArray:
+        """Weighted regressors, static part, modes, their derivatives, and data (B, m, k).
+
+        Before the data of points of a frequency response there is the derivative of a direct term.
+        """
+        problem, n, count = self._problem, self._free.shape[1], self._poles.shape[1]
+        q, moving = problem.regressors.shape[1], n if slopes else 0
+        turning = self._sines if slopes else None
+        width = q + 1 + count + moving + (turning is not None) + 1
+        # A column is contiguous, as LAPACK has it.
+        space = np.empty((len(self._tau), width, problem.data.size))
+        space[:, :q] = problem.weighted_regressors.T
+        space[:, -1] = problem.weighted_data
+        inside = space[:, q:-1]
+        if not _step_columns(problem, self._tau, self._modes, inside):
+            static, mode, slope = problem.drive.modes(self._tau, self._poles)
+            parts = [static[:, :, None], self._modes.columns(mode)]
+            if slopes:
+                parts.append(self._modes.columns(slope[:, :, :n]))
+            if turning is not None:
+                parts.append(turning.direct_slope(self._tau)[:, :, None])
+            inside[:] = np.swapaxes(problem.weighted(np.concatenate(parts, axis=2)), 1, 2)
+        return np.swapaxes(space, 1, 2)
+
+    def linear(self, columns: FloatArray, regressors: int = 0) -> FloatArray:
+        """Responses (B, m, n - r + 1), regressors and data, from columns."""
+        made = columns[:, :, regressors : regressors + self.weights.shape[1]] @ self.weights
+        return np.concatenate([made, columns[:, :, :regressors], columns[:, :, -1:]], axis=2)
+
+    def slopes(self, numerator: FloatArray) -> FloatArray:
+        """Weights (B, k, 1 + n) of the columns in the derivatives of the models."""
+        n, count = self._free.shape[1], self._poles.shape[1]
+        amplitudes = (self._residues @ numerator[:, :, None])[:, :, 0]
+        through = np.empty((len(numerator), count, 1 + n), dtype=np.complex128)
+        through[:, :, 0] = -amplitudes * self._poles
+        turned = moved_amplitudes(self._poles, amplitudes, self._dresidues, numerator)
+        through[:, :, 1:] = turned[:, :, :n] @ self.dfree
+        found = np.zeros((len(numerator), 1 + count + n + (self._sines is not None), 1 + n))
+        level = ((-1.0 / self._free)[:, None] @ self.dfree)[:, 0].real
+        found[:, 0, 1:] = level * (self._gain * numerator[:, 0])[:, None]
+        found[:, 1 : 1 + count] = self._modes.weights(through)
+        moved = amplitudes[:, :n, None] * self.dfree
+        found[:, 1 + count : 1 + count + n, 1:] = self._modes.weights(moved)
+        if self._sines is not None:
+            found[:, -1, 0] = numerator[:, -1]
+        return found
+
+
+def _eliminated(columns: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Residual (B, k) of the last column, weights (B, z) of the others, their orthonormal basis."""
+    columns, data = columns[:, :, :-1], columns[:, :, -1:]
+    # Columns scaled to equal norm: the powers of s differ by many decades.
+    norm = np.sqrt(np.add.reduce(columns * columns, axis=1))
+    norm[norm == 0] = 1.0
+    columns = columns / norm[:, None]
+    if columns.shape[2] == 1:
+        inside = np.swapaxes(columns, 1, 2) @ data
+        return (data - columns @ inside)[:, :, 0], inside[:, :, 0] / norm, columns
+    # Variable projection: residual = (I - Q Q') data (Golub and Pereyra 1973).
+    q, r = np.linalg.qr(columns)
+    inside = np.swapaxes(q, 1, 2) @ data
+    return (data - q @ inside)[:, :, 0], solve_upper(r, inside[:, :, 0]) / norm, q
+
+
+def _orthogonal(columns: FloatArray, basis: FloatArray) -> FloatArray:
+    """Project an orthonormal basis (B, m, k) out of columns (B, m, l)."""
+    return np.asarray(columns - basis @ (np.swapaxes(basis, 1, 2) @ columns))
+
+
+def triangle(columns: FloatArray) -> FloatArray:
+    """Triangular factor (B, k, k) of columns (B, m, k) with m >= k; fewer rows if m < k."""
+    # What LAPACK leaves, without the reflections below; `mode="r"` takes as long again for that.
+    left = np.swapaxes(np.linalg.qr(columns, mode="raw")[0], 1, 2)
+    rows = min(left.shape[1:])
+    return np.asarray(left[:, :rows] * _upper(rows, left.shape[2]))
+
+
+@lru_cache(maxsize=64)
+def _upper(rows: int, columns: int) -> FloatArray:
+    return np.triu(np.ones((rows, columns)))
+
+
+def _step_columns(
+    problem: Problem, tau: FloatArray, models: RealModes, columns: FloatArray
+) -> bool:
+    """Weighted static part, modes, and derivatives of the first of them, to `columns` (B, k, m).
+
+    False where that is not possible: for other inputs than one step, coloured noise, missing
+    samples, and bins in which the step arrives.
+    """
+    drive = problem.drive
+    if not isinstance(drive, StepSequence) or problem.whitener is not None:
+        return False
+    elapsed = drive.since_the_step(tau)
+    if elapsed is None:
+        return False
+    count = models.poles.shape[1]
+    static, modes, slopes = columns[:, 0], columns[:, 1 : 1 + count], columns[:, 1 + count :]
+    moving = slopes.shape[1]
+    np.multiply(elapsed > 0, drive.sizes[0] * problem.root_weight, out=static)
+    # The mean of a mode over a bin is its first sample times a factor; that of t exp(p t) has the
+    # mean of the time besides.
+    rates = models.poles.real
+    factor, lag, kind = drive.means(rates)
+    np.multiply(rates[:, :, None], elapsed[:, None], out=modes)
+    np.exp(modes, out=modes)
+    modes *= factor.take(kind, axis=2)
+    modes *= static[:, None]
+    late = elapsed[:, None] + lag[:, :moving].take(kind, axis=2)
+    np.multiply(modes[:, :moving], late, out=slopes)
+    for pair, (i, j) in enumerate(zip(models.first, models.second, strict=True)):
+        # Cosine and sine instead of both of a pair; the slopes are a product of complex numbers.
+        rows = np.flatnonzero(models.turning[:, pair])
+        if not rows.size:
+            continue
+        when, rate = elapsed[rows], models.poles[rows, i, None]
+        factor, lag, kind = drive.means(rate)
+        factor, lag = np.log(factor[:, 0]), lag[:, 0]
+        decay = static[rows] * np.exp(rate.real * when + factor.real.take(kind, axis=1))
+        phase = rate.imag * when + factor.imag.take(kind, axis=1)
+        cosine, sine = decay * np.cos(phase), decay * np.sin(phase)
+        modes[rows, i], modes[rows, j] = cosine, sine
+        if i < moving:
+            length, turn = when + lag.real.take(kind, axis=1), lag.imag.take(kind, axis=1)
+            slopes[rows, i] = cosine * length - sine * turn
+            slopes[rows, j] = cosine * turn + sine * length
+    return True
