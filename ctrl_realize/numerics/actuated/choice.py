@@ -62,8 +62,10 @@ class ActuatedFit:
     ends : tuple of Ends
         95 % interval of the dead time in s, for all models with an actuator that are not ruled out,
         and of the values of the actuator, for all numbers of lags.
+    records : Records
+        With all their samples.
     residual : ndarray, shape (M,)
-        Of all records.
+        At all of them.
     correlation : float
         Samples of the residual that count as one.
     variance : float
@@ -73,6 +75,7 @@ class ActuatedFit:
     member: Member
     evidence: float
     ends: tuple[Ends, ...]
+    records: Records
     residual: FloatArray
     correlation: float
     variance: float
@@ -106,7 +109,7 @@ def fit_actuated(
     ActuatedFit or None
         None if there is nothing to fit.
     """
-    records = Records(tuple(parts))
+    records = Records(tuple(part.thinned() for part in parts))
     orders = LAGS if structures is None else tuple(s.order for s in structures if s.zeros == 0)
     if not wanted or not orders:
         return None
@@ -119,7 +122,7 @@ def fit_actuated(
         linear = search_linear(records.problem, LINEAR, scales)
         found = [replace(one.family, records=records).improved(one.x) for one in found]
         residual = _residual(found)
-    correlation = correlation_time(residual[: max(part.rows.size for part in parts)])
+    correlation = correlation_time(residual[: max(part.rows.size for part in records.parts)])
     free = max(residual.size - found[0].parameters - records.regressors.shape[1], 1)
     variance = max(float(residual @ residual) / free, 1e-300) * correlation
     charge = max(parameter_charge(residual.size / correlation), LEAST_CHARGE)
@@ -151,6 +154,7 @@ def fit_actuated(
         same = (one.family.kind, one.family.place) == (member.family.kind, member.family.place)
         every.append(profiled(one, variance, dead_time_alone=not same)[1])
     unions = ([each[i] for each in every if len(each) > i] for i in range(len(ends)))
+    whole = Records(tuple(parts))
     return ActuatedFit(
         member=member,
         evidence=float(straight - value(member)),
@@ -158,7 +162,8 @@ def fit_actuated(
             Ends(min(lows), max(highs))
             for lows, highs in (zip(*each, strict=True) for each in unions)
         ),
-        residual=_residual([member]),
+        records=whole,
+        residual=replace(member.family, records=whole).residuals(member.x[None])[0][0],
         correlation=correlation,
         variance=variance,
     )

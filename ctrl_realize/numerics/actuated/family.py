@@ -181,14 +181,13 @@ class Family:
         positions = {}
         if self.place == "input":
             positions = {case: case[0].driven(record, case[1]) for case in dict.fromkeys(cases)}
-        for wait, each, weight, rows in zip(
-            lags[:, 0], poles, weights, alike.values(), strict=True
-        ):
+        waits = lags[:, 0] / record.dt - record.late
+        for wait, each, weight, rows in zip(waits, poles, weights, alike.values(), strict=True):
             if positions:
                 signals = np.array([positions[cases[k]] for k in rows])
-                found[rows] = _lagged(signals, wait / record.dt, each * record.dt, weight)
+                found[rows] = _lagged(signals, wait, each * record.dt, weight)
                 continue
-            demand = _lagged(record.command[None], wait / record.dt, each * record.dt, weight)[0]
+            demand = _lagged(record.command[None], wait, each * record.dt, weight)[0]
             for k in rows:
                 motion, start = cases[k]
                 found[k] = motion.followed(record.command[0] + demand, record.dt, start)

@@ -12,7 +12,7 @@ References
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -43,12 +43,15 @@ class ActuatedRecord:
         Output, NaN where it is missing.
     regressors : ndarray, shape (N, q)
         Level and other terms of the record that do not depend on the command.
+    late : float
+        Samples by which the output was measured after the command of the same sample.
     """
 
     command: FloatArray
     dt: float
     measured: FloatArray
     regressors: FloatArray
+    late: float = 0.0
 
     @cached_property
     def rows(self) -> IntArray:
@@ -71,6 +74,23 @@ class ActuatedRecord:
         first[starts] = True
         first[np.minimum(starts + 1, first.size - 1)] = True
         return self.command[first], np.cumsum(first) - 1
+
+    def thinned(self) -> ActuatedRecord:
+        """Means over blocks of samples, counted from the first move, of a long record."""
+        block = -(-self.command.size // MOST_SAMPLES)
+        if block == 1:
+            return self
+        first = int(self.moves[0]) % block if self.moves.size else 0
+        count = (self.command.size - first) // block
+        values = np.column_stack([self.command, self.measured, self.regressors])
+        blocks = values[first : first + count * block].reshape(count, block, -1)
+        seen = ~np.isnan(blocks[:, :, 1])
+        weight = (seen / np.maximum(seen.sum(axis=1, keepdims=True), 1))[:, :, None]
+        means = np.where(seen[:, :, None], blocks, 0.0)
+        means = (means * weight).sum(axis=1)
+        output = np.where(seen.any(axis=1), means[:, 1], np.nan)
+        command, late = blocks[:, :, 0].mean(axis=1), (block - 1) / (2 * block)
+        return ActuatedRecord(command, block * self.dt, output, means[:, 2:], late)
 
 
 def actuated_record(
@@ -158,5 +178,5 @@ class Records:
         for part, values in zip(self.parts, np.split(output, ends), strict=True):
             measured = part.measured.copy()
             measured[part.rows] = values
-            parts.append(ActuatedRecord(part.command, part.dt, measured, part.regressors))
+            parts.append(replace(part, measured=measured))
         return Records(tuple(parts))

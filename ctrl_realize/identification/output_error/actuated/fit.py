@@ -205,14 +205,14 @@ def _estimate(
 ) -> OutputErrorEstimate:
     member, structure = found.member, found.member.family.structure
     static, parameters = propagated(member, found.variance, scales.length)
-    fitted = member.family.records.output - found.residual
+    fitted = found.records.output - found.residual
     low, high = found.ends[0]
     dead_time = float(member.x[0])
     low, high = min(low, dead_time), max(high, dead_time)
     complete = float(fit_percent(measured[None], fitted[None])[0])
     if np.isfinite(result.onset) and len(result.records) == 1:
         free = max(measured.size - member.parameters, 1)
-        normalized_rms = float(np.sqrt(member.cost / free)) / result.data.sigma
+        normalized_rms = float(np.linalg.norm(found.residual) / np.sqrt(free)) / result.data.sigma
         adequate = normalized_rms <= ADEQUATE * max(result.data.colour, 1.0)
     else:
         normalized_rms, adequate = float(np.sqrt(found.correlation)), found.correlation <= WHITE
