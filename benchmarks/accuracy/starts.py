@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 from joblib import Parallel, delayed
 
-from ctrl_realize.numerics.engine.descend import descend
+from ctrl_realize.numerics.engine.batch_search import fit_batch
 from ctrl_realize.numerics.engine.poles import parameters_from_poles
 from ctrl_realize.numerics.engine.problem import KnownFactor, Structure
 from ctrl_realize.numerics.engine.structures import parameter_bounds, search
@@ -32,7 +32,7 @@ def missed(name: str, noise: float, seed: int) -> bool:
     found = search(problem, [structure], replace(scales, ringing=0.0))[structure]
     start = np.concatenate([[truth * record.dt], parameters_from_poles(plant.poles() + 0j)])
     box = parameter_bounds(structure, scales)
-    _, cost = descend(problem, structure, start[None], box, most_iterations=100)
+    _, cost = fit_batch(problem, structure, start[None], box, most_iterations=100)
     return bool(found.cost > cost[0] * (1 + EQUAL))
 
 

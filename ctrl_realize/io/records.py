@@ -180,7 +180,6 @@ def read_record(
     --------
     >>> import tempfile
     >>> from pathlib import Path
-    from types import SimpleNamespace
     >>> import ctrl_realize as cr
     >>> with tempfile.TemporaryDirectory() as folder:
     ...     file = Path(folder) / "valve.csv"
@@ -226,7 +225,6 @@ def read_records(
     --------
     >>> import tempfile
     >>> from pathlib import Path
-    from types import SimpleNamespace
     >>> import ctrl_realize as cr
     >>> with tempfile.TemporaryDirectory() as folder:
     ...     file = Path(folder) / "tests.csv"

@@ -1,4 +1,7 @@
-r"""Damped least squares of many starts at once, with bounds and with kinks at samples.
+r"""Follow starts of a search close to the minimum, with bounds and with kinks at samples.
+
+A search (`batch_search`) ends when a step gains little. The remaining difference depends on
+rounding, and would affect the comparison of structures and the ends of intervals.
 
 Every step is a Levenberg-Marquardt step from an orthogonal factorisation (the normal equations
 square the condition number), with a damping that depends on the ratio of actual to predicted
@@ -6,8 +9,7 @@ decrease [1]_, [2]_. Newton's method continues from there (`newton`).
 
 As a function of the dead time the sum of squares has a kink where the response starts at a sample.
 Between two samples it is smooth, so a step ends at the next sample and continues on its other side;
-a kink is a minimum if the cost decreases towards it on both sides. That is our own rule. A search
-that compares starts does without: it ends when a step gains little.
+a kink is a minimum if the cost decreases towards it on both sides. That is our own rule.
 
 References
 ----------
@@ -18,8 +20,6 @@ References
 """
 
 from __future__ import annotations
-
-from dataclasses import replace
 
 import numpy as np
 
@@ -32,18 +32,10 @@ IN_ROUNDING = 1e-11
 BESIDE = 1e-8
 """Distance in samples from a sample at which a dead time counts as being on one side of it."""
 _NEAR = 0.05  # variances: predicted decrease at which Newton's steps take over
-_ROUGHLY = 1e-4  # of the cost: decrease by a step at which a start of a search ends
 _NO_WAY = 0.03  # of the distance to a level, as predicted decrease, at which it is not reached
-_DAMPING = 1e-4, 1e-2  # of the first step, in squared columns of the Jacobian; in a search
-_RISE, _FALL = (2.0, 8.0), 0.2
-"""Of the damping after a step that gains nothing, in a search too, where it falls as fast however
-well a step was predicted: valleys of starts bend."""
-_LONGEST_STEP = 1.0, 1.5  # of a logarithmic parameter; in a search
-_WHOLE = 1 - 1e-9  # of that, up to which a step was not shortened
-_MOST_TURNS = 100, 30
-_MOST_FAILURES = 4  # of a start in a row, before a search gives it up
-_TURNS_FOR_ALL, _HOPELESS = 8, 1.5
-"""Iterations of a search, after which starts are given up whose cost is so many times the least."""
+_DAMPING = 1e-4  # of the first step, in squared columns of the Jacobian
+_LONGEST_STEP = 1.0  # of a logarithmic parameter
+_MOST_TURNS = 100
 _NOTHING = 1e-10  # of the largest column of the Jacobian: a direction of rounding
 _MOST_PINS = 3
 
@@ -53,14 +45,12 @@ def descend(
     structure: Structure,
     starts: FloatArray,
     bounds: Bounds,
-    dt: float | None = None,
+    dt: float,
     *,
     dead_time_fixed: bool = False,
     level: float | None = None,
-    tolerance: float | None = None,
-    most_iterations: int | None = None,
 ) -> tuple[FloatArray, FloatArray]:
-    """Follow every start downhill, until it is near its minimum or roughly; the rest is Newton's.
+    """Follow every start until it is near its minimum; `newton.settle` does the rest.
 
     Starts of one structure compete: those that cannot reach the best are abandoned.
 
@@ -71,26 +61,18 @@ def descend(
     starts : ndarray, shape (B, 1 + n)
         Dead time in s and pole parameters.
     bounds : Bounds
-    dt : float, optional
-        Sample time in s. Without it kinks at samples are left aside, and starts end roughly.
+    dt : float
+        Sample time in s.
     dead_time_fixed : bool, optional
         Keep the first column as it is (profile likelihood).
     level : float, optional
         A cost; it is only tested whether a minimum lies below it.
-    tolerance : float, optional
-        A start ends when a step is predicted to lower its cost by less than this part.
-    most_iterations : int, optional
-        Limit for all starts together.
 
     Returns
     -------
     parameters : ndarray, shape (B, 1 + n)
     cost : ndarray, shape (B,)
     """
-    searching = dt is None
-    if dt is None:
-        bounds, dt = replace(bounds, smooth=True), np.inf
-    near = tolerance or (_ROUGHLY if searching else _NEAR / problem.data.size)
     x = np.clip(starts, bounds.low, bounds.high)
     if dead_time_fixed:
         x[:, 0] = starts[:, 0]
@@ -99,9 +81,7 @@ def descend(
     state = compress(problem, structure, x)
     residual, jacobian, cost = state.residual, state.jacobian, state.cost
     count = len(x)
-    rise, longest = _RISE[searching], _LONGEST_STEP[searching]
-    damping, growth = np.full(count, _DAMPING[searching]), np.full(count, rise)
-    failures = np.zeros(count, dtype=np.int64)
+    damping, growth = np.full(count, _DAMPING), np.full(count, 2.0)
     # A fixed dead time: given, or at a kink towards which the cost decreases on both sides.
     pinned = np.full(count, dead_time_fixed)
     crossed = np.zeros(count, dtype=np.bool_)
@@ -110,7 +90,7 @@ def descend(
     # A dead time that has crossed samples one after the other may cross several at once.
     reach, heading = np.zeros(count), np.zeros(count, dtype=np.int64)
     active: IntArray = np.arange(count)
-    for turns in range(most_iterations or _MOST_TURNS[searching]):
+    for _ in range(_MOST_TURNS):
         at = x[active]
         low, high = cell(at, bounds, dt, pinned[active], reach[active])
         downhill = np.einsum("bmp,bm->bp", jacobian[active], residual[active])
@@ -118,7 +98,7 @@ def descend(
         free = ~((at <= low) & (downhill < 0) | (at >= high) & (downhill > 0) | (low >= high))
         step, predicted = _step_to(
             residual[active], jacobian[active], free, damping[active], low[:, 0] - at[:, 0],
-            high[:, 0] - at[:, 0], longest,
+            high[:, 0] - at[:, 0],
         )  # fmt: skip
         trial = np.clip(at + step, low, high)
         wide = reach[active] > 0
@@ -143,29 +123,19 @@ def descend(
         residual[up], jacobian[up] = moved.residual[better], moved.jacobian[better]
         usual = better & ~turn
         ratio = gained[usual] / np.maximum(predicted[usual], 1e-300)
-        ease = (
-            _FALL if searching else np.clip(1 - (2 * np.clip(ratio, 0.0, 1.0) - 1) ** 3, 1 / 9, 2.0)
-        )
+        ease = np.clip(1 - (2 * np.clip(ratio, 0.0, 1.0) - 1) ** 3, 1 / 9, 2.0)
         damping[active[usual]] = np.maximum(damping[active[usual]] * ease, 1e-12)
-        growth[active[usual]] = rise
+        growth[active[usual]] = 2.0
         damping[down] *= growth[down]
-        growth[down] *= 1.0 if searching else rise
-        failures[up] = 0
-        failures[down] += 1
+        growth[down] *= 2.0
         crossed[active] = turn
         pinned[active[kink]], at_kink[active[kink]] = True, cost[active[kink]]
-        enough = near * cost[active]
+        enough = _NEAR / problem.data.size * cost[active]
         if dead_time_fixed and level is not None:
             enough = np.maximum(enough, _NO_WAY * np.abs(cost[active] - level))
-        elif not (dead_time_fixed or searching):
+        elif not dead_time_fixed:
             enough = np.maximum(enough, _NO_WAY * (cost[active] - cost.min()))
         done = ~turn & ~kink & (better | ~wide) & (predicted <= enough)
-        if searching:
-            # A shortened step gains little where there is far to go.
-            whole = np.abs(step[:, 1:]).max(axis=1, initial=0.0) < _WHOLE * longest
-            done = (better & whole & (gained < enough)) | (failures[active] >= _MOST_FAILURES)
-            if turns >= _TURNS_FOR_ALL and not dead_time_fixed:
-                done |= cost[active] > _HOPELESS * cost.min()
         # Where the other parameters have changed since, the kink is tested once more.
         again = done & pinned[active] & (pins[active] < _MOST_PINS)
         again &= at_kink[active] - cost[active] > enough
@@ -186,19 +156,16 @@ def _step_to(
     damping: FloatArray,
     low: FloatArray,
     high: FloatArray,
-    longest: float,
 ) -> tuple[FloatArray, FloatArray]:
     """Damped step; where the dead time would leave its bounds, the best one with it at a bound."""
-    step, predicted = _step(residual, jacobian, free, damping, longest)
+    step, predicted = _step(residual, jacobian, free, damping)
     reached = np.clip(step[:, 0], low, high)
     cut = free[:, 0] & (reached != step[:, 0])
     if cut.any():
         move = reached[cut, None] * jacobian[cut, :, 0]
         others = free[cut]
         others[:, 0] = False
-        step[cut], gained = _step(
-            residual[cut] - move, jacobian[cut], others, damping[cut], longest
-        )
+        step[cut], gained = _step(residual[cut] - move, jacobian[cut], others, damping[cut])
         step[cut, 0] = reached[cut]
         gained += np.einsum("bm,bm->b", move, 2 * residual[cut] - move)
         predicted[cut] = np.maximum(gained, 0.0)
@@ -210,7 +177,6 @@ def _step(
     jacobian: FloatArray,
     free: BoolArray,
     damping: FloatArray,
-    longest: float,
 ) -> tuple[FloatArray, FloatArray]:
     """Damped step in the free directions, and the decrease of the linear model."""
     columns = jacobian * free[:, None]
@@ -229,7 +195,7 @@ def _step(
     r = triangle(whole)
     step = np.linalg.solve(r[:, :count, :count], r[:, :count, count:])[:, :, 0]
     step = np.where(moving & free, step / size, 0.0)
-    excess = np.maximum(np.abs(step[:, 1:]).max(axis=1, initial=0.0) / longest, 1.0)
+    excess = np.maximum(np.abs(step[:, 1:]).max(axis=1, initial=0.0) / _LONGEST_STEP, 1.0)
     step = step / excess[:, None]
     change = np.einsum("bmp,bp->bm", columns, step)
     predicted = np.einsum("bm,bm->b", change, 2 * residual - change)

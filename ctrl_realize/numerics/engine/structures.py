@@ -23,7 +23,7 @@ import numpy as np
 
 from ..arrays import ComplexArray, FloatArray
 from ..constants import SMALLEST
-from .descend import descend
+from .batch_search import fit_batch
 from .poles import parameters_from_poles, poles_from_parameters
 from .problem import Bounds, Family, Problem, Structure
 
@@ -141,7 +141,7 @@ def search(
             starts += pattern_starts(structure, scales)
         bounds = parameter_bounds(structure, scales)
         done = float(np.clip(_ROUGHLY / problem.data.size, 1e-4, 1e-3))
-        parameters, cost = descend(problem, structure, np.array(starts), bounds, tolerance=done)
+        parameters, cost = fit_batch(problem, structure, np.array(starts), bounds, tolerance=done)
         order = np.argsort(cost)
         best, ends = order[0], apart(parameters[order[:_ENDS]])
         found[structure] = Candidate(structure, parameters[best], float(cost[best]), ends, True)

@@ -203,8 +203,8 @@ class WindowFit:
 def with_noise_of_residual(fit: WindowFit) -> WindowFit:
     """Correct the noise of a fit for what its model has taken from slow noise.
 
-    For a residual that is noise: that of a misfit tells no noise. Ablation: noise that the model
-    has taken.
+    For a residual that is noise: that of a misfit tells no noise. It is for errors alone, the
+    choice of the structure stays. Ablation: noise that the model has taken.
     """
     structure, window = fit.best.structure, fit.window
     parameters = 1 + structure.order + structure.zeros + window.columns.shape[1]
@@ -212,8 +212,7 @@ def with_noise_of_residual(fit: WindowFit) -> WindowFit:
     count = window.output.size - window.start
     correlation, missing = correlation_of_noise(fit.correlation, parameters / count)
     sigma = fit.sigma / float(np.sqrt(1.0 - missing))
-    fit = replace(fit, sigma=sigma, correlation=correlation)
-    return replace(fit, criterion=fit.criteria(fit.candidates))
+    return replace(fit, sigma=sigma, correlation=correlation)
 
 
 def weighted_correlation(correlation: float, counted: float) -> float:

@@ -18,8 +18,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..arrays import ComplexArray, FloatArray
+from ..engine.batch_search import fit_batch
 from ..engine.compared_fits import converged
-from ..engine.descend import descend
 from ..engine.modal import respond
 from ..engine.poles import parameters_from_poles
 from ..engine.problem import KnownFactor, Problem, Structure
@@ -115,7 +115,7 @@ def _starting_fits(
     for structure in sorted(starts, key=lambda s: (s.order, s.zeros)):
         tried = [*_parameters(starts[structure]), from_points[structure].parameters]
         tried += neighbour_starts(structure, scales, found)
-        parameters, cost = descend(
+        parameters, cost = fit_batch(
             problem, structure, np.array(tried), parameter_bounds(structure, scales)
         )
         order = np.argsort(cost)

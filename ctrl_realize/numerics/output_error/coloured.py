@@ -18,8 +18,8 @@ from dataclasses import replace
 import numpy as np
 
 from ..arrays import FloatArray
+from ..engine.batch_search import fit_batch
 from ..engine.compared_fits import converged
-from ..engine.descend import descend
 from ..engine.eliminate import eliminate
 from ..engine.problem import Problem, Structure
 from ..engine.structures import Candidate, Scales, choose, neighbour_starts, parameter_bounds
@@ -88,7 +88,7 @@ def _fitted_again(fits: WindowFit, problem: Problem) -> dict[Structure, Candidat
         starts = _dead_times_near(problem, fits.candidates[structure], fits.scales)
         starts += neighbour_starts(structure, fits.scales, found)
         bounds = parameter_bounds(structure, fits.scales)
-        parameters, cost = descend(problem, structure, np.array(starts), bounds)
+        parameters, cost = fit_batch(problem, structure, np.array(starts), bounds)
         order = np.argsort(cost)
         best = order[0]
         found[structure] = Candidate(

@@ -23,6 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import ComplexArray, FloatArray
+from ..engine.batch_search import fit_batch
 from ..engine.descend import descend
 from ..engine.eliminate import evaluate
 from ..engine.modal import partial_fractions
@@ -118,7 +119,7 @@ def refined(
 ) -> list[Candidate]:
     """Refine several starts: all of them a little, the best few to the end; the best first."""
     bounds = parameter_bounds(structure, data.scales)
-    x, cost = descend(
+    x, cost = fit_batch(
         data.problem, structure, np.array(starts), bounds, most_iterations=_FIRST_ITERATIONS
     )
     best = np.argsort(cost, kind="stable")[:kept]

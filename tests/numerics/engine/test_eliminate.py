@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from ctrl_realize.numerics.engine.descend import descend
+from ctrl_realize.numerics.engine.batch_search import fit_batch
 from ctrl_realize.numerics.engine.eliminate import compress, eliminate, evaluate
 from ctrl_realize.numerics.engine.local_terms import Segments
 from ctrl_realize.numerics.engine.modal import respond
@@ -190,7 +190,7 @@ def test_no_random_start_beats_the_few_that_are_tried():
         found = search(problem, [Structure(3, 3)], scales)[Structure(3, 3)]
         box = parameter_bounds(Structure(3, 3), scales)
         starts = rng.uniform(box.low, box.high, size=(30, 4))
-        _, cost = descend(problem, Structure(3, 3), starts, box, most_iterations=60)
+        _, cost = fit_batch(problem, Structure(3, 3), starts, box, most_iterations=60)
         worse += found.cost > cost.min() * (1 + 1e-4)
     assert worse == 0
 

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from scipy.optimize import least_squares
 
+from ctrl_realize.numerics.engine.batch_search import fit_batch
 from ctrl_realize.numerics.engine.compared_fits import at_dead_time, converged, on_new_data
 from ctrl_realize.numerics.engine.descend import descend
 from ctrl_realize.numerics.engine.eliminate import evaluate
@@ -42,7 +43,7 @@ def found():
     problem, scales = problem_of()
     structure = Structure(2, 2)
     bounds = parameter_bounds(structure, scales)
-    parameters, cost = descend(problem, structure, start(DEAD, *LAGS)[None], bounds)
+    parameters, cost = fit_batch(problem, structure, start(DEAD, *LAGS)[None], bounds)
     return problem, Candidate(structure, parameters[0], float(cost[0])), scales
 
 
@@ -178,5 +179,5 @@ def test_no_random_start_beats_the_model_at_a_dead_time_far_from_the_best(dead_t
     box = parameter_bounds(structure, scales)
     starts = np.random.default_rng(9).uniform(box.low, box.high, size=(30, 4))
     starts[:, 0] = dead_time
-    cost = descend(problem, structure, starts, box, dead_time_fixed=True, most_iterations=60)[1]
+    cost = fit_batch(problem, structure, starts, box, dead_time_fixed=True, most_iterations=60)[1]
     assert at_dead_time(problem, best, scales, dead_time).cost <= cost.min()

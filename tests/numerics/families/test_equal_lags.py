@@ -7,7 +7,7 @@ from scipy.integrate import quad
 from scipy.special import gammainc
 from scipy.stats import invgauss
 
-from ctrl_realize.numerics.engine.descend import descend
+from ctrl_realize.numerics.engine.batch_search import fit_batch
 from ctrl_realize.numerics.engine.poles import parameters_from_poles
 from ctrl_realize.numerics.engine.problem import KnownFactor, Structure
 from ctrl_realize.numerics.engine.structures import Candidate, parameter_bounds
@@ -30,7 +30,7 @@ def problem():
     structure = Structure(3, 3)
     start = np.append(40.0, parameters_from_poles(-np.array([0.04, 0.05, 0.06], complex)))
     bounds = parameter_bounds(Structure(3, 3), scales)
-    parameters, cost = descend(problem, structure, start[None], bounds)
+    parameters, cost = fit_batch(problem, structure, start[None], bounds)
     return problem, Candidate(structure, parameters[0], float(cost[0])), scales
 
 
@@ -50,7 +50,7 @@ def test_the_modes_of_diffusion_are_found_and_the_hidden_ones_counted(shift):
     problem = window(data, k.size, KnownFactor()).problem
     start = np.append(25.0, parameters_from_poles(-np.array([0.01, 0.06], complex)))
     bounds = parameter_bounds(Structure(2, 2), scales)
-    parameters, cost = descend(problem, Structure(2, 2), start[None], bounds)
+    parameters, cost = fit_batch(problem, Structure(2, 2), start[None], bounds)
     like = Candidate(Structure(2, 2), parameters[0], float(cost[0]))
     (chain,) = fit_diffusion(problem, like, scales, 1e-8, 7.0)
     beyond = float(np.sum(1 / rates[8:]))

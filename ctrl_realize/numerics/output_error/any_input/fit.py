@@ -25,8 +25,8 @@ from functools import partial
 import numpy as np
 
 from ...arrays import FloatArray
+from ...engine.batch_search import fit_batch
 from ...engine.compared_fits import converged
-from ...engine.descend import descend
 from ...engine.poles import parameters_from_poles
 from ...engine.problem import KnownFactor, Problem, Structure
 from ...engine.structures import Candidate, neighbour_starts, parameter_bounds
@@ -225,7 +225,7 @@ def _fit_condensed(sums: Condensed, stretch: WindowFit, known: KnownFactor) -> W
     for structure in sorted(stretch.candidates, key=lambda s: (s.order, s.zeros)):
         starts = [stretch.candidates[structure].parameters]
         starts += neighbour_starts(structure, stretch.scales, found)
-        parameters, cost = descend(
+        parameters, cost = fit_batch(
             problem, structure, np.array(starts), parameter_bounds(structure, stretch.scales)
         )
         best = int(np.argmin(cost))
