@@ -182,7 +182,7 @@ def _given_structures(
     others = other_structures(fits, free)
     if adequate and whiten:
         fits = in_coloured_noise(fits, data)
-    if adequate and fits.colour is None:
+    if adequate and fits.colour is None and others.better is None:
         fits = with_noise_of_residual(fits)
     if forms:
         level = max(ADEQUATE * data.colour, fits.normalized_rms if adequate else 0.0)
