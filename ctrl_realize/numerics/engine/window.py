@@ -126,9 +126,10 @@ class WindowFit:
 
     ``variance`` is that of independent noise with the same effect on the estimates as the residual:
     the variance of the residual, plus that of a coarse `rounding` (neighbours are rounded alike),
-    times its `correlation`; after prewhitening, times `colour`, the mean square of the whitened
-    residual. `normalized_rms` is the root mean square of the residual of the chosen structure, in
-    means over bins, over the given noise level. `rivals` are the margins by which structures were
+    times its `correlation`; or times `colour`: after prewhitening the mean square of the whitened
+    residual, otherwise with what the model has taken from slow noise. `normalized_rms` is the root
+    mean square of the residual of the chosen structure, in means over bins, over the given noise
+    level. `rivals` are the margins by which structures were
     chosen, or not, for estimating the noise.
     """
 
@@ -211,8 +212,7 @@ def with_noise_of_residual(fit: WindowFit) -> WindowFit:
     parameters += fit.problem.local_count(structure.order)
     count = window.output.size - window.start
     correlation, missing = correlation_of_noise(fit.correlation, parameters / count)
-    sigma = fit.sigma / float(np.sqrt(1.0 - missing))
-    return replace(fit, sigma=sigma, correlation=correlation)
+    return replace(fit, colour=weighted_correlation(correlation, window.counted) / (1.0 - missing))
 
 
 def weighted_correlation(correlation: float, counted: float) -> float:

@@ -341,7 +341,7 @@ def assembled(
         numerator=numerator,
         adequate=adequate,
         residual=Residual(
-            fits.sigma, fits.normalized_rms, fits.correlation, fits.colour is not None
+            fits.sigma, fits.normalized_rms, fits.correlation, fits.problem.whitener is not None
         ),
         structures=_table(fits, profiles),
         delay_estimates=delay_estimates,
