@@ -212,7 +212,7 @@ SWITCHES = (
     Switch(
         "resolved gain first",
         {
-            f"{ENGINE}.window:WindowFit.best_of": lambda _: (
+            f"{ENGINE}.window_fit:WindowFit.best_of": lambda _: (
                 lambda self, criterion: self.candidates[choose(criterion)]
             )
         },
@@ -225,7 +225,7 @@ SWITCHES = (
     ),
     Switch(
         "integrator beside a lag of any ratio",
-        {f"{ENGINE}.window:_RAMP": value(0.0)},
+        {f"{ENGINE}.window_fit:_RAMP": value(0.0)},
         (f"{STEP}:fit_window", f"{FITS}.any_input.window:fit_window"),
         called=True,
     ),
@@ -341,7 +341,7 @@ SWITCHES = (
     ),
     Switch(
         "correlation in units of weight",
-        {f"{ENGINE}.window:weighted_correlation": lambda _: lambda time, _counted: time},
+        {f"{ENGINE}.window_fit:weighted_correlation": lambda _: lambda time, _counted: time},
     ),
     Switch(
         "first motion in means",
@@ -350,7 +350,7 @@ SWITCHES = (
     ),
     Switch(
         "start at the ringing",
-        {f"{ENGINE}.window:_ringing": giving(0.0)},
+        {f"{ENGINE}.window_fit:_ringing": giving(0.0)},
         called=True,
     ),
     Switch(

@@ -32,7 +32,7 @@ from ..engine.structures import (
 from ..engine.structures import search as search_linear
 from ..signals.noise import correlation_time, mad_sigma
 from .commands import knots
-from .family import Family, Member
+from .family import ActuatedFamily, Member
 from .intervals import Ends, profiled
 from .motions import Kind, Place
 from .records import ActuatedRecord, Records
@@ -180,7 +180,7 @@ def _with_actuators(
     levels = knots(records.parts)
     first = sorted(orders)[min(1, len(orders) - 1)]
     minima = [
-        searched(Family(records, scales, first, kind, place, levels), linear)
+        searched(ActuatedFamily(records, scales, first, kind, place, levels), linear)
         for kind, place in wanted
     ]
     residual = _residual([each[0] for each in minima])

@@ -49,7 +49,7 @@ _DAMPING = Damping(first=1e-2, rise=8.0, fall=5.0, least=1e-9, tries=6)
 class Member:
     """One model of a family: ``x`` = [dead time, pole parameters, values, starts]."""
 
-    family: Family
+    family: ActuatedFamily
     x: FloatArray
     cost: float
 
@@ -85,7 +85,7 @@ class _Point:
 
 
 @dataclass(frozen=True, eq=False)
-class Family:
+class ActuatedFamily:
     """Models of records with a kind of actuator at one place.
 
     Attributes

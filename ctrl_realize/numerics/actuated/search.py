@@ -16,7 +16,7 @@ from ..arrays import FloatArray
 from ..engine.poles import parameters_from_poles
 from ..engine.problem import Structure
 from ..engine.structures import Candidate, neighbour_starts, pattern_starts
-from .family import Family, Member
+from .family import ActuatedFamily, Member
 
 _QUICK = 0.2  # of the visible rise: the lags of the response are longer than those of the plant
 _SHORTEST, _LONG, _RISES = 3.0, 20.0, 5  # samples, parts of a record: lags behind what sticks
@@ -30,7 +30,7 @@ _ROUNDS = 3
 _FINE = np.linspace(-0.4, 0.4, 81)  # of the logarithm of a slip jump, with S - J kept
 
 
-def searched(family: Family, linear: Mapping[Structure, Candidate]) -> list[Member]:
+def searched(family: ActuatedFamily, linear: Mapping[Structure, Candidate]) -> list[Member]:
     """Find the best member of a family, and others at which the misfit has a minimum.
 
     `linear` are linear models of the same records.
@@ -48,7 +48,7 @@ def searched(family: Family, linear: Mapping[Structure, Candidate]) -> list[Memb
     return [first, *(one for one in others if abs(one.x[0] - first.x[0]) > family.scales.dt)]
 
 
-def _actuators(family: Family) -> FloatArray:
+def _actuators(family: ActuatedFamily) -> FloatArray:
     """Values, and places within play at the beginning, that are tried."""
     grid, parts = family.properties.grid(family.size), len(family.records.parts)
     if not family.properties.starts:
@@ -57,7 +57,9 @@ def _actuators(family: Family) -> FloatArray:
     return np.concatenate([np.concatenate([grid, place], axis=1) for place in places])
 
 
-def _linear_starts(family: Family, linear: Mapping[Structure, Candidate]) -> list[FloatArray]:
+def _linear_starts(
+    family: ActuatedFamily, linear: Mapping[Structure, Candidate]
+) -> list[FloatArray]:
     """Dead times and poles that are tried."""
     structure, scales = family.structure, family.scales
     starts = [linear[structure].parameters] if structure in linear else []
@@ -71,7 +73,7 @@ def _linear_starts(family: Family, linear: Mapping[Structure, Candidate]) -> lis
     return starts
 
 
-def _other_slips(family: Family, found: Member) -> Member:
+def _other_slips(family: ActuatedFamily, found: Member) -> Member:
     """Search S and J about a member: one step of a staircase more or less makes another slip."""
     first, jump = family.values.start, family.jump
     assert jump is not None

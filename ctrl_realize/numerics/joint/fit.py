@@ -24,7 +24,8 @@ from ..engine.modal import respond
 from ..engine.poles import parameters_from_poles
 from ..engine.problem import KnownFactor, Problem, Structure
 from ..engine.structures import Candidate, Scales, neighbour_starts, parameter_bounds, search
-from ..engine.window import Window, WindowFit
+from ..engine.window import Window
+from ..engine.window_fit import WindowFit
 from ..output_error.interval import likelihood_fit
 from ..output_error.result import Followed, OutputErrorEstimate
 from ..signals.correlation import fit_percent

@@ -26,7 +26,7 @@ from ..engine.poles import parameters_from_poles, poles_from_parameters
 from ..engine.problem import KnownFactor, Problem
 from ..engine.responses import HeldInput
 from ..engine.structures import Scales
-from ..engine.window import weighted_correlation
+from ..engine.window_fit import weighted_correlation
 from ..output_error.any_input.data import SampledData, cut
 from ..output_error.result import OutputErrorEstimate
 from ..output_error.step_data import StepData, step_scales, window

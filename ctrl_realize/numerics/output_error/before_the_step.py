@@ -22,7 +22,7 @@ from ..engine.eliminate import evaluate
 from ..engine.modal import respond
 from ..engine.problem import Structure
 from ..engine.structures import PLAUSIBLE, SIMPLE_STRUCTURES, needless_parameters
-from ..engine.window import WindowFit
+from ..engine.window_fit import WindowFit
 from .step_data import StepData
 
 _OUTLIER = 3.0  # standard deviations at which residuals are cut where explanations are compared

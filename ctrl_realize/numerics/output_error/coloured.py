@@ -23,7 +23,7 @@ from ..engine.compared_fits import converged
 from ..engine.eliminate import eliminate
 from ..engine.problem import Problem, Structure
 from ..engine.structures import Candidate, Scales, choose, neighbour_starts, parameter_bounds
-from ..engine.window import WindowFit
+from ..engine.window_fit import WindowFit
 from ..signals.noise import correlation_time, mad_sigma
 from ..signals.noise_model import noise_covariance, whitener
 from .step_data import StepData, settled_at

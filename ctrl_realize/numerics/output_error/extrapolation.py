@@ -27,7 +27,7 @@ from ..engine.poles import parameters_from_poles, poles_from_parameters
 from ..engine.problem import Family, KnownFactor, Structure
 from ..engine.static_gain import StaticGain
 from ..engine.structures import Candidate, parameter_bounds
-from ..engine.window import WindowFit
+from ..engine.window_fit import WindowFit
 
 _FASTEST = 4.0  # over the length of the record: 2 % of such a mode are left at its end
 _RATIO = 2.0  # of the rates that are tried: time

@@ -23,7 +23,7 @@ from ..engine.compared_fits import at_dead_time
 from ..engine.eliminate import evaluate
 from ..engine.problem import Structure
 from ..engine.profile import dead_time_error
-from ..engine.window import WindowFit
+from ..engine.window_fit import WindowFit
 from ..families.physical import process_parameters
 from .extrapolation import least_extrapolating
 from .margins import close_to

@@ -27,7 +27,7 @@ from ..engine.descend import descend
 from ..engine.problem import Structure
 from ..engine.profile_ends import profile_limits
 from ..engine.structures import LEAST_CHARGE, PLAUSIBLE, Candidate, parameter_bounds
-from ..engine.window import WindowFit
+from ..engine.window_fit import WindowFit
 
 _S_AND_J = 2  # parameters of friction; behind a single lag the dead time takes the place of one
 _POINTS = 16  # dead times at which the friction is tried: time

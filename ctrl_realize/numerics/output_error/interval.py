@@ -26,7 +26,7 @@ from ..engine.problem import Structure
 from ..engine.profile import Points
 from ..engine.profile_ends import profile_limits
 from ..engine.structures import LEAST_CHARGE, PLAUSIBLE, Scales, charged, plausible
-from ..engine.window import WindowFit
+from ..engine.window_fit import WindowFit
 from ..families.equal_lags import (
     FREE_IN_A_CHAIN,
     LagChain,

@@ -45,7 +45,7 @@ from ..engine.structures import (
     parameter_bounds,
     pattern_starts,
 )
-from ..engine.window import WindowFit
+from ..engine.window_fit import WindowFit
 from ..signals.load_step import LoadStep
 from ..signals.noise import correlation_time, mad_sigma
 from .step_data import StepData, stop_at

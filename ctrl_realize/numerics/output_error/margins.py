@@ -12,7 +12,7 @@ from typing import Literal, TypeAlias
 
 from ..engine.problem import Structure
 from ..engine.structures import PLAUSIBLE, charged, needless_parameters, plausible
-from ..engine.window import WindowFit
+from ..engine.window_fit import WindowFit
 
 CLOSE = 1e-3
 """Distance from a threshold, as a part of it, within which a decision is called close. Structures

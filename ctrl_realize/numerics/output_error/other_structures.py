@@ -26,7 +26,7 @@ from ..engine.structures import (
     plausible,
     search,
 )
-from ..engine.window import WindowFit
+from ..engine.window_fit import WindowFit
 from .profiles import profile_of
 from .result import OtherStructures, StructureFit
 

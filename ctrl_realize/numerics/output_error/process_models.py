@@ -18,7 +18,7 @@ import numpy as np
 
 from ..constants import SMALLEST
 from ..engine.structures import PLAUSIBLE, Candidate
-from ..engine.window import WindowFit
+from ..engine.window_fit import WindowFit
 from ..families.form_fit import fit_form
 from ..families.lag_profiles import with_profiled_lags
 from ..families.process_form import ProcessForm
@@ -94,7 +94,7 @@ def _with_profiles(fits: WindowFit, process: ProcessEstimate) -> ProcessEstimate
     assert process.form is not None
     return process._replace(
         parameters=with_profiled_lags(
-            fits.problem, fits.scales, process.form, process.parameters, fits.variance
+            fits.problem, fits.scales, process.form, process.parameters, fits.error_variance
         )
     )
 

@@ -22,7 +22,7 @@ from ..engine.problem import Structure
 from ..engine.profile import Points, dead_time_profile, profile_curve, profile_points, with_ends
 from ..engine.profile_ends import bracket_ends, profile_limits
 from ..engine.structures import Candidate
-from ..engine.window import WindowFit
+from ..engine.window_fit import WindowFit
 
 _LOWER = 0.01
 """Variances by which a profile must lead below a minimum to be followed.

@@ -23,7 +23,7 @@ from ..engine.problem import Structure
 from ..engine.profile_ends import profile_limits
 from ..engine.static_gain import StaticGain, averaged_ends
 from ..engine.structures import Candidate, Scales, needless_parameters
-from ..engine.window import WindowFit
+from ..engine.window_fit import WindowFit
 from ..families.equal_lags import LagChain
 from ..families.flow import DispersedFlow
 from ..families.form_fit import FormFamily
@@ -316,11 +316,11 @@ def assembled(
     problem, family = fits.problem, chosen.structure
     numerator = evaluate(problem, family, chosen.parameters[None]).numerator[0]
     if isinstance(family, FormFamily):
-        parameters = family.parameters(problem, chosen.parameters, fits.variance)
+        parameters = family.parameters(problem, chosen.parameters, fits.error_variance)
         process = ProcessEstimate(parameters, family.form, family.at_bound)
     else:
         process = ProcessEstimate(
-            fitted_parameters(problem, chosen, numerator, fits.variance, fits.scales.length)
+            fitted_parameters(problem, chosen, numerator, fits.error_variance, fits.scales.length)
         )
     interval = interval.rounded(chosen.dead_time, fits.scales)
     static = static or fits.static(chosen)
@@ -341,7 +341,7 @@ def assembled(
         numerator=numerator,
         adequate=adequate,
         residual=Residual(
-            fits.sigma, fits.normalized_rms, fits.correlation, fits.problem.whitener is not None
+            fits.sigma, fits.normalized_rms, fits.correlation, fits.colour is not None
         ),
         structures=_table(fits, profiles),
         delay_estimates=delay_estimates,

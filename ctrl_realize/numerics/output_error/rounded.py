@@ -26,7 +26,7 @@ from ..engine.eliminate import evaluate
 from ..engine.modal import respond
 from ..engine.problem import Structure
 from ..engine.structures import Candidate, parameter_bounds
-from ..engine.window import WindowFit
+from ..engine.window_fit import WindowFit
 from ..families.physical import fitted_parameters
 from ..signals.noise import correlation_time
 from .result import OutputErrorEstimate, followed_by

@@ -24,7 +24,7 @@ from dataclasses import dataclass, replace
 
 from ..engine.problem import Structure
 from ..engine.structures import PLAUSIBLE, Candidate, choose, needless_parameters, search
-from ..engine.window import WindowFit
+from ..engine.window_fit import WindowFit
 from ..families.equal_lags import FREE_IN_A_CHAIN, LagChain, fit_chains, fit_diffusion
 from ..families.flow import DispersedFlow, fit_flows
 

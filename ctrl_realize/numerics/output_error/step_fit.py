@@ -73,7 +73,7 @@ from ..engine.structures import (
     Candidate,
     choose,
 )
-from ..engine.window import WindowFit, among, fit_window, with_noise_of_residual
+from ..engine.window_fit import WindowFit, among, fit_window, with_noise_of_residual
 from ..families.equal_lags import LagChain
 from ..families.flow import DispersedFlow
 from ..families.physical import without_errors

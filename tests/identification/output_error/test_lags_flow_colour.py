@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.linalg import toeplitz
 from scipy.signal import lfilter
 from scipy.special import gammainc
 from scipy.stats import invgauss
@@ -167,6 +168,29 @@ def test_slow_noise_leaves_a_narrower_interval_that_holds():
         first, last = cr.fit_output_error(data, noise="white", **LAGS).fit.delay_interval
         narrower += high - low < last - first
     assert narrower >= 3
+
+
+def test_the_gain_in_slow_noise_has_its_standard_error_though_the_model_takes_part_of_it():
+    n, edge, scale, pole = 280, 60, 0.02, 0.9
+    k, true = np.arange(n), np.array([10.0, 12.0, 2.0, 0.0])  # dead time, lag, gain, level
+
+    def model(dead_time, lag, gain, level):
+        return level - gain * np.expm1(-np.clip(k - edge - dead_time, 0, None) / lag)
+
+    moves = 1e-4 * np.eye(4)
+    slopes = np.stack([(model(*(true + m)) - model(*(true - m))) / 2e-4 for m in moves], axis=1)
+    # of least squares in noise of known colour: the sandwich of its covariance
+    pseudo = np.linalg.pinv(slopes)
+    exact = np.sqrt((pseudo @ toeplitz(scale**2 * pole**k) @ pseudo.T)[2, 2])
+    stated = []
+    for seed in range(16):
+        white = scale * np.sqrt(1 - pole**2) * np.random.default_rng(seed).standard_normal(n + 200)
+        noise = lfilter([1], [1, -pole], white)[200:]
+        record = cr.Record(1.0 * k, 1.0 * (k >= edge), model(*true) + noise)
+        fit = cr.fit_output_error(record, structures=[(1, 1)]).fit
+        stated.append(fit.gain_std_given_structure / exact)
+    # One scatters by 45 %, their median by 14 %. Without what the model takes it is 0.69.
+    assert 0.8 < np.median(stated) < 1.25
 
 
 def test_records_fitted_together_know_the_noise_of_their_mean():

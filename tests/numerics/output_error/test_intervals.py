@@ -10,7 +10,7 @@ from ctrl_realize.identification.output_error.flags import sampled_flags
 from ctrl_realize.numerics.engine.eliminate import evaluate
 from ctrl_realize.numerics.engine.problem import KnownFactor, Structure
 from ctrl_realize.numerics.engine.structures import PLAUSIBLE, Scales, needless_parameters
-from ctrl_realize.numerics.engine.window import WindowFit, fit_window
+from ctrl_realize.numerics.engine.window_fit import WindowFit, fit_window
 from ctrl_realize.numerics.output_error.interval import likelihood_fit
 from ctrl_realize.numerics.output_error.margins import CLOSE, close_to
 from ctrl_realize.numerics.output_error.profiles import laid_profiles, lower_minima

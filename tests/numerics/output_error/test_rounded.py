@@ -9,7 +9,7 @@ from scipy.stats import norm
 import ctrl_realize as cr
 from ctrl_realize.numerics.engine.problem import KnownFactor, Structure
 from ctrl_realize.numerics.engine.structures import Candidate
-from ctrl_realize.numerics.engine.window import fit_window
+from ctrl_realize.numerics.engine.window_fit import fit_window
 from ctrl_realize.numerics.output_error.rounded import fit_rounded, log_probability, scores
 from ctrl_realize.numerics.output_error.step_data import step_data, step_scales, window
 

@@ -30,7 +30,8 @@ from ...engine.compared_fits import converged
 from ...engine.poles import parameters_from_poles
 from ...engine.problem import KnownFactor, Problem, Structure
 from ...engine.structures import Candidate, neighbour_starts, parameter_bounds
-from ...engine.window import Window, WindowFit, extended
+from ...engine.window import Window
+from ...engine.window_fit import WindowFit, extended
 from ...families.process_form import ProcessForm
 from ...signals.correlation import fit_percent
 from ...signals.noise import correlation_time, winsorised_sigma

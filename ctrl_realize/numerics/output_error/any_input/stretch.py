@@ -14,7 +14,7 @@ import numpy as np
 from ...arrays import FloatArray
 from ...engine.problem import KnownFactor, Structure
 from ...engine.structures import Candidate
-from ...engine.window import WindowFit
+from ...engine.window_fit import WindowFit
 from ..result import UnweightedModel
 from .condensed import MOST_LAGS
 from .data import SampledData, cut

@@ -27,7 +27,8 @@ from ...engine.poles import poles_from_parameters
 from ...engine.problem import KnownFactor, Problem, Structure
 from ...engine.static_gain import StaticGain
 from ...engine.structures import Candidate, Scales, search
-from ...engine.window import Window, WindowFit, fit_window
+from ...engine.window import Window
+from ...engine.window_fit import WindowFit, fit_window
 from ...signals.noise import quantisation_step, winsorised_sigma
 from ...signals.noise_model import noise_lags, whitening_filter
 from ...signals.onset import correlation_onset

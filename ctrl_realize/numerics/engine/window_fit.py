@@ -1,0 +1,338 @@
+"""Fit all structures to one part of a record, and determine the noise from the best of them.
+
+Huber's loss by modified residuals [1]_ with the constant of [2]_ (95 % efficiency in Gaussian
+noise); the effective number of samples follows [3]_, the criterion [4]_.
+
+References
+----------
+.. [1] P. J. Huber and E. M. Ronchetti, Robust Statistics, 2nd ed., Wiley 2009, section 7.8
+   (computation of regression estimates by modified residuals), doi:10.1002/9780470434697.
+.. [2] P. W. Holland and R. E. Welsch, Robust regression using iteratively reweighted least-squares,
+   Comm. Statist. A 6 (1977) 813-827, doi:10.1080/03610927708827533.
+.. [3] C. J. Geyer, Practical Markov chain Monte Carlo, Statist. Sci. 7 (1992) 473-483,
+   doi:10.1214/ss/1177011137.
+.. [4] G. Schwarz, Estimating the dimension of a model, Ann. Statist. 6 (1978) 461-464,
+   doi:10.1214/aos/1176344136.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+
+import numpy as np
+
+from ..arrays import FloatArray
+from ..constants import HUBER, SMALLEST
+from ..signals.noise import correlation_of_noise, correlation_time, is_coarse, mad_sigma
+from .compared_fits import converged, on_new_data, settled
+from .problem import Problem, Structure
+from .static_gain import StaticGain, static_gain
+from .structures import (
+    PLAUSIBLE,
+    Candidate,
+    Scales,
+    choose,
+    criteria,
+    needless_parameters,
+    parameter_charge,
+    search,
+)
+from .window import Window
+
+_PASSES = 2  # of modified residuals; see `fit_window`
+_RAMP = 0.1
+"""Pole of a first-order fit times the length of the record, below which there may be an integrator
+beside a lag that is faster by any ratio. Ablation: integrator beside a lag of any ratio."""
+_LONG = 2**18  # samples that tell a frequency, for time and memory
+
+
+@dataclass(frozen=True, eq=False)
+class WindowFit:
+    """Candidates for one window, and the noise estimated from the best of them.
+
+    ``variance`` is that of independent noise with the same effect on the estimates as the residual:
+    the variance of the residual, plus that of a coarse `rounding` (neighbours are rounded alike),
+    times its `correlation`; after prewhitening, times `colour`, the mean square of the whitened
+    residual. `taken` is what a model takes from slow noise: errors of gain and process parameters
+    have the variance times that. `normalized_rms` is the root mean square of the residual of the
+    chosen structure, in means over bins, over the given noise level. `rivals` are the margins by
+    which structures were chosen, or not, for estimating the noise.
+    """
+
+    window: Window
+    problem: Problem
+    candidates: dict[Structure, Candidate]
+    criterion: dict[Structure, float]
+    scales: Scales
+    sigma: float
+    correlation: float
+    normalized_rms: float
+    rounding: float = 0.0
+    colour: float | None = None
+    taken: float = 1.0
+    rivals: Mapping[Structure, float] = field(default_factory=dict)
+
+    @property
+    def variance(self) -> float:
+        """Variance per sample, including correlation."""
+        colour = self.colour
+        if colour is None:
+            colour = weighted_correlation(self.correlation, self.window.counted)
+        return (self.sigma**2 + self.rounding**2) * colour
+
+    @property
+    def error_variance(self) -> float:
+        """Variance that counts for errors of gain and process parameters."""
+        return self.variance * self.taken
+
+    @property
+    def independent(self) -> float:
+        """Number of samples after the step that count."""
+        count = self.window.samples or self.window.output.size - self.window.start
+        return count / self.correlation
+
+    @property
+    def penalty(self) -> float:
+        """Penalty on a parameter in the criterion: log of the number of independent samples."""
+        return parameter_charge(self.independent)
+
+    @cached_property
+    def best(self) -> Candidate:
+        """Fit of the chosen structure."""
+        return self.best_of(self.criterion)
+
+    def best_of(self, criterion: dict[Structure, float]) -> Candidate:
+        """Fit of the structure that is chosen among some.
+
+        A structure with a pole slower than the record, or an integrator, whose gain is not
+        significant is replaced by the best one without that is not ruled out: a slow drift is not a
+        response.
+        """
+        first = choose(criterion)
+        limit = criterion[first] + PLAUSIBLE
+        left = {s: value for s, value in criterion.items() if value <= limit}
+        while left:
+            structure = choose(left)
+            if replace(self, taken=1.0).static(self.candidates[structure]).resolved:
+                return self.candidates[structure]
+            del left[structure]
+        return self.candidates[first]
+
+    def misfit(self, candidate: Candidate) -> float:
+        """Root mean square of the residual of a candidate, in units of `normalized_rms`."""
+        least = self.candidates[choose(self.criterion)].cost
+        return self.normalized_rms * float(np.sqrt(candidate.cost / max(least, SMALLEST)))
+
+    def static(self, candidate: Candidate) -> StaticGain:
+        """Gain and total delay of a candidate, with their errors."""
+        return static_gain(self.problem, candidate, self.error_variance, self.scales.length)
+
+    def criteria(self, candidates: dict[Structure, Candidate]) -> dict[Structure, float]:
+        """Information criterion of other candidates on the same data."""
+        values = criteria(candidates, self.variance, self.independent)
+        return {s: value + self.problem.local_count(s.order) for s, value in values.items()}
+
+
+def with_noise_of_residual(fit: WindowFit) -> WindowFit:
+    """Count for errors what a model has taken from slow noise.
+
+    For a residual that is noise: that of a misfit tells no noise. Choices are made without it, and
+    the dead time, which shows in the fast part of a response, has its interval without it.
+    Ablation: noise that the model has taken.
+    """
+    window, count = fit.window, fit.window.output.size - fit.window.start
+    parameters = _estimated(window, fit.best.structure)
+    correlation, missing = correlation_of_noise(fit.correlation, parameters / count)
+    return replace(fit, taken=correlation / fit.correlation / (1.0 - missing))
+
+
+def _estimated(window: Window, structure: Structure) -> int:
+    """Parameters of a model of a window, with its regressors and local terms."""
+    columns: int = window.columns.shape[1]
+    local = window.problem.local_count(structure.order)
+    return 1 + structure.order + structure.zeros + columns + local
+
+
+def weighted_correlation(correlation: float, counted: float) -> float:
+    """Correlation time in units of weight, of which few samples of it may have been given already.
+
+    Ablation: correlation in units of weight.
+    """
+    return max(correlation * counted, 1.0)
+
+
+def fit_window(
+    window: Window,
+    structures: Sequence[Structure],
+    scales: Scales,
+    noise: tuple[float, float],
+    huber: bool,
+) -> WindowFit:
+    """Search all structures.
+
+    Parameters
+    ----------
+    window : Window
+    structures : sequence of Structure
+    scales : Scales
+    noise : tuple of float
+        Noise level and quantisation step.
+    huber : bool
+        Huber's loss by pseudo-values: the data are moved towards the model, so that their
+        least-squares fit is that of Huber's loss. Starting from least squares one pass suffices,
+        two with outliers.
+    """
+    sigma, quantum = noise
+    problem = window.problem
+    # Neither what rings nor what integrates matters to its search: it is made once.
+    first = search(problem, [Structure(1, 1)], scales)
+    rough = first[Structure(1, 1)]
+    error = window.output - window.predict(problem, rough)
+    spacing = window.spacing * scales.dt
+    scales = replace(
+        scales,
+        ringing=_ringing(error[window.start :], spacing),
+        integrating=bool(np.abs(rough.poles[0]) * scales.length < _RAMP),
+    )
+    others = [s for s in structures if s not in first]
+    candidates = search(problem, others, scales, first if len(others) < len(structures) else None)
+    passes = _PASSES if huber else 0
+    rivals: dict[Structure, float] = {}
+    for iteration in range(passes + 1):
+        rest = _residual(window, problem, candidates, (sigma, quantum), huber)
+        setting = rest.variance, rest.independent
+        del rest  # to save the memory of a long record
+        candidates = converged(
+            problem, candidates, scales, *setting, last=iteration > 0 or not huber
+        )
+        rest = _residual(window, problem, candidates, (sigma, quantum), huber)
+        if iteration == 0 and rest.best.ends is not None:
+            # The structure that determines the pseudo-values has converged.
+            candidates[rest.best.structure] = settled(problem, rest.best, scales)
+            del rest
+            rest = _residual(window, problem, candidates, (sigma, quantum), huber)
+        # Huber's pseudo-values are those of the structure chosen in each pass.
+        rivals = {s: min(v, rivals.get(s, v)) for s, v in rest.rivals.items()}
+        if iteration == passes or (iteration == 1 and not rest.has_outliers):
+            break
+        problem = window.with_output(rest.values)
+        candidates = on_new_data(problem, candidates)
+    criterion = criteria(candidates, rest.variance, rest.independent)
+    # One initial value more for a pole reduces the cost by one variance for noise alone.
+    criterion = {s: value + problem.local_count(s.order) for s, value in criterion.items()}
+    chosen = candidates[choose(criterion)]
+    freedom = max(problem.data.size - _estimated(window, rest.best.structure), 1)
+    misfit = float(np.sqrt(chosen.cost / freedom)) / max(sigma, SMALLEST)
+    rounding = quantum / np.sqrt(12) if is_coarse(sigma, quantum) else 0.0
+    return WindowFit(
+        window, problem, candidates, criterion, scales, rest.level, rest.correlation, misfit,
+        rounding, rivals=rivals,
+    )  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class _Residual:
+    """Residual of the best of some candidates on a window: the noise, if the fit is good.
+
+    `values` (N,) are the data that Huber's loss asks for; `level` is the standard deviation of the
+    residual, `correlation` its correlation time, `independent` the number of samples that count;
+    `rivals` tells how much worse other structures are, and for the best by how much it is better.
+    """
+
+    best: Candidate
+    values: FloatArray
+    has_outliers: bool
+    level: float
+    correlation: float
+    independent: float
+    rivals: dict[Structure, float]
+    counted: float
+
+    @property
+    def variance(self) -> float:
+        return self.level**2 * weighted_correlation(self.correlation, self.counted)
+
+
+def _residual(
+    window: Window,
+    problem: Problem,
+    candidates: dict[Structure, Candidate],
+    noise: tuple[float, float],
+    huber: bool,
+) -> _Residual:
+    """Determine the residual of the structure with the lowest criterion.
+
+    Not that of the lowest cost, because with superfluous parameters many values are equally good.
+    The criterion here is that of white noise of unknown variance, m log(cost) for m means: the
+    residual of too poor a model would be large and correlated, and would thus be accepted.
+    """
+    sigma, quantum = noise
+    samples = window.output.size - window.start
+    value = {
+        s: problem.data.size * float(np.log(max(c.cost, 1e-300)))
+        + (s.order + s.zeros + 2) * parameter_charge(samples)
+        + problem.local_count(s.order)
+        for s, c in candidates.items()
+    }
+    chosen = choose(value)
+    lowest = value[chosen] + needless_parameters(chosen)
+    rivals = {s: v + needless_parameters(s) - lowest for s, v in value.items() if s != chosen}
+    rivals[chosen] = min(rivals.values(), default=np.inf)
+    best = candidates[chosen]
+    error = window.output - window.predict(problem, best)
+    kept = _clipped(error, max(0.5 * quantum, 0.1 * sigma)) if huber else error.copy()
+    after = kept[window.start :]
+    freedom = max(after.size - _estimated(window, best.structure), 1)
+    level = float(np.sqrt(float(after @ after) / freedom))
+    # Far below the noise the residual is rounding, and its correlation has no meaning.
+    floor = 0.3 * sigma
+    correlation = correlation_time(after) if level > floor else 1.0
+    has_outliers = _has_outliers(error)
+    kept -= error
+    kept += window.output
+    return _Residual(
+        best, kept, has_outliers, max(level, floor), correlation, after.size / correlation, rivals,
+        window.counted,
+    )  # fmt: skip
+
+
+def extended(fit: WindowFit, structures: Sequence[Structure]) -> WindowFit:
+    """Add structures to a fit; noise and data remain those of the previous structures."""
+    candidates = search(fit.problem, structures, fit.scales, fit.candidates)
+    candidates = converged(fit.problem, candidates, fit.scales, fit.variance, fit.independent)
+    return replace(fit, candidates=candidates, criterion=fit.criteria(candidates))
+
+
+def among(fit: WindowFit, structures: Sequence[Structure]) -> WindowFit:
+    """Compare some of the structures with each other only, at their minima."""
+    few = {s: fit.candidates[s] for s in structures}
+    candidates = fit.candidates | converged(
+        fit.problem, few, fit.scales, fit.variance, fit.independent
+    )
+    return replace(fit, candidates=candidates, criterion=fit.criteria(candidates))
+
+
+def _clipped(error: FloatArray, least: float) -> FloatArray:
+    """Residuals clipped at 1.345 sigma and rescaled by the fraction that was not."""
+    limit = HUBER * max(mad_sigma(error), least)
+    left = np.clip(error, -limit, limit)
+    inside = float(np.mean(left == error))
+    return np.divide(left, max(inside, 0.5), out=left)
+
+
+def _has_outliers(error: FloatArray) -> bool:
+    """Whether there are more residuals beyond four sigma than in Gaussian noise."""
+    return bool(np.mean(np.abs(error) > 4 * mad_sigma(error)) > 0.002)
+
+
+def _ringing(error: FloatArray, dt: float) -> float:
+    """Angular frequency that stands out of what a first-order fit leaves over."""
+    if error.size < 16:
+        return 0.0
+    # A length with a large prime factor takes many times the time and memory; a long residual
+    # need not be looked at to its last samples.
+    count = error.size if error.size < _LONG else 2 ** int(np.log2(error.size))
+    lines = np.abs(np.fft.rfft(error[:count] - error.mean()))
+    return float(2 * np.pi * (int(np.argmax(lines[2:])) + 2) / (count * dt))
