@@ -8,6 +8,7 @@ from __future__ import annotations
 import ast
 import pkgutil
 import re
+from collections.abc import Sequence
 from enum import Enum
 from typing import Annotated, Any
 
@@ -15,14 +16,17 @@ import typer
 
 SPELLED = {
     "output": "--output-column", "start": "--from", "stop": "--to", "header": "--no-header",
-    "band_hz": "--band",
+    "band_hz": "--band", "fit": "--no-fit",
 }  # fmt: skip
 """Options that are not spelled like their argument: ``--output`` is the folder."""
 _MORE = {"output": ["--response"]}
-_METAVARS = {"rest": "INPUT OUTPUT"}
+_METAVARS = {
+    "rest": "INPUT OUTPUT", "band_hz": "LOW HIGH", "command_range": "CLOSED OPEN",
+    "travel_range": "CLOSED OPEN",
+}  # fmt: skip
 _TYPES = (
-    (r"Selector|Sequence\[str", list[str]), ("Sequence", tuple[float, float]), ("float", float),
-    ("int$", int),
+    (r"Selector|Structures|Sequence\[str", list[str]), ("Sequence|tuple", tuple[float, float]),
+    ("float", float), ("^int", int),
 )  # fmt: skip
 """Patterns of annotations -> type of the option; others are text."""
 
@@ -58,16 +62,16 @@ def options_of(file: str, function: str, left_out: str = "") -> dict[str, Any]:
         if name not in left_out.split():
             value = ast.unparse(default or ast.Constant(None))
             denied = kind.startswith("bool") and value != "False"
-            options["no_" * denied + name] = _option(name, kind, said.get(name, ""))
+            options["no_" * denied + name] = _option(name, kind, *said.get(name, ((), "")))
     return options
 
 
-def _option(name: str, kind: str, said: str) -> Any:
+def _option(name: str, kind: str, choices: Sequence[str], said: str) -> Any:
     found: Any = next((type_ for pattern, type_ in _TYPES if re.search(pattern, kind)), str)
     if kind.startswith("bool"):
         found = bool
-    elif words := re.search(r"Literal\[(.*)\]", kind):
-        found = choice(*ast.literal_eval(f"[{words[1]}]"))
+    elif choices:
+        found = _choice(choices)
     return Annotated[
         found if found is bool else found | None,
         typer.Option(
@@ -79,20 +83,24 @@ def _option(name: str, kind: str, said: str) -> Any:
     ]
 
 
-def choice(*values: str) -> Any:
-    """Type of an option that has one of these values."""
+def _choice(values: Sequence[str]) -> Any:
     return Enum("Choice", {value: value for value in values}, type=str)
 
 
-def _descriptions(docstring: str) -> dict[str, str]:
-    """First sentence for each parameter, without the marks of numpydoc."""
+def _descriptions(docstring: str) -> dict[str, tuple[list[str], str]]:
+    """Choices and first sentence for each parameter, without the marks of numpydoc.
+
+    Choices stand in braces; None is the word "none".
+    """
     section = re.search(r"\nParameters\n-+\n(.*?)\n\n\w+\n---", docstring, re.DOTALL)
     said = {}
-    for names, text in re.findall(
-        r"^(\w[\w, ]*)(?: : .*)?\n((?:    .*\n?)+)", section[1] if section else "", re.MULTILINE
+    for names, kind, text in re.findall(
+        r"^(\w[\w, ]*)(?: : (.*))?\n((?:    .*\n?)+)", section[1] if section else "", re.MULTILINE
     ):
+        braces = re.match(r"\{.*?\}", kind)
+        choices = ast.literal_eval(f"[{braces[0][1:-1]}]") if braces else []
         sentence = re.split(r"(?<=\.)\s", " ".join(text.split()))[0]
         plain = sentence.replace('``"', "").replace('"``', "").replace("`", "")
         for name in names.split(", "):
-            said[name] = plain.removeprefix("False: ")
+            said[name] = [value or "none" for value in choices], plain.removeprefix("False: ")
     return said

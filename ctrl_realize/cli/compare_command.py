@@ -22,8 +22,7 @@ def run_compare(
     frf: Path,
     output: Path | None,
     *,
-    trusted: Mapping[str, Any],
-    hold: str,
+    choices: Mapping[str, Any],
     reading: Mapping[str, Any],
     report: bool,
     overwrite: bool,
@@ -31,14 +30,12 @@ def run_compare(
     """Compare, write the results if a folder is given, and return the exit code."""
     system = load_model(model)
     measured = read_frf(frf, **reading)
-    method: Any = None if hold == "none" else hold
-    comparison = compare_frf(system, measured, hold=method, **trusted)
+    comparison = compare_frf(system, measured, **choices)
     say(printable(f"{model}: {system!r}"))
     say(comparison.report())
     if output is None:
         return 0
-    words = [str(model), str(frf)]
-    words += words_of({**trusted, **({} if hold == "auto" else {"hold": hold}), **reading})
+    words = [str(model), str(frf), *words_of({**choices, **reading})]
     run = Run(typed_call("compare", words), (model, frf), overwrite)
     words += ["--output", str(output)]
     write = partial(

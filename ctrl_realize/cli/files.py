@@ -72,10 +72,10 @@ def given(**options: Any) -> Given:
     for name, value in options.items():
         if value is None or value is False or value in ("", []):
             continue
-        if name == "no_header":
-            found["header"] = False
-        elif name == "quality" and value == "none":
-            found["quality"] = None
+        if name.startswith("no_"):
+            found[name.removeprefix("no_")] = False
+        elif value == "none" and name in ("quality", "comment", "hold"):
+            found[name] = None
         elif name in _COLUMNS:
             columns = [selector(one) for one in (value if isinstance(value, list) else [value])]
             found[name] = columns[0] if len(columns) == 1 else columns
@@ -83,8 +83,6 @@ def given(**options: Any) -> Given:
             found[name] = _second(value)
         elif name == "delimiter":
             found[name] = {"tab": "\t", r"\t": "\t"}.get(value, value)
-        elif name == "comment" and value == "none":
-            found[name] = None
         else:
             found[name] = value.value if isinstance(value, Enum) else value
     return found

@@ -12,7 +12,6 @@ from ..errors import CtrlRealizeError, DataError, OptionError
 from ..frequency import FRFComparison, compare_frf
 from ..identification.campaign.campaign import Campaign
 from ..identification.campaign.run import identify_campaign
-from ..identification.methods import Method
 from ..identification.methods import identify as identify_record
 from ..io import read_frf
 from ..results import ModelFit
@@ -37,7 +36,6 @@ def run_identify(
     files: list[Path],
     output: Path,
     *,
-    method: Method,
     choices: Mapping[str, Any],
     frf: Path | None,
     joint: bool,
@@ -54,7 +52,7 @@ def run_identify(
         raise OptionError("expected --joint or --separate, got both")
     if len(tests) > 1:
         raise OptionError("expected --by or --split, got both")
-    settings = Settings(method, dict(choices), joint)  # type: ignore[arg-type]
+    settings = Settings(choices, joint)
     how = Reading(reading, tests)
     measured = None if frf is None else read_frf(frf, **response)
     words = words_again(files, settings, how, frf, response, separate)
@@ -83,13 +81,9 @@ def _one(
 ) -> bool:
     """Identify one model into a folder; return whether its report was written as asked."""
     records = [source.record() for source in sources]
-    options: dict[str, Any] = {**settings.choices}
-    if settings.joint and frf is not None:
-        options["frf"] = frf
+    options = {**settings.choices, **({} if frf is None or not settings.joint else {"frf": frf})}
     with working("identifying"):
-        system = identify_record(
-            records[0] if len(records) == 1 else records, method=settings.method, **options
-        )
+        system = identify_record(records[0] if len(records) == 1 else records, **options)
         comparison = None if frf is None else compare_frf(system, frf)
     for source, record in zip(sources, records, strict=True):
         say(printable(f"{source.file}: {record!r}"))
@@ -122,7 +116,7 @@ def _many(
     with kept_rows(output) as store:
         campaign = identify_campaign(
             [source.content for source in sources],
-            n_jobs=n_jobs, method=settings.method, store=store, **settings.choices,
+            n_jobs=n_jobs, store=store, **settings.choices,
         )  # fmt: skip
         _refuse_useless(campaign)
         comparison = None if frf is None else compare_frf(campaign.system, frf)

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from ..data import Record
-from ..identification.methods import IdentifyOptions, Method
+from ..identification.methods import METHODS
 from ..io import read_record, read_records
 from .options import words_of
 
@@ -56,14 +56,13 @@ class Reading:
 class Settings:
     """How to identify: the arguments of `identify` that were given."""
 
-    method: Method
-    choices: IdentifyOptions
+    choices: Mapping[str, Any]
     joint: bool = False
 
     @property
     def given(self) -> dict[str, object]:
         """Names and values of the given arguments, for files and reports."""
-        return {"method": self.method, **self.choices}
+        return {"method": METHODS[0], **self.choices}
 
 
 def folder_name(file: Path) -> str:
@@ -79,6 +78,21 @@ def typed_call(command: str, words: Sequence[str]) -> str:
 def python_keywords(keywords: Mapping[str, object]) -> str:
     """Return keyword arguments as Python text."""
     return "".join(f", {name}={value!r}" for name, value in keywords.items())
+
+
+def reading_in_python(files: Sequence[Path], how: Reading) -> tuple[list[str], str]:
+    """Return the lines of Python that read files, and the name of what they read."""
+    keywords = python_keywords({**how.tests, **how.keywords}).replace(", split=True", "")
+    lines = ["import ctrl_realize as cr"]
+    if len(files) == 1 and not how.tests:
+        return [*lines, f"record = cr.read_record({str(files[0])!r}{keywords})"], "record"
+    names = ",\n    ".join(repr(str(file)) for file in files)
+    lines.append(f"files = [\n    {names},\n]")
+    if how.tests:
+        reader = f"one for file in files for one in cr.io.read_records(file{keywords})"
+    else:
+        reader = f"cr.read_record(file{keywords}) for file in files"
+    return [*lines, f"records = [{reader}]"], "records"
 
 
 def words_again(
@@ -112,31 +126,16 @@ def calls_again(
 
     `test` is the number of a test in its file, if that is identified alone.
     """
-    keywords = python_keywords(how.keywords)
     chosen = python_keywords(settings.given)
-    several = len(files) > 1 or bool(how.tests)
-    lines = ["import ctrl_realize as cr"]
-    if how.tests:
-        by = how.tests.get("by")
-        keywords = ("" if by is None else f", by={by!r}") + keywords
-        lines.append(f"files = {[str(file) for file in files]!r}")
-        lines.append(
-            f"records = [one for file in files for one in cr.io.read_records(file{keywords})]"
-        )
-    elif several:
-        names = ",\n    ".join(repr(str(file)) for file in files)
-        lines.append(f"files = [\n    {names},\n]")
-        lines.append(f"records = [cr.read_record(file{keywords}) for file in files]")
-    else:
-        lines.append(f"record = cr.read_record({str(files[0])!r}{keywords})")
+    lines, name = reading_in_python(files, how)
     if settings.joint and frf is not None:
         path, response = frf
         lines.append(f"frf = cr.read_frf({str(path)!r}{python_keywords(response)})")
         chosen += ", frf=frf"
     if how.tests and test is not None:
         lines.append(f"sys = cr.identify(records[{test}]{chosen})")
-    elif several and not settings.joint:
+    elif name == "records" and not settings.joint:
         lines += [f"campaign = cr.identify_campaign(records{chosen})", "sys = campaign.system"]
     else:
-        lines.append(f"sys = cr.identify({'records' if several else 'record'}{chosen})")
+        lines.append(f"sys = cr.identify({name}{chosen})")
     return [("In a terminal", typed_call("identify", words)), ("In Python", "\n".join(lines))]

@@ -4,39 +4,14 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from enum import Enum
 from pathlib import Path
 from typing import Annotated, Any, TypeAlias
 
 import typer
 
-from .arguments import choice, option_of, options_of
+from .arguments import option_of, options_of
 
 _OPTION = typer.Option
-
-
-class Method(str, Enum):  # noqa: UP042  # typer shows the values of a plain str Enum
-    """Ways to find a model."""
-
-    output_error = "output_error"
-    scan = "scan"
-    paper = "paper"
-
-
-class LoopKind(str, Enum):  # noqa: UP042
-    """Kinds of the process in a loop."""
-
-    self_regulating = "self-regulating"
-    flow = "flow"
-    integrating = "integrating"
-
-
-class Hold(str, Enum):  # noqa: UP042
-    """Treatment of the model's zero-order hold."""
-
-    auto = "auto"
-    zoh = "zoh"
-    none = "none"
 
 
 Files = Annotated[
@@ -52,10 +27,6 @@ Overwrite = Annotated[
 ]
 
 # how to identify
-MethodOption = Annotated[
-    Method, _OPTION("--method", help="output_error fits the raw record; scan and paper use "
-                    "realization."),
-]  # fmt: skip
 Frf = Annotated[Path | None, _OPTION(help="Measured frequency response to compare the model with.")]
 Joint = Annotated[
     bool, _OPTION("--joint", help="Fit one model to all records, and to the --frf if given.")
@@ -77,106 +48,48 @@ Limit = Annotated[
     _OPTION(help="Permitted values, such as t86=0.5, gain=0.9:1.1, t86@2=0.4 (steps of 2 %); "
             "repeatable."),
 ]  # fmt: skip
-NoFit = Annotated[
-    bool, _OPTION("--no-fit", help="Do not fit the dead time of each size and direction.")
-]
 # how to judge a loop
-ProcessOption = Annotated[LoopKind, _OPTION("--process", help="What the process value is.")]
 SetPoint = Annotated[
     str | None, _OPTION("--set-point", help="Column of the set point, if it moves.")
-]
-
-# comparison
-HoldOption = Annotated[
-    Hold,
-    _OPTION(
-        "--hold",
-        help="zoh divides the zero-order hold out of the model; auto does so for sampled models.",
-    ),
 ]
 
 Given: TypeAlias = dict[str, Any]
 """Arguments of Python for the options of a group that were given, see `files.with_options`."""
 
 
-def _asked(kind: Any, said: str, *names: str, **limits: Any) -> Any:
-    return Annotated[kind if kind is bool else kind | None, _OPTION(*names, help=said, **limits)]
-
-
-_OF_TEXT = [
-    "delimiter",
-    "decimal",
-    "encoding",
-    "comment",
-    "no_header",
-    "skip_rows",
-    "variable",
-    "max_bytes",
-]
 _RECORD = options_of("io/records.py", "read_record", "name")
-_FREQUENCY_RESPONSE = options_of(
-    "io/frf.py", "read_frf", " ".join(["response coherence std name header", *_OF_TEXT])
-)
-_PAIR = tuple[float, float]
+_FREQUENCY_RESPONSE = options_of("io/frf.py", "read_frf", "response coherence std name")
 GROUPS: dict[str, dict[str, Any]] = {
-    "chosen": {
-        "order": _asked(int, "Model order without the delay. Default: estimated.", min=1),
-        "max_delay": _asked(int, "Largest delay to consider, in samples.", min=1),
-        "structures": _asked(
-            list[str], "Process model: P1D, P2DZ, FOPDT, SOPDT, ...; repeatable."
-        ),
-        "samples": _asked(
-            int, "scan, paper: number of samples of the impulse response.", min=1
-        ),
-        "cutoff_hz": _asked(float, "scan, paper: cutoff of the filter, in Hz."),
-        "gains": _asked(
-            choice("common", "own"),
-            "own: each record of a joint fit has its own gain. Implies --joint.",
-        ),
-        "actuator": _asked(
-            choice("auto", "slew_rate", "dead_band", "stiction", "resolution", "saturation",
-                   "characteristic"),
-            "Fit the limits of a valve or drive as well; auto: choose by information criterion.",
-        ),
-    },
+    "chosen": options_of(
+        "identification/methods.py", "identify", "known loss noise include_known feedthrough frf"
+    ),
     "tests": {
-        "by": _asked(str, "A file holds several tests: the column that separates them."),
-        "split": _asked(
-            bool, "A file holds several tests: split it where its time jumps.", "--split"
-        ),
+        **options_of("io/records.py", "read_records"),
+        "split": Annotated[
+            bool, _OPTION("--split", help="A file holds several tests: split it where its time "
+                          "jumps."),
+        ],
     },
     "record": _RECORD,
     "valve_test": {name: option for name, option in _RECORD.items() if name != "missing"},
     "trend": {
         name: option for name, option in _RECORD.items() if name not in ("missing", "rest")
     },
-    "response": _FREQUENCY_RESPONSE,
-    "response_file": {**_FREQUENCY_RESPONSE, **{name: _RECORD[name] for name in _OF_TEXT}},
-    "trusted": {
-        "min_coherence": _asked(float, "Smallest coherence of a trusted point. Default: 0.95."),
-        "band_hz": _asked(
-            _PAIR, "Compare in this band, in Hz.", "--band", metavar="LOW HIGH"
-        ),
+    "response": {
+        name: option for name, option in _FREQUENCY_RESPONSE.items() if name not in _RECORD
     },
-    "ranges": {
-        "command_range": _asked(
-            _PAIR, "Command of the closed and the open valve. Default: 0 100 for %, 4 20 for mA, "
-            "otherwise the range of the records.", metavar="CLOSED OPEN",
-        ),
-        "travel_range": _asked(
-            _PAIR, "Position of the closed and the open valve. Default: 0 100 for %, otherwise "
-            "such that the gain of the larger steps is one.", metavar="CLOSED OPEN",
-        ),
+    "response_file": {
+        name: _RECORD.get(name, option) for name, option in _FREQUENCY_RESPONSE.items()
     },
+    "compared": options_of("frequency/compare.py", "compare_frf"),
+    "measured": options_of("valves/evaluate.py", "valve_report", "limits"),
+    "diagnosed": options_of("valves/loops/diagnose.py", "diagnose_loop"),
 }  # fmt: skip
 """Options that several commands share, or that go together to one function of Python."""
 
 ARGUMENTS = frozenset(
-    name.removeprefix("no_")
-    for group in ("chosen", "tests", "record", "response", "trusted")
-    for name in GROUPS[group]
-    if name != "split"
-) | {"method", "hold"}
+    name.removeprefix("no_") for group in GROUPS.values() for name in group if name != "split"
+)
 """Arguments of Python that have an option."""
 
 _COLUMNS = ("time", "input", "output", "quality", "by")

@@ -20,7 +20,6 @@ from .loading import loading
 def identify(
     files: o.Files,
     folder: o.Folder,
-    method: o.MethodOption = o.Method.output_error,
     *,
     frf: o.Frf = None,
     joint: o.Joint = False,
@@ -39,7 +38,7 @@ def identify(
     campaign: the output also contains a table of their delays (records.csv), a model for each
     (models/) and a final model. A record that fails becomes a row of the table with its error. If a
     campaign is interrupted, the finished records are kept in rows/, and the same command resumes
-    from there. With --joint, one model is fitted to all records together.
+    from there. With --joint, or --gains own, one model is fitted to all records together.
 
     \b
     Examples:
@@ -55,7 +54,7 @@ def identify(
         from .identify_command import run_identify
 
     return run_identify(
-        files, folder, method=method.value, choices=chosen, frf=frf,
+        files, folder, choices=chosen, frf=frf,
         joint=joint or "gains" in chosen, separate=separate, tests=tests, reading=record,
         response=response, jobs=jobs, report=not no_report, overwrite=overwrite,
     )  # fmt: skip
@@ -67,8 +66,7 @@ def compare(
     frf: Annotated[Path, typer.Argument(help="Measured frequency response: CSV, TSV, .mat, .npz.")],
     folder: o.MaybeFolder = None,
     *,
-    trusted: o.Given,
-    hold: o.HoldOption = o.Hold.auto,
+    compared: o.Given,
     response_file: o.Given,
     no_report: o.NoReport = False,
     overwrite: o.Overwrite = False,
@@ -88,7 +86,7 @@ def compare(
         from .compare_command import run_compare
 
     return run_compare(
-        model, frf, folder, trusted=trusted, hold=hold.value, reading=response_file,
+        model, frf, folder, choices=compared, reading=response_file,
         report=not no_report, overwrite=overwrite,
     )  # fmt: skip
 
@@ -98,9 +96,8 @@ def valve(
     files: o.Files,
     folder: o.Folder,
     *,
-    ranges: o.Given,
+    measured: o.Given,
     limit: o.Limit = None,
-    no_fit: o.NoFit = False,
     tests: o.Given,
     valve_test: o.Given,
     no_report: o.NoReport = False,
@@ -126,8 +123,8 @@ def valve(
         from .valve.command import run_valve
 
     return run_valve(
-        files, folder, choices=ranges | ({"fit": False} if no_fit else {}), limits=limit or (),
-        tests=tests, reading=valve_test, report=not no_report, overwrite=overwrite,
+        files, folder, choices=measured, limits=limit or (), tests=tests, reading=valve_test,
+        report=not no_report, overwrite=overwrite,
     )  # fmt: skip
 
 
@@ -135,9 +132,9 @@ def valve(
 def loop(
     files: o.Files,
     folder: o.Folder,
-    process: o.ProcessOption = o.LoopKind.self_regulating,
-    set_point: o.SetPoint = None,
     *,
+    diagnosed: o.Given,
+    set_point: o.SetPoint = None,
     trend: o.Given,
     no_report: o.NoReport = False,
     overwrite: o.Overwrite = False,
@@ -158,6 +155,6 @@ def loop(
         from .valve.loop import run_loop
 
     return run_loop(
-        files, folder, process=process.value, set_point=set_point, reading=trend,
+        files, folder, choices=diagnosed, set_point=set_point, reading=trend,
         report=not no_report, overwrite=overwrite,
     )  # fmt: skip

@@ -40,14 +40,14 @@ def compare_frf(
     frf : MeasuredFRF
         Measured response; any `control.FrequencyResponseData`.
     min_coherence : float, optional
-        Least coherence of a trusted point. Default 0.95 if the FRF has a coherence; otherwise
+        Smallest coherence of a trusted point. Default 0.95 if the FRF has a coherence; otherwise
         points with a standard deviation of at most 10 % of the response are trusted, and all points
         if it has neither.
     band_hz : tuple of float, optional
         Compare in this band in Hz instead.
     hold : {"auto", "zoh", None}
-        "zoh": divide the zero-order hold out of a discrete model. None: do not. "auto": do so for a
-        discrete model, unless its ``.fit`` states that it is impulse-invariant. An FRF with a known
+        ``"zoh"`` divides the zero-order hold out of a discrete model; ``"auto"`` does so unless its
+        ``.fit`` states that it is impulse-invariant. None: never. An FRF with a known
         sample time contains a hold as well: if it has the sample time of the model neither is
         divided out, otherwise both.
 

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from inspect import signature
 from typing import TYPE_CHECKING, Any, Literal, TypedDict
 
 import control as ct
@@ -74,20 +75,36 @@ def identify(
         The output-error fit accepts several records, any input (see `fit_output_error`), and
         several inputs and outputs (see `fit_state_space`).
     method : {"output_error", "scan", "paper"}, optional
-        ``"output_error"``: fit of the raw record with a continuous delay; the most accurate, and
-        the only one with a confidence interval. ``"scan"``: the realization scan with zero-phase
-        filter and backward difference. ``"paper"``: the published method: central difference,
-        causal filter at 50 Hz, order 3, 1000 samples, delays 0...100.
+        ``"output_error"`` fits the raw record, ``"scan"`` and ``"paper"`` use realization. The fit
+        has a continuous delay, is the most accurate, and the only one with a confidence interval.
+        ``"scan"``: the realization scan with zero-phase filter and backward difference.
+        ``"paper"``: the published method: central difference, causal filter at 50 Hz, order 3, 1000
+        samples, delays 0...100.
     order : int, optional
-        Order of the model without its delay. Default: chosen from the data (``"paper"``: 3).
+        Order of the model without its delay; default: chosen from the data (``"paper"``: 3).
     max_delay : int, optional
         Largest delay in samples. Default: for ``"scan"`` the time at which the step response has
         reached half of its final value, for ``"paper"`` 100, for ``"output_error"`` see
         `fit_output_error`.
-    known, loss, noise, structures, include_known, gains, actuator : optional
+    known, loss, noise, include_known : optional
         For ``"output_error"``, see `fit_output_error`.
-    cutoff_hz, samples, feedthrough : optional
-        For ``"scan"`` and ``"paper"``, see `impulse_from_step` and `estimate_delay`.
+    structures : optional
+        Process model, such as P1D, P2DZ, FOPDT or SOPDT. For ``"output_error"``, which also takes
+        (order, relative degree), see `fit_output_error`.
+    gains : {"common", "own"}, optional
+        ``"own"``: each of several records has its own gain. For ``"output_error"``.
+    actuator : {"auto", "slew_rate", "dead_band", "stiction", "resolution", "saturation", \
+            "characteristic"}, optional
+        Fit the limits of a valve or drive as well; ``"auto"``: choose by information criterion. For
+        ``"output_error"``.
+    cutoff_hz : float or None, optional
+        For ``"scan"`` and ``"paper"``: cutoff of the filter in Hz. See `impulse_from_step`.
+    samples : int, optional
+        For ``"scan"`` and ``"paper"``: number of samples of the impulse response. See
+        `estimate_delay`.
+    feedthrough : bool, optional
+        For ``"scan"``, ``"paper"`` and several channels, see `estimate_delay` and
+        `fit_state_space`.
     frf : MeasuredFRF, optional
         Measured frequency response of the same plant, which is fitted together with the records;
         see `fit_joint`.
@@ -140,67 +157,63 @@ def identify(
     >>> isinstance(sys, ct.StateSpace), round(sys.fit.dead_time, 3)
     (True, 0.125)
     """
-    method = one_of(method, "method", METHODS)
-    of_scan = _given(
-        cutoff_hz=cutoff_hz != "auto", samples=samples is not None,
-        feedthrough=feedthrough is not None,
-    )  # fmt: skip
-    of_fit = _given(
-        known=known is not None, structures=structures is not None, loss=loss != "huber",
-        noise=noise != "auto", include_known=include_known, gains=gains != "common",
-        actuator=actuator is not None,
-    )  # fmt: skip
-    other_method = f"an argument of method={method!r}; see the documentation of identify"
-    if method != "output_error":
-        _refuse(of_fit + _given(frf=frf is not None), other_method)
-        return _scanned(method, record, order, max_delay, cutoff_hz, samples, feedthrough)
-    if frf is not None:
-        _refuse(
-            [name for name in of_scan + of_fit if name != "structures"],
-            "an argument with frf; expected order, structures or max_delay; fit the records alone "
-            "with the others",
+    options = {
+        name: value
+        for name, value in locals().items()
+        if name in _DEFAULTS and not _is_default(value, _DEFAULTS[name])
+    }
+    name, fit = _fit_of(one_of(method, "method", METHODS), record, frf is not None)
+    taken = signature(fit).parameters
+    if "structures" in taken:
+        options = _with_structures(**options)
+    if others := options.keys() - taken.keys():
+        raise OptionError(
+            f"{', '.join(sorted(others))}: not an argument of {name}; expected order, "
+            f"{', '.join(one for one in _DEFAULTS if one in taken and one != 'order')}"
         )
-        from .joint.fit import fit_joint
-
-        return fit_joint(record, frf, structures=_requested(order, structures), max_delay=max_delay)
-    _refuse(of_scan, other_method)
-    if any(one.ninputs * one.noutputs > 1 for one in as_records(record)):
-        _refuse(
-            of_fit + _given(max_delay=max_delay is not None),
-            "an argument for records of several channels; see fit_state_space",
-        )
-        from .state_space_fit.fit import fit_state_space
-
-        return fit_state_space(record, order)
-    system = fit_records(
-        record, order=order, max_delay=max_delay, known=known, loss=loss, noise=noise,
-        structures=structures, include_known=include_known, gains=gains, actuator=actuator,
-    )  # fmt: skip
-    if known is not None:
+    system = fit(record, **options)
+    if name != _OUTPUT_ERROR or known is not None:
         return system
     return _modes_judged(system, max_delay, asked=order is not None or structures is not None)
 
 
-def _given(**used: bool) -> list[str]:
-    """Names of the arguments that were used."""
-    return [name for name, is_used in used.items() if is_used]
+_DEFAULTS = {
+    name: one.default
+    for name, one in signature(identify).parameters.items()
+    if name not in ("record", "method")
+}
+"""Arguments that only some methods take."""
+_OUTPUT_ERROR = "method='output_error'"
 
 
-def _refuse(arguments: Sequence[str], what: str) -> None:
-    if arguments:
-        raise OptionError(f"{', '.join(arguments)}: not {what}")
+def _is_default(value: object, default: object) -> bool:
+    return value is default or (isinstance(value, str) and value == default)
 
 
-def _scanned(method: str, record: object, *options: Any) -> DelayedStateSpace:
-    """Identify one record by realization."""
-    if not isinstance(record, Record):
-        raise OptionError(
-            f"method={method!r} takes one record; use method='output_error' for several "
-            "records together, or identify_campaign for each on its own"
-        )
-    from .scan_methods import by_paper, by_scan
+def _fit_of(
+    method: str, record: object, with_frf: bool
+) -> tuple[str, Callable[..., DelayedStateSpace]]:
+    """Name and function of the fit; its signature has the arguments that it takes."""
+    if method != "output_error":
+        if not isinstance(record, Record):
+            raise OptionError(
+                f"method={method!r} takes one record; use method='output_error' for several "
+                "records together, or identify_campaign for each on its own"
+            )
+        from .scan_methods import by_paper, by_scan
 
-    return (by_paper if method == "paper" else by_scan)(record, *options)
+        return f"method={method!r}", by_paper if method == "paper" else by_scan
+    if with_frf:
+        from .joint.fit import fit_joint
+
+        return "a fit with frf", fit_joint
+    if any(one.ninputs * one.noutputs > 1 for one in as_records(record)):
+        from .state_space_fit.fit import fit_state_space
+
+        return "a fit of several channels", fit_state_space
+    from .output_error.fit import fit_output_error
+
+    return _OUTPUT_ERROR, fit_output_error
 
 
 def _modes_judged(
@@ -218,26 +231,22 @@ def _modes_judged(
     return with_modes_judged(system, max_delay, asked=asked)
 
 
-def fit_records(
-    records: Record | Sequence[Record],
-    *,
-    order: int | None = None,
-    structures: Structures | None = None,
-    **options: Any,
-) -> DelayedStateSpace:
+def fit_records(records: Record | Sequence[Record], **options: Any) -> DelayedStateSpace:
     """Output-error fit with the arguments of `identify`; several records are fitted together."""
     from .output_error.fit import fit_output_error
 
-    return fit_output_error(records, structures=_requested(order, structures), **options)
+    return fit_output_error(records, **_with_structures(**options))
 
 
-def _requested(order: int | None, structures: Structures | None) -> Structures | None:
-    """Structures that are asked for, by themselves or by an order."""
+def _with_structures(
+    order: int | None = None, structures: Structures | None = None, **options: Any
+) -> dict[str, Any]:
+    """Options with the structures that an order stands for."""
     if order is None:
-        return structures
+        return options if structures is None else {"structures": structures, **options}
     if structures is not None:
         raise OptionError("expected order or structures, got both")
     from .process_structures import MOST_ORDER
 
     order = integer(order, "order", 1, MOST_ORDER)
-    return [(order, degree) for degree in range(1, order + 1)]
+    return {"structures": [(order, degree) for degree in range(1, order + 1)], **options}

@@ -25,11 +25,11 @@ SCANNED_ORDERS = range(1, 6)
 
 def by_scan(
     record: Record,
-    order: int | None,
-    max_delay: int | None,
-    cutoff_hz: float | Literal["auto"] | None,
-    samples: int | None,
-    feedthrough: bool | None,
+    order: int | None = None,
+    max_delay: int | None = None,
+    cutoff_hz: float | Literal["auto"] | None = "auto",
+    samples: int | None = None,
+    feedthrough: bool | None = None,
 ) -> DelayedStateSpace:
     """Zero-phase filter, backward difference, one realization for every delay."""
     step = unit_step(record)
@@ -69,11 +69,11 @@ def by_scan(
 
 def by_paper(
     record: Record,
-    order: int | None,
-    max_delay: int | None,
-    cutoff_hz: float | Literal["auto"] | None,
-    samples: int | None,
-    feedthrough: bool | None,
+    order: int | None = None,
+    max_delay: int | None = None,
+    cutoff_hz: float | Literal["auto"] | None = "auto",
+    samples: int | None = None,
+    feedthrough: bool | None = None,
 ) -> DelayedStateSpace:
     """Settings of the paper: central difference, causal filter, order 3."""
     step = unit_step(record)

@@ -205,8 +205,8 @@ def read_records(
     ----------
     path : path-like
     by : str or int, optional
-        Column that separates the tests, by its name or number. Default: a new test begins where
-        time jumps back, or forward by more than ten usual steps.
+        A file holds several tests: the column that separates them, by name or number. Default: a
+        new test begins where time jumps back, or forward by more than ten usual steps.
     **options
         Arguments of `read_record`.
 

@@ -54,16 +54,17 @@ def valve_report(
         Command (input) and position of the stem (output), or a process variable instead of the
         position. Records of the same valve.
     command_range, travel_range : (float, float), optional
-        Command and position of the closed and of the open valve, in the units of the records.
-        Default: 0 to 100 for %, 4 to 20 for a command in mA; for other units the range of the
-        command, and a travel with which the gain of the larger steps is one.
+        Values of the closed and of the open valve, in the units of the records; default 0 to 100
+        for %, 4 to 20 for a command in mA. For other units it is the range of the command, and a
+        travel with which the gain of the larger steps is one.
     limits : mapping, optional
         Largest permitted value, or (smallest, largest), of metrics by their key in `DEFINITIONS`;
         in s, % and %/s. Of a metric that depends on the step also a mapping from step size in % to
         such a limit: ``{"t86": {2: 0.4, 10: 0.8}}``. There are no default limits: they are those
         of your specification.
     fit : bool, default True
-        Fit the dead time of each size and direction with `identify`, too (about 0.3 s for each).
+        False: Do not fit the dead time of each size and direction with `identify` (about 0.3 s for
+        each).
 
     Returns
     -------

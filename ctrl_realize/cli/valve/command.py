@@ -10,7 +10,7 @@ from typing import Any
 from ...errors import OptionError
 from ...report.valves import write_valve_report
 from ...valves import valve_report
-from ..inputs import Reading, python_keywords, typed_call
+from ..inputs import Reading, python_keywords, reading_in_python, typed_call
 from ..manifest import Run, refuse_other_results
 from ..options import words_of
 from ..results import write_results
@@ -32,11 +32,7 @@ def run_valve(
     how = Reading(reading, tests)
     bounds = _limits(limits)
     options = {**choices, **({"limits": bounds} if bounds else {})}
-    words = [str(file) for file in files]
-    words += words_of({name: value for name, value in choices.items() if name != "fit"})
-    words += ["--no-fit"] if choices.get("fit") is False else []
-    words += [word for one in limits for word in ("--limit", one)]
-    words += words_of({**tests, **reading})
+    words = [*map(str, files), *words_of({**choices, "limit": list(limits), **tests, **reading})]
     run = Run(typed_call("valve", words), tuple(files), overwrite)
     refuse_other_results(output, run)
     sources = how.sources(files)
@@ -46,10 +42,9 @@ def run_valve(
     result = valve_report(records, **options)
     say(result.report())
     words += ["--output", str(output)]
-    calls = [
-        ("In a terminal", typed_call("valve", words)),
-        ("In Python", _in_python(files, how, options)),
-    ]
+    lines, name = reading_in_python(files, how)
+    lines.append(f"report = cr.valves.valve_report({name}{python_keywords(options)})")
+    calls = [("In a terminal", typed_call("valve", words)), ("In Python", "\n".join(lines))]
     tables = {
         "metrics.csv": (result.metric_table(), True),
         "sizes.csv": (result.table(), False),
@@ -83,20 +78,3 @@ def _limits(given: Sequence[str]) -> dict[str, Any]:
                 "metric@size=largest, such as t86=0.5, gain=0.9:1.1 or t86@2=0.4"
             ) from None
     return found
-
-
-def _in_python(files: list[Path], how: Reading, options: Mapping[str, Any]) -> str:
-    keywords = python_keywords(how.keywords)
-    names = ", ".join(repr(str(file)) for file in files)
-    reader = "cr.read_record"
-    lines = ["import ctrl_realize as cr", f"files = [{names}]"]
-    if how.tests:
-        by = how.tests.get("by")
-        keywords = ("" if by is None else f", by={by!r}") + keywords
-        lines.append(
-            f"records = [one for file in files for one in cr.io.read_records(file{keywords})]"
-        )
-    else:
-        lines.append(f"records = [{reader}(file{keywords}) for file in files]")
-    lines.append(f"report = cr.valves.valve_report(records{python_keywords(options)})")
-    return "\n".join(lines)

@@ -12,8 +12,7 @@ from ...errors import OptionError
 from ...io import read_record
 from ...report.loops import write_loop_report
 from ...valves.loops.diagnose import diagnose_loop
-from ...valves.loops.methods import LoopProcess
-from ..inputs import python_keywords, typed_call
+from ..inputs import Reading, python_keywords, reading_in_python, typed_call
 from ..manifest import Run, refuse_other_results
 from ..options import words_of
 from ..results import write_results
@@ -24,7 +23,7 @@ def run_loop(
     files: list[Path],
     output: Path,
     *,
-    process: LoopProcess,
+    choices: Mapping[str, Any],
     set_point: str | None,
     reading: Mapping[str, Any],
     report: bool,
@@ -33,7 +32,6 @@ def run_loop(
     """Diagnose, write the results, and return the exit code."""
     if len(files) != 1:
         raise OptionError(f"{len(files)} files; expected one record of operation")
-    choices: dict[str, Any] = {"process": process}
     words = [str(files[0]), *words_of({**choices, **reading})]
     reading = {**reading, "missing": "keep"}  # the longest complete part is judged
     words += [] if set_point is None else ["--set-point", set_point]
@@ -51,7 +49,9 @@ def run_loop(
     words += ["--output", str(output)]
     calls = [("In a terminal", typed_call("loop", words))]
     if set_point is None:
-        calls.append(("In Python", _in_python(files[0], reading, choices)))
+        lines, name = reading_in_python(files, Reading(reading, {}))
+        lines.append(f"print(cr.valves.diagnose_loop({name}{python_keywords(choices)}).report())")
+        calls.append(("In Python", "\n".join(lines)))
     write = partial(write_loop_report, diagnosis=result, files=files, settings=choices, calls=calls)
     tables = {"methods.csv": (result.table(), True)}
     return write_results(output, run, tables, write if report else None, "the table of methods")
@@ -63,13 +63,3 @@ def _with_set_point(file: Path, set_point: str, reading: Mapping[str, Any]) -> R
     if given is None or isinstance(given, list):
         raise OptionError("--set-point needs the column of the process value: --output-column")
     return read_record(file, **{**reading, "output": [given, set_point]})
-
-
-def _in_python(file: Path, reading: Mapping[str, Any], choices: Mapping[str, Any]) -> str:
-    return "\n".join(
-        (
-            "import ctrl_realize as cr",
-            f"record = cr.read_record({str(file)!r}{python_keywords(reading)})",
-            f"print(cr.valves.diagnose_loop(record{python_keywords(choices)}).report())",
-        )
-    )

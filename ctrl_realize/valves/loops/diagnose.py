@@ -51,9 +51,9 @@ def diagnose_loop(
     dt : float, optional
         Sample time in s, if `loop` is OP.
     process : {"self-regulating", "flow", "integrating"}
-        ``"flow"``: PV follows the position of the valve nearly at once, as flows do, or is the
-        position; ``"integrating"``: levels. Which methods apply, and to which signal, depends on
-        it.
+        What the process value is. ``"flow"``: PV follows the position of the valve nearly at once,
+        as flows do, or is the position; ``"integrating"``: levels. Which methods apply, and to
+        which signal, depends on it.
 
     Returns
     -------
