@@ -20,12 +20,14 @@ from ...numerics.arrays import ComplexArray, FloatArray
 from ...numerics.blas_threads import single_threaded
 from ...numerics.constants import SMALLEST
 from ...numerics.engine.problem import Structure
+from ...numerics.engine.structures import Scales
+from ...numerics.engine.window import Window
+from ...numerics.joint.data import JointData, sampled_data, sampled_part, step_part
+from ...numerics.joint.effects import Effect, with_random_effects
 from ...numerics.joint.fit import joint_fit
-from ...numerics.joint.frf_rows import MeasuredPoints
-from ...numerics.joint.own_effects import EffectKey, with_random_effects
-from ...numerics.joint.record_part import RecordPart, sampled_data, sampled_part, step_part
 from ...numerics.output_error.result import OutputErrorEstimate
 from ...numerics.output_error.step_data import StepData, bare_data
+from ...numerics.rational.frf_data import FRFData
 from ...numerics.rational.search import points_as_one
 from ..output_error.any_input import joined_signals
 from ..output_error.fit import fit_output_error
@@ -137,17 +139,18 @@ def fit_joint(
         FRFFit,
     )
     latest = None if max_delay is None else max_delay * first.dt
-    part, data, time = _part(first, latest)
+    window, scales, data, time = _records(first, latest)
     lows, highs = zip(first.interval, other.interval, strict=True)
     span = float(min(lows)), float(max(highs))
     spread = _spread(first)
-    part = with_random_effects(part, first.estimate, spread)
-    joint = joint_fit(part, _points(other), _starts(first, other), span)
-    estimate, agreed = joint.estimate, joint.agreement
+    window = with_random_effects(window, first.estimate, spread, scales.dt)
+    points, freedom = _points(other, scales.latest)
+    both = JointData(window, scales, points, freedom)
+    estimate, agreed = joint_fit(both, _starts(first, other), span)
     if agreed.contradicts:
         low, high = min(span[0], estimate.dead_time), max(span[1], estimate.dead_time)
         estimate = replace(estimate, low=low, high=high)
-    growth = float(np.std(part.output - estimate.fitted))
+    growth = float(np.std(window.output - estimate.fitted))
     growth /= max(float(np.std(first.measured - first.fitted)), SMALLEST)
     estimate = replace(
         estimate,
@@ -174,10 +177,12 @@ def fit_joint(
     return fitted_model(fitted_core(estimate, result.poles), result)
 
 
-def _part(first: OutputErrorFit, latest: float | None) -> tuple[RecordPart, StepData, FloatArray]:
+def _records(
+    first: OutputErrorFit, latest: float | None
+) -> tuple[Window, Scales, StepData, FloatArray]:
     """Rows of the records, and what is shown of them: data and times."""
     if np.isfinite(first.onset):
-        return step_part(first.data, first.estimate, latest), first.data, first.time
+        return *step_part(first.data, first.estimate, latest), first.data, first.time
     repeats = first.repeatability
     left_out = () if repeats is None else repeats.outlying
     names = repeats.names if repeats is not None else ("",)
@@ -185,19 +190,19 @@ def _part(first: OutputErrorFit, latest: float | None) -> tuple[RecordPart, Step
     outputs, inputs = ([np.ravel(getattr(r, k)) for r in used] for k in ("output", "input"))
     data = sampled_data(outputs, inputs, first.dt, first.dead_time, first.data.every)
     time, signal = joined_signals(used, data)
-    part = sampled_part(data, first.estimate, latest)
+    window, scales = sampled_part(data, first.estimate, latest)
     span = sum(data.lengths) * data.step
-    shown = bare_data(part.output, signal, data.dt, first.residual, span, data.every)
-    return part, shown, time
+    shown = bare_data(window.output, signal, data.dt, first.residual, span, data.every)
+    return window, scales, shown, time
 
 
-def _spread(first: OutputErrorFit) -> list[tuple[EffectKey, float]]:
+def _spread(first: OutputErrorFit) -> list[tuple[Effect, float]]:
     """Standard errors of what differs between records by more than their noise."""
     repeats = first.repeatability
     if repeats is None:
         return []
     kept = np.array([name not in repeats.outlying for name in repeats.names])
-    tests: tuple[tuple[EffectKey, FloatArray, float], ...] = (
+    tests: tuple[tuple[Effect, FloatArray, float], ...] = (
         ("gain", repeats.gains, repeats.gain_test[1]),
         ("dead_time", repeats.delays, repeats.p_value),
         ("lags", np.log(repeats.lags), repeats.lag_test[1]),
@@ -213,7 +218,7 @@ def _choices(
     estimate: OutputErrorEstimate,
     first: OutputErrorFit,
     other: FRFFit,
-    spread: Sequence[tuple[EffectKey, float]],
+    spread: Sequence[tuple[Effect, float]],
 ) -> tuple[str, ...]:
     s, count = estimate.structure, len(estimate.structures)
     kind = f"order {s.order}, relative degree {s.relative_degree}"
@@ -239,7 +244,7 @@ def _choices(
     return tuple(reasons)
 
 
-def _points(fit: FRFFit) -> MeasuredPoints:
+def _points(fit: FRFFit, latest: float) -> tuple[FRFData, float]:
     """Points with the noise that their own fit leaves, never less than what was measured."""
     omega = 2 * np.pi * fit.frequency_hz
     scale = max(fit.weighted_rms, 1.0) if fit.noise_known else fit.weighted_rms
@@ -248,7 +253,9 @@ def _points(fit: FRFFit) -> MeasuredPoints:
     scale *= float(np.sqrt(points_as_one((fit.measured - fit.response(omega)) / fit.sigma)))
     freedom = 2.0 * omega.size - (2 * fit.order + 2 - fit.relative_degree)
     known = fit.noise_known and fit.weighted_rms <= 1.0
-    return MeasuredPoints(omega, fit.measured, fit.sigma * scale, np.inf if known else freedom)
+    weight = np.sqrt(2.0) / (fit.sigma * scale)  # so that real and imaginary parts have variance 1
+    points = FRFData(np.asarray(1j * omega), fit.measured, weight, latest)
+    return points, np.inf if known else freedom
 
 
 def _starts(

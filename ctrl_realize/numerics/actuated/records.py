@@ -167,7 +167,7 @@ class Records:
         """The problem of linear models of the same records."""
         inputs = tuple(SampledInput(part.command - part.command[0], part.dt) for part in self.parts)
         rows = tuple(part.rows for part in self.parts)
-        drive = SeveralInputs(inputs, (0,) * len(rows), rows)
+        drive = SeveralInputs(inputs, rows)
         weight = np.ones(self.output.size)
         return Problem(self.output, weight, drive, self.regressors, KnownFactor())
 

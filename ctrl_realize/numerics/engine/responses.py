@@ -313,34 +313,29 @@ class SampledInput:
 
 @dataclass(frozen=True, eq=False)
 class SeveralInputs:
-    """Inputs of several records, concatenated, each without its first samples.
+    """Inputs of several parts of the data, one below the other.
 
     Attributes
     ----------
     parts : tuple of HeldInput
-    starts : tuple of int
-        First sample of every part at which the response is needed.
-    rows : tuple of ndarray of int, optional
-        Samples of every part at which it is needed, if not at all from there on.
+    rows : tuple of ndarray of int or slice, optional
+        Rows of every part at which the response is needed; default: all.
     """
 
     parts: tuple[HeldInput, ...]
-    starts: tuple[int, ...]
-    rows: tuple[IntArray, ...] | None = None
+    rows: tuple[IntArray | slice, ...] | None = None
 
     def pieces(self) -> list[SeveralInputs]:
         """The complete input: a recursion needs all of it."""
         return [self]
 
     def modes(self, tau: FloatArray, poles: ComplexArray) -> Modes:
-        """Evaluate H, E and T at every sample wanted; see `HeldInput`."""
-        found = [part.modes(tau, poles) for part in self.parts]
-        wanted: Sequence[IntArray | slice] = self.rows or [slice(k, None) for k in self.starts]
-        static, mode, slope = (
-            np.concatenate(
-                [modes[i][:, rows] for modes, rows in zip(found, wanted, strict=True)],
-                axis=1,
-            )
-            for i in range(3)
-        )
+        """Evaluate H, E and T at every row wanted; see `HeldInput`."""
+        wanted = self.rows or (slice(None),) * len(self.parts)
+        modes = [
+            [values[:, rows] for values in part.modes(tau, poles)]
+            for part, rows in zip(self.parts, wanted, strict=True)
+        ]
+        joined = (np.concatenate(values, axis=1) for values in zip(*modes, strict=True))
+        static, mode, slope = joined
         return static, mode, slope

@@ -16,7 +16,7 @@ References
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -119,6 +119,7 @@ def search(
     structures: Iterable[Structure],
     scales: Scales,
     beside: dict[Structure, Candidate] | None = None,
+    starts: Mapping[Structure, Sequence[FloatArray]] | None = None,
 ) -> dict[Structure, Candidate]:
     """Find the best fit of every structure.
 
@@ -133,15 +134,19 @@ def search(
     scales : Scales
     beside : dict of Structure to Candidate, optional
         Previous results, which are included.
+    starts : mapping of Structure to sequences of ndarray, optional
+        Models of other data of the plant, which take the place of those sets of poles.
     """
     found = dict(beside or {})
     for structure in sorted(structures, key=lambda s: (s.order, s.zeros)):
-        starts = neighbour_starts(structure, scales, found)
-        if not starts or structure.order <= 3 or _worth_a_search(problem, structure, found):
-            starts += pattern_starts(structure, scales)
+        tried = neighbour_starts(structure, scales, found)
+        if starts is not None:
+            tried += starts[structure]
+        elif not tried or structure.order <= 3 or _worth_a_search(problem, structure, found):
+            tried += pattern_starts(structure, scales)
         bounds = parameter_bounds(structure, scales)
         done = float(np.clip(_ROUGHLY / problem.data.size, 1e-4, 1e-3))
-        parameters, cost = fit_batch(problem, structure, np.array(starts), bounds, tolerance=done)
+        parameters, cost = fit_batch(problem, structure, np.array(tried), bounds, tolerance=done)
         order = np.argsort(cost)
         best, ends = order[0], apart(parameters[order[:_ENDS]])
         found[structure] = Candidate(structure, parameters[best], float(cost[best]), ends, True)

@@ -31,7 +31,7 @@ class Window:
         Residuals count from this sample on.
     output : ndarray, shape (N,)
     problem : Problem
-        On the bins, or on the samples if there are none.
+        On the bins, or on the samples if there are none; rows of other data may follow.
     drive : HeldInput
         For the response at every sample.
     columns : ndarray, shape (N, q)
@@ -39,8 +39,8 @@ class Window:
     bins : Bins or None
     own : Segments or None
         Local terms at every sample, if the problem has them on bins.
-    samples : int or None
-        Represented by the output, if it is different from them.
+    samples : float or None
+        Number that the problem represents, if it is not that of the output.
     spacing : float
         Mean distance of the samples, in sample times; 1 if none is missing.
     """
@@ -50,9 +50,9 @@ class Window:
     problem: Problem
     drive: HeldInput
     columns: FloatArray
-    bins: Bins | None
+    bins: Bins | None = None
     own: Segments | None = None
-    samples: int | None = None
+    samples: float | None = None
     spacing: float = 1.0
 
     @cached_property
@@ -61,7 +61,7 @@ class Window:
 
         Below 1 where means of coarsely rounded samples weigh less than their number.
         """
-        if self.bins is None:
+        if self.bins is None or self.samples is not None:
             return 1.0
         after = self.bins.first >= self.start
         weights = float(np.sum(self.problem.root_weight[after] ** 2))
@@ -76,14 +76,21 @@ class Window:
         """Model at every sample, with the linear terms of the problem."""
         state = evaluate(problem, candidate.structure, candidate.parameters[None])
         if self.bins is None:
-            # The samples are the data of the problem, all with weight 1.
-            return np.asarray(problem.data - state.residual[0])
+            # The samples are the first data of the problem.
+            fitted = problem.data - state.residual[0] / problem.root_weight
+            return np.asarray(fitted[: self.output.size])
         setting = problem.known, state.numerator[0], candidate.theta
         model = respond(self.drive, *setting)
         model += self.columns @ state.regression[0]
         if self.own is not None:
             weight = problem.root_weight
             terms = problem.local_terms(candidate.poles[None])
-            rest = weight * (problem.data - respond(problem.drive, *setting))
-            model = model + terms.fitted(rest[None], self.own)[0]
+            forced = respond(problem.drive, *setting) + problem.regressors @ state.regression[0]
+            remainder = weight * (problem.data - forced)
+            model = model + terms.fitted(remainder[None], self.own)[0]
         return np.asarray(model)
+
+
+def window_of_rows(problem: Problem) -> Window:
+    """Window of a problem of which every row is a sample."""
+    return Window(0, problem.data, problem, problem.drive, problem.regressors)

@@ -135,6 +135,19 @@ class WindowFit:
         return {s: value + self.problem.local_count(s.order) for s, value in values.items()}
 
 
+def with_known_noise(
+    window: Window,
+    candidates: dict[Structure, Candidate],
+    scales: Scales,
+    sigma: float,
+    correlation: float = 1.0,
+) -> WindowFit:
+    """Compare candidates on a window with noise of a known level, whatever their residual is."""
+    level = float(np.sqrt(correlation))
+    fit = WindowFit(window, window.problem, candidates, {}, scales, sigma, correlation, level)
+    return replace(fit, criterion=fit.criteria(candidates))
+
+
 def with_noise_of_residual(fit: WindowFit) -> WindowFit:
     """Count for errors what a model has taken from slow noise.
 

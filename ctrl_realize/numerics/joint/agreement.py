@@ -18,15 +18,15 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.stats import chi2
+from scipy.stats import f as f_distribution
 
 from ..arrays import BoolArray, FloatArray
 from ..engine.compared_fits import settled
 from ..engine.eliminate import evaluate
 from ..engine.problem import Problem, Structure
 from ..engine.structures import Candidate
-from .frf_rows import MeasuredPoints
-from .own_effects import OwnKey, chance_of, freed
-from .record_part import RecordPart
+from .data import JointData
+from .effects import freed
 
 BY_CHANCE = 0.01  # one false alarm in a hundred plants, as among records of one plant
 OUTSIDE = 0.95
@@ -62,7 +62,7 @@ class Agreement:
     @property
     def parameters(self) -> int:
         """Number of parameters that are common: dead time, poles, numerator."""
-        return self.structure.order + self.structure.zeros + 2
+        return self.structure.free + 2
 
     @property
     def contradicts(self) -> bool:
@@ -71,78 +71,68 @@ class Agreement:
 
 
 def agreement(
-    record: RecordPart,
-    points: MeasuredPoints,
-    problem: Problem,
-    model: Candidate,
-    starts: Mapping[Structure, Sequence[FloatArray]],
-) -> tuple[FloatArray, Agreement]:
+    data: JointData, model: Candidate, starts: Mapping[Structure, Sequence[FloatArray]]
+) -> Agreement:
     """Fit the structure of a joint model to each of the two alone, and compare.
 
     Parameters
     ----------
-    record : RecordPart
-    points : MeasuredPoints
-    problem : Problem
-        Of both together.
+    data : JointData
     model : Candidate
-        The best of a structure on it.
+        The best of a structure on both together.
     starts : mapping
         Other starts of every structure, for each of the two.
-
-    Returns
-    -------
-    fitted : ndarray, shape (N,)
-        Response of the joint model at every sample of the records.
-    Agreement
     """
-    rows = record.problem.data.size
-    state = evaluate(problem, model.structure, model.parameters[None])
-    residual = state.residual[0]
-    fitted = record.predict(state.numerator[0], model.parameters, state.regression[0], problem)
-    near = starts[model.structure]
-    own = _alone(record.problem, model, near, record)
-    other = _alone(points.problem(), model, near, record)
-    record_rise = max(float(np.sum(residual[:rows] ** 2)) - own.cost, 0.0)
-    frf_rise = max(float(np.sum(residual[rows:] ** 2)) - other.cost, 0.0)
-    statistic = record_rise + frf_rise
-    parameters = model.structure.order + model.structure.zeros + 2
-    chance = chance_of(statistic, parameters, points.freedom)
+    records, points = data.records, data.points
+    rows = records.problem.data.size
+    residual = evaluate(data.problem, model.structure, model.parameters[None]).residual[0]
+    separate = [_alone(data, part.problem, model, starts) for part in (records, points)]
+    parts = residual[:rows], residual[rows:]
+    rises = [
+        max(float(part @ part) - fit.cost, 0.0) for part, fit in zip(parts, separate, strict=True)
+    ]
+    statistic, least = sum(rises), sum(fit.cost for fit in separate)
+    parameters = model.structure.free + 2
+    chance = _chance_of(statistic, parameters, data.freedom)
     gain = later = (np.nan, np.nan)
     if chance < BY_CHANCE:
-        separate = own.cost + other.cost
         gain, later = (
-            _differing(record, points, model, separate, key) for key in ("gain", "dead_time")
+            (value, _chance_of(max(cost - least, 0.0), parameters - 1, data.freedom))
+            for value, cost in (freed(data, model, "gain"), freed(data, model, "dead_time"))
         )
-    state = evaluate(record.problem, own.structure, own.parameters[None])
-    single = record.predict(state.numerator[0], own.parameters, state.regression[0], record.problem)
     reach = float(chi2.ppf(OUTSIDE, 2))
-    return fitted, Agreement(
+    return Agreement(
         structure=model.structure,
         statistic=statistic,
         p_value=chance,
-        record_rise=record_rise,
-        frf_rise=frf_rise,
-        radius=points.sigma * np.sqrt(reach / 2),
+        record_rise=rises[0],
+        frf_rise=rises[1],
+        # The rows of a point have half of its variance.
+        radius=np.sqrt(reach) / points.weight,
         outside=np.sum(np.square(np.split(residual[rows:], 2)), axis=0) > reach,
-        shift=fitted - single,
+        shift=records.predict(data.problem, model) - records.predict(records.problem, separate[0]),
         gain_ratio=gain,
         later=later,
     )
 
 
 def _alone(
-    problem: Problem, joint: Candidate, starts: Sequence[FloatArray], record: RecordPart
+    data: JointData,
+    problem: Problem,
+    joint: Candidate,
+    starts: Mapping[Structure, Sequence[FloatArray]],
 ) -> Candidate:
+    """Best fit of the joint structure to one of the two."""
     cost = float(evaluate(problem, joint.structure, joint.parameters[None]).cost[0])
-    first = replace(joint, cost=cost, ends=np.array(starts).reshape(-1, joint.parameters.size))
-    return settled(problem, first, record.scales)
+    ends = np.array(starts[joint.structure]).reshape(-1, joint.parameters.size)
+    return settled(problem, replace(joint, cost=cost, ends=ends), data.scales)
 
 
-def _differing(
-    record: RecordPart, points: MeasuredPoints, joint: Candidate, separate: float, key: OwnKey
-) -> tuple[float, float]:
-    """Own value of the frequency response, and the probability of what it does not explain."""
-    value, cost = freed(record.problem, points, joint, record.scales, key)
-    parameters = joint.structure.order + joint.structure.zeros + 1
-    return value, chance_of(max(cost - separate, 0.0), parameters, points.freedom)
+def _chance_of(statistic: float, parameters: int, freedom: float) -> float:
+    """Probability of a larger likelihood ratio by chance.
+
+    A chi-square, or an F ratio if the noise was estimated with `freedom` degrees of freedom.
+    """
+    if np.isfinite(freedom):
+        return float(f_distribution.sf(statistic / parameters, parameters, freedom))
+    return float(chi2.sf(statistic, parameters))

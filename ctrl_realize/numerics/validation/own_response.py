@@ -20,13 +20,18 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import chdtrc, ndtri, stdtrit
 
-from ..arrays import FloatArray
+from ..arrays import ComplexArray, FloatArray
+from ..engine.modal import respond
+from ..engine.poles import parameters_from_poles
+from ..engine.problem import KnownFactor
+from ..engine.responses import HeldInput
 from ..signals.correlation import fit_percent
 from ..signals.noise import correlation_time
 
 _TURNS = 6  # of Gauss and Newton at most
 _LARGEST_STRETCH = 0.5  # of the logarithm, in one turn
 _SETTLED = 1e-3  # samples, and part of the lags
+_STRETCH = 0.01  # of the time constants, for a slope by differences: off by 1e-4
 _FALSE_NAMES = 0.01  # chance that an outlier is named in a set without one
 
 
@@ -49,6 +54,35 @@ class OwnResponse:
     followed: float = float("nan")
     gain_alone: float = 1.0
     gain_alone_error: float = float("inf")
+
+
+def response_slopes(
+    drive: HeldInput,
+    known: KnownFactor,
+    dead_time: float,
+    poles: ComplexArray,
+    numerator: FloatArray,
+    step: float,
+    stretch: float = 1.0,
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Response (m,) of a model, and what another gain, dead time or time scale would add to it.
+
+    The response is also its derivative with respect to the logarithm of the gain. The others are
+    central differences: with respect to the dead time, which is moved by `step` s, and to the
+    logarithm of all time constants. These are `stretch` times as long as those of `poles`, with the
+    same gain. Before time 0 the response is extrapolated.
+    """
+    powers = np.arange(numerator.size) - float(poles.size)
+
+    def response(at: float, stretch: float) -> FloatArray:
+        parameters = np.append(at, parameters_from_poles(poles / stretch))
+        return respond(drive, known, numerator * stretch**powers, parameters)
+
+    at = max(dead_time, step)
+    later = (response(at + step, stretch) - response(at - step, stretch)) / (2 * step)
+    longer, shorter = (response(at, stretch * (1 + part)) for part in (_STRETCH, -_STRETCH))
+    here = response(at, stretch) + (dead_time - at) * later
+    return here, later, (longer - shorter) / (2 * _STRETCH)
 
 
 def homogeneity(values: FloatArray, errors: FloatArray) -> tuple[float, float]:

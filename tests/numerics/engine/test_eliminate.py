@@ -14,7 +14,7 @@ from ctrl_realize.numerics.engine.poles import parameters_from_poles
 from ctrl_realize.numerics.engine.problem import KnownFactor, Problem, Structure
 from ctrl_realize.numerics.engine.responses import SampledInput, SeveralInputs, StepSequence
 from ctrl_realize.numerics.engine.structures import Scales, parameter_bounds, search
-from ctrl_realize.numerics.joint.frf_rows import with_rows
+from ctrl_realize.numerics.joint.data import with_rows
 from ctrl_realize.numerics.signals.sines import Sines
 from tests import rigs
 from tests.oracles.varpro import evaluate as oracle
@@ -40,8 +40,8 @@ def two_records(data, weight):
     parts = tuple(SampledInput(rng.normal(size=n // 10).repeat(10), 1.0) for n in (140, 200))
     clock = np.concatenate([np.arange(120.0), np.arange(180.0)])
     own = Segments(np.array([0, 120, 300]), clock, np.stack([np.ones(300), clock], axis=1))
-    nothing = np.empty((300, 0))
-    return Problem(data, weight, SeveralInputs(parts, (20, 20)), nothing, KnownFactor(), own)
+    drive = SeveralInputs(parts, (slice(20, None),) * 2)
+    return Problem(data, weight, drive, np.empty((300, 0)), KnownFactor(), own)
 
 
 def behind_known(drive):

@@ -86,19 +86,15 @@ class SampledData:
             for y, start in zip(self.outputs, self.starts, strict=True)
         )
 
-    def _drive(self, i: int) -> HeldInput:
-        """Input of a record, for all of its outputs."""
-        signal = self.inputs[i] / self.scales[i]
-        if self.every == 1:
-            return SampledInput(signal, self.dt)
-        return AveragedInput(signal, self.dt, self.every, self.width)
-
-    def _sparse_input(self, i: int) -> tuple[HeldInput, IntArray]:
-        """Input of a record with missing samples, and the responses of it that are needed."""
+    def _input(self, i: int) -> tuple[HeldInput, IntArray]:
+        """Input of a record, and the rows of its response that are fitted."""
         rows, signal = self.rows[i], self.inputs[i] / self.scales[i]
+        if self.every > 1:
+            return AveragedInput(signal, self.dt, self.every, self.width), rows
         moves = np.flatnonzero(np.diff(signal, prepend=0.0))
-        if moves.size > MOST_MOVES or self.every > 1:
-            return self._drive(i), rows
+        if self.complete or moves.size > MOST_MOVES:
+            return SampledInput(signal, self.dt), rows
+        # Few moves, and samples missing: the response at those that there are.
         sizes = np.diff(signal, prepend=0.0)[moves]
         single = np.ones(rows.size, dtype=np.int64)
         times, when = (self.dt * index.astype(np.float64) for index in (rows, moves))
@@ -158,15 +154,8 @@ class SampledData:
         ]
         shapes = [_own_shapes(clock, known) for clock in clocks]
         m = int(self.edges[-1])
-        if self.complete:
-            drive = SeveralInputs(
-                tuple(self._drive(i) for i in range(len(self.inputs))),
-                self.starts,
-            )
-        else:
-            pairs = [self._sparse_input(i) for i in range(len(self.inputs))]
-            parts, rows = zip(*pairs, strict=True)
-            drive = SeveralInputs(parts, self.starts, rows)
+        inputs = [self._input(i) for i in range(len(self.inputs))]
+        drive = SeveralInputs(*zip(*inputs, strict=True))
         joined = np.concatenate(
             [y / scale for y, scale in zip(self.measured, self.scales, strict=True)]
         )

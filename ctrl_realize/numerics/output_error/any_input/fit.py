@@ -25,13 +25,12 @@ from functools import partial
 import numpy as np
 
 from ...arrays import FloatArray
-from ...engine.batch_search import fit_batch
 from ...engine.compared_fits import converged
 from ...engine.poles import parameters_from_poles
 from ...engine.problem import KnownFactor, Problem, Structure
-from ...engine.structures import Candidate, neighbour_starts, parameter_bounds
-from ...engine.window import Window
-from ...engine.window_fit import WindowFit, extended
+from ...engine.structures import Candidate, search
+from ...engine.window import window_of_rows
+from ...engine.window_fit import WindowFit, extended, with_known_noise
 from ...families.process_form import ProcessForm
 from ...signals.correlation import fit_percent
 from ...signals.noise import correlation_time, winsorised_sigma
@@ -218,29 +217,18 @@ def _condensed(
 
 def _fit_condensed(sums: Condensed, stretch: WindowFit, known: KnownFactor) -> WindowFit:
     """Fit all structures to all samples, starting from the fit of a part."""
-    m = sums.data.size
+    m, scales = sums.data.size, stretch.scales
     problem = Problem(sums.data, np.ones(m), sums.drive, np.empty((m, 0)), known)
-    window = Window(0, sums.data, problem, sums.drive, problem.regressors, None)
-    window = replace(window, samples=sums.samples)
-    found: dict[Structure, Candidate] = {}
-    for structure in sorted(stretch.candidates, key=lambda s: (s.order, s.zeros)):
-        starts = [stretch.candidates[structure].parameters]
-        starts += neighbour_starts(structure, stretch.scales, found)
-        parameters, cost = fit_batch(
-            problem, structure, np.array(starts), parameter_bounds(structure, stretch.scales)
-        )
-        best = int(np.argmin(cost))
-        found[structure] = Candidate(structure, parameters[best], float(cost[best]))
-    found = converged(problem, found, stretch.scales, sums.noise**2, sums.samples)
-    first = min(found.values(), key=lambda candidate: candidate.cost)
-    freedom = max(m - 2 - first.structure.order - first.structure.zeros, 1)
+    starts = {s: [fit.parameters] for s, fit in stretch.candidates.items()}
+    fits = search(problem, starts, scales, starts=starts)
+    fits = converged(problem, fits, scales, sums.noise**2, sums.samples)
+    closest = min(fits.values(), key=lambda candidate: candidate.cost)
+    freedom = max(m - 2 - closest.structure.free, 1)
     # Residual above the noise: what no structure explains is treated as noise of that size.
-    excess = first.cost / freedom / sums.noise**2
+    excess = closest.cost / freedom / sums.noise**2
     colour = excess if excess > 1 + _CLEARLY * np.sqrt(2 / freedom) else 1.0
-    fit = WindowFit(
-        window, problem, found, {}, stretch.scales, sums.noise, colour, float(np.sqrt(colour))
-    )
-    return replace(fit, criterion=fit.criteria(found))
+    window = replace(window_of_rows(problem), samples=sums.samples)
+    return with_known_noise(window, fits, scales, sums.noise, colour)
 
 
 def _on_stretch(data: SampledData, fit: OutputErrorEstimate, known: KnownFactor) -> FloatArray:

@@ -27,7 +27,7 @@ from ...engine.poles import poles_from_parameters
 from ...engine.problem import KnownFactor, Problem, Structure
 from ...engine.static_gain import StaticGain
 from ...engine.structures import Candidate, Scales, search
-from ...engine.window import Window
+from ...engine.window import Window, window_of_rows
 from ...engine.window_fit import WindowFit, fit_window
 from ...signals.noise import quantisation_step, winsorised_sigma
 from ...signals.noise_model import noise_lags, whitening_filter
@@ -145,9 +145,7 @@ def _settles(static: StaticGain) -> bool:
 
 def window_of(data: SampledData, known: KnownFactor) -> Window:
     """Set up the fit of all samples."""
-    problem = data.problem(known)
-    window = Window(0, problem.data, problem, problem.drive, problem.regressors, None)
-    return replace(window, spacing=data.spacing / data.every)
+    return replace(window_of_rows(data.problem(known)), spacing=data.spacing / data.every)
 
 
 def _fit(
