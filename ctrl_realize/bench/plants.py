@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from .._checks import not_negative, positive, real
 from ..errors import OptionError
-from .linear import Core, chain, integrator, lag
+from .linear import chain, integrator, lag
 from .plant import Plant
 from .truth import PlantTruth
 
@@ -74,17 +76,7 @@ def heater(
       dead time          20 s = 20 samples
       total delay at DC  172 s
     """
-    return _plant(
-        "heater",
-        chain([_lag(lag_time, "lag_time"), _lag(sensor_lag, "sensor_lag")], _gain(gain, "gain")),
-        ("power", "temperature"),
-        ("%", "degC"),
-        steady_state=(20.0, 40.0),
-        amplitude=30.0,
-        dead_time=dead_time, noise=noise, disturbance=disturbance,
-        disturbance_time=disturbance_time, resolution=resolution, dt=dt,
-        pre_step_time=pre_step_time, hold=hold,
-    )  # fmt: skip
+    return _plant("heater", **locals())
 
 
 def tank(
@@ -148,17 +140,7 @@ def tank(
       dead time          12 s = 12 samples
       total delay at DC  16 s
     """
-    return _plant(
-        "tank",
-        chain([_lag(sensor_lag, "sensor_lag"), integrator(_gain(rate, "rate"))]),
-        ("valve", "level"),
-        ("%", "%"),
-        steady_state=(50.0, 30.0),
-        amplitude=10.0,
-        dead_time=dead_time, noise=noise, disturbance=disturbance,
-        disturbance_time=disturbance_time, resolution=resolution, dt=dt,
-        pre_step_time=pre_step_time, hold=hold,
-    )  # fmt: skip
+    return _plant("tank", **locals())
 
 
 def flow_loop(
@@ -219,65 +201,57 @@ def flow_loop(
     >>> print(f"{record.output[:100].mean():.0f} to {record.output[-100:].mean():.0f} m3/h")
     48 to 60 m3/h
     """
-    return _plant(
-        "flow loop",
-        chain([_lag(lag_time, "lag_time"), _lag(sensor_lag, "sensor_lag")], _gain(gain, "gain")),
-        ("valve", "flow"),
-        ("%", "m3/h"),
-        steady_state=(40.0, 48.0),
-        amplitude=10.0,
-        dead_time=dead_time, noise=noise, disturbance=disturbance,
-        disturbance_time=disturbance_time, resolution=resolution, dt=dt,
-        pre_step_time=pre_step_time, hold=hold,
-    )  # fmt: skip
+    return _plant("flow loop", **locals())
+
+
+@dataclass(frozen=True)
+class _Kind:
+    """What is measured, the steady state before a record, and the step from it."""
+
+    labels: tuple[str, str]
+    units: tuple[str, str]
+    steady_state: tuple[float, float]
+    amplitude: float
+
+
+_KINDS = {
+    "heater": _Kind(("power", "temperature"), ("%", "degC"), (20.0, 40.0), 30.0),
+    "tank": _Kind(("valve", "level"), ("%", "%"), (50.0, 30.0), 10.0),
+    "flow loop": _Kind(("valve", "flow"), ("%", "m3/h"), (40.0, 48.0), 10.0),
+}
 
 
 def _plant(
-    plant: str,
-    matrices: Core,
-    labels: tuple[str, str],
-    units: tuple[str, str],
+    name: str,
     *,
-    steady_state: tuple[float, float],
-    amplitude: float,
-    dead_time: float,
-    noise: float,
-    disturbance: float,
-    disturbance_time: float,
+    sensor_lag: float,
+    lag_time: float | None = None,
+    gain: float = 1.0,
+    rate: float | None = None,
     resolution: float | None,
-    dt: float,
-    pre_step_time: float,
-    hold: float,
+    **sizes: float,
 ) -> Plant:
-    """Check what all plants share."""
-    not_negative(dead_time, "dead_time", "dead time in s")
-    not_negative(noise, "noise", "standard deviation")
-    not_negative(disturbance, "disturbance", "standard deviation")
+    """Set up a plant of a lag, or an integrator of `rate`, and a sensor."""
+    for key, value in (("gain", gain), ("rate", 1.0 if rate is None else rate)):
+        if real(value, key, "a number") == 0:
+            raise OptionError(f"{key}={value!r}; expected a value other than 0")
+    lags = {"lag_time": lag_time, "sensor_lag": sensor_lag}
+    parts = [
+        lag(1 / (2 * np.pi * positive(value, key, "time constant in s")))
+        for key, value in lags.items()
+        if value is not None
+    ]
+    parts += [] if rate is None else [integrator(rate)]
+    for key in ("dead_time", "noise", "disturbance"):
+        not_negative(sizes[key], key, "time in s, or standard deviation")
+    for key in ("dt", "pre_step_time", "hold", "disturbance_time"):
+        positive(sizes[key], key, "time in s")
     if resolution is not None:
         positive(resolution, "resolution", "step in units of the output, or None")
-    step = positive(dt, "dt", "sample time in s")
-    truth = PlantTruth(matrices, float(dead_time), step, units, plant)
+    kind, numbers = _KINDS[name], {key: float(value) for key, value in sizes.items()}
+    dead_time = numbers.pop("dead_time")
     return Plant(
-        truth=truth,
-        dt=step,
-        pre_step_time=positive(pre_step_time, "pre_step_time", "time in s"),
-        hold=positive(hold, "hold", "time in s"),
-        steady_state=steady_state,
-        amplitude=amplitude,
-        input_range=(0.0, 100.0),
-        noise=float(noise),
-        disturbance=float(disturbance),
-        disturbance_time=positive(disturbance_time, "disturbance_time", "time in s"),
-        resolution=resolution,
-        labels=labels,
-    )
-
-
-def _lag(time_constant: float, name: str) -> Core:
-    return lag(1 / (2 * np.pi * positive(time_constant, name, "time constant in s")))
-
-
-def _gain(value: float, name: str) -> float:
-    if real(value, name, "a number") == 0:
-        raise OptionError(f"{name}={value!r}; expected a value other than 0")
-    return float(value)
+        truth=PlantTruth(chain(parts, gain), dead_time, numbers["dt"], kind.units, name),
+        labels=kind.labels, steady_state=kind.steady_state, amplitude=kind.amplitude,
+        input_range=(0.0, 100.0), resolution=resolution, **numbers,
+    )  # fmt: skip

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Literal
+from collections.abc import Callable, Sequence
+from typing import Any, Literal
 
 from .. import paper
 from .._checks import integer, not_negative, one_of, positive, real
@@ -123,66 +123,25 @@ def valve(
       dead time          28.906 ms = 37 samples
       total delay at DC  134.42 ms
     """
-    positive(dt, "dt", "sample time in s")
-    not_negative(dead_time, "dead_time", "dead time in s")
-    for value, argument in (
-        (noise, "noise"),
-        (input_noise, "input_noise"),
-        (spikes, "spikes"),
-        (hysteresis, "hysteresis"),
-        (hum, "hum"),
-        (dead_time_scatter, "dead_time_scatter"),
-    ):
-        not_negative(value, argument, "a fraction or a count")
-    real(drift, "drift", "fraction of the stroke per second")
-    positive(pre_step_time, "pre_step_time", "time in s")
-    positive(hold, "hold", "time in s")
-    if bits is not None:
-        integer(bits, "bits", 2, 32)
-    if slew_limit is not None:
-        positive(slew_limit, "slew_limit", "speed in strokes per second")
+    given = {name: _checked(name, value) for name, value in locals().items()}
     thin: list[Actuator] = [] if slew_limit is None else [SlewRateLimit(100.0 * slew_limit)]
     thin += [Backlash(100.0 * hysteresis)] if hysteresis else []
-    parts = (*thin, *actuators_of(actuator))
-    place = one_of(actuator_at, "actuator_at", ("stem", "input"))
-    if anti_aliasing is not None:
-        anti_aliasing = one_of(anti_aliasing, "anti_aliasing", ("linear-phase", "analog"))
+    parts = given["actuator"] = (*thin, *actuators_of(actuator))
     before = [
-        lag(paper.SETUP.converter_cutoff_hz),
-        lag(positive(lag_hz, "lag_hz", "frequency in Hz")),
-        second_order_lag(
-            positive(actuator_hz, "actuator_hz", "frequency in Hz"),
-            positive(damping, "damping", "damping ratio"),
-        ),
-    ]
+        lag(paper.SETUP.converter_cutoff_hz), lag(lag_hz), second_order_lag(actuator_hz, damping)
+    ]  # fmt: skip
     after = []
     if lvdt_hz is not None:
-        after.append(lag(positive(lvdt_hz, "lvdt_hz", "frequency in Hz")))
-    if anti_aliasing == "analog":
+        after.append(lag(lvdt_hz))
+    if given["anti_aliasing"] == "analog":
         after += butterworth(4, 1 / (2.56 * dt))
     gain = STROKE_MM / (paper.SETUP.current_range[1] - paper.SETUP.current_range[0])
     # An ideal sensor still needs a state; this one is faster than anything that is sampled.
     sensed = after or [lag(1e3 / dt)]
     whole_chain = chain(before + after, gain)
+    of_motion = ("dead_time", "lag_hz", "actuator_hz", "damping", "lvdt_hz")
     return Valve(
         truth=ValveTruth(matrices=whole_chain, dead_time=float(dead_time), dt=float(dt)),
-        dt=float(dt),
-        pre_step_time=float(pre_step_time),
-        hold=float(hold),
-        noise=float(noise),
-        input_noise=float(input_noise),
-        spikes=float(spikes),
-        bits=bits,
-        anti_aliasing=anti_aliasing,
-        drift=float(drift),
-        hum=float(hum),
-        slew_limit=slew_limit,
-        hysteresis=float(hysteresis),
-        actuator=parts,
-        actuator_at=place,
-        dead_time_scatter=float(dead_time_scatter),
-        scatter_shape=one_of(scatter_shape, "scatter_shape", ("normal", "exponential")),
-        sine_amplitude=positive(sine_amplitude, "sine_amplitude", "amplitude in mA"),
         _motion=Motion(
             whole=whole_chain,
             before=chain(before, gain),
@@ -191,9 +150,41 @@ def valve(
             closed=gain * paper.SETUP.current_range[0],
             stroke=STROKE_MM,
             actuator=parts,
-            place=place,
+            place=given["actuator_at"],
         ),
+        **{name: value for name, value in given.items() if name not in of_motion},
     )
+
+
+_FRACTION, _TIME, _FREQUENCY = "a fraction or a count", "time in s", "frequency in Hz"
+_CHECKS: dict[str, tuple[Callable[..., float], str]] = {
+    "dt": (positive, _TIME), "pre_step_time": (positive, _TIME), "hold": (positive, _TIME),
+    "dead_time": (not_negative, _TIME), "dead_time_scatter": (not_negative, _TIME),
+    "lag_hz": (positive, _FREQUENCY), "actuator_hz": (positive, _FREQUENCY),
+    "lvdt_hz": (positive, _FREQUENCY), "damping": (positive, "damping ratio"),
+    "noise": (not_negative, _FRACTION), "input_noise": (not_negative, _FRACTION),
+    "spikes": (not_negative, _FRACTION), "hysteresis": (not_negative, _FRACTION),
+    "hum": (not_negative, _FRACTION), "drift": (real, "fraction of the stroke per second"),
+    "slew_limit": (positive, "speed in strokes per second"),
+    "sine_amplitude": (positive, "amplitude in mA"),
+}  # fmt: skip
+_CHOICES = {
+    "anti_aliasing": ("linear-phase", "analog"), "actuator_at": ("stem", "input"),
+    "scatter_shape": ("normal", "exponential"),
+}  # fmt: skip
+_MAY_BE_NONE = ("lvdt_hz", "slew_limit", "bits", "anti_aliasing")
+
+
+def _checked(name: str, value: Any) -> Any:
+    """Check an argument of `valve`."""
+    if value is None and name in _MAY_BE_NONE:
+        return None
+    if name in _CHOICES:
+        return one_of(value, name, _CHOICES[name])
+    if name == "bits":
+        return integer(value, name, 2, 32)
+    check, what = _CHECKS.get(name, (None, ""))
+    return value if check is None else check(value, name, what)
 
 
 def paper_valve() -> Valve:
