@@ -7,10 +7,10 @@ from pathlib import Path
 from typing import Any
 
 from .._checks import one_of
-from ..errors import OptionError
 from ..io.atomic import write_text
 from .equations import program_of
 from .languages import c_header, c_source, python_class, structured_text
+from .names import ending
 
 
 def to_c(system: Any, path: str | os.PathLike[str], *, name: str | None = None) -> Path:
@@ -56,7 +56,7 @@ def to_c(system: Any, path: str | os.PathLike[str], *, name: str | None = None) 
     ...     print(written.name, written.with_suffix(".h").read_text().splitlines()[0])
     pi.c /* PID algorithm level, call every 0.5 s */
     """
-    target = _ending(path, ".c")
+    target = ending(path, ".c")
     program = program_of(system, name)
     header = target.with_suffix(".h")
     write_text(header, c_header(program))
@@ -89,7 +89,7 @@ def to_python(system: Any, path: str | os.PathLike[str], *, name: str | None = N
     >>> level().step(setpoint=1.0, measured=0.0)
     2.05
     """
-    target = _ending(path, ".py")
+    target = ending(path, ".py")
     write_text(target, python_class(program_of(system, name)))
     return target
 
@@ -140,11 +140,4 @@ def to_structured_text(
     one_of(real, "real", ("LREAL", "REAL"))
     target = Path(path)
     write_text(target, structured_text(program_of(system, name), real))
-    return target
-
-
-def _ending(path: str | os.PathLike[str], suffix: str) -> Path:
-    target = Path(path)
-    if target.suffix != suffix:
-        raise OptionError(f"path={str(target)!r}; expected a name that ends in {suffix}")
     return target

@@ -11,11 +11,11 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-from ..errors import MissingPackageError, OptionError
+from ..errors import MissingPackageError
 from ..io.atomic import replaced_when_complete
 from .equations import program_of
 from .languages import python_class
-from .names import one_line
+from .names import ending, one_line
 from .program import Program
 
 TEMPLATE = """
@@ -80,9 +80,7 @@ def to_fmu(system: Any, path: str | os.PathLike[str], *, name: str | None = None
     >>> cr.export.to_fmu(plant, "oven.fmu")  # doctest: +SKIP
     PosixPath('oven.fmu')
     """
-    target = Path(path)
-    if target.suffix != ".fmu":
-        raise OptionError(f"path={str(target)!r}; expected a name that ends in .fmu")
+    target = ending(path, ".fmu")
     program = program_of(system, name)
     try:
         builder = import_module("pythonfmu.builder")

@@ -3,14 +3,44 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
-from typing import Any
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
 
 from .names import plain
 from .program import If, Program, Statement, Variable, literal
 
 C_TYPES = {"real": "double", "integer": "long", "boolean": "int"}
 PYTHON_ZERO = {"real": "0.0", "integer": "0", "boolean": "False"}
+
+
+class _Syntax(NamedTuple):
+    """How a language writes conditions and assignments, and which of the names."""
+
+    condition: str
+    otherwise: str
+    end: list[str]
+    negation: str
+    assignment: str
+    names: Mapping[str, str]
+
+    def lines(self, statements: Sequence[Statement], depth: int = 0) -> list[str]:
+        """Write statements, indented by `depth`."""
+        lines = []
+        for each in statements:
+            if isinstance(each, If):
+                condition = (self.negation if each.negated else "") + self.named(each.condition)
+                lines += [self.condition.format(condition), *self.lines(each.then, 1)]
+                if each.otherwise:
+                    lines += [self.otherwise, *self.lines(each.otherwise, 1)]
+                lines += self.end
+            else:
+                both = self.named(each.target), self.named(each.expression)
+                lines.append(self.assignment.format(*both))
+        return [f"{'    ' * depth}{line}" for line in lines]
+
+    def named(self, text: str) -> str:
+        """Replace the names in an expression."""
+        return re.sub(r"\b[a-z_]\w*\b", lambda found: self.names.get(found[0], found[0]), text)
 
 
 def structured_text(program: Program, real: str = "LREAL") -> str:
@@ -30,15 +60,7 @@ def structured_text(program: Program, real: str = "LREAL") -> str:
             lines.append(f"    {each.name} : {kind}{start};{comment}")
         return [*lines, "END_VAR"]
 
-    def written(statement: Statement) -> list[str]:
-        if isinstance(statement, If):
-            condition = ("NOT " if statement.negated else "") + statement.condition
-            lines = [f"IF {condition} THEN", *_block(statement.then, written)]
-            if statement.otherwise:
-                lines += ["ELSE", *_block(statement.otherwise, written)]
-            return [*lines, "END_IF;"]
-        return [f"{statement.target} := {statement.expression.replace('true', 'TRUE')};"]
-
+    syntax = _Syntax("IF {} THEN", "ELSE", ["END_IF;"], "NOT ", "{} := {};", {"true": "TRUE"})
     lines = [f"(* {plain(line)} *)" for line in program.words]
     lines.append(f"FUNCTION_BLOCK {program.name}")
     lines += declared("VAR_INPUT", program.inputs)
@@ -46,7 +68,7 @@ def structured_text(program: Program, real: str = "LREAL") -> str:
     lines += declared("VAR CONSTANT", program.constants, values=True)
     lines += declared("VAR", program.states)
     lines += declared("VAR", program.scratch)
-    lines += ["", *[line for each in program.body for line in written(each)]]
+    lines += ["", *syntax.lines(program.body)]
     return "\n".join([*lines, "END_FUNCTION_BLOCK", ""])
 
 
@@ -68,30 +90,11 @@ def c_header(program: Program) -> str:
 
 def c_source(program: Program, header: str) -> str:
     """Definitions for C (C89); `header` is the name of the file of the declarations."""
-    state = {each.name for each in program.states}
     several = {each.name for each in program.outputs} if len(program.outputs) > 1 else set()
     upper = {each.name: each.name.upper() for each in program.constants}
-
-    def places(text: str) -> str:
-        def place(found: re.Match[str]) -> str:
-            word = found.group()
-            if word == "true":
-                return "1"
-            if word in state:
-                return f"s->{word}"
-            return f"(*{word})" if word in several else upper.get(word, word)
-
-        return re.sub(r"\b[a-z_]\w*\b", place, text)
-
-    def written(statement: Statement) -> list[str]:
-        if isinstance(statement, If):
-            condition = ("!" if statement.negated else "") + places(statement.condition)
-            lines = [f"if ({condition}) {{", *_block(statement.then, written)]
-            if statement.otherwise:
-                lines += ["} else {", *_block(statement.otherwise, written)]
-            return [*lines, "}"]
-        return [f"{places(statement.target)} = {places(statement.expression)};"]
-
+    names = upper | {name: f"(*{name})" for name in several}
+    names |= {each.name: f"s->{each.name}" for each in program.states} | {"true": "1"}
+    syntax = _Syntax("if ({}) {{", "} else {", ["}"], "!", "{} = {};", names)
     lines = [f"/* {plain(line)} */" for line in program.words]
     lines += ["#include <string.h>", f'#include "{header}"', ""]
     for each in program.constants:
@@ -101,7 +104,7 @@ def c_source(program: Program, header: str) -> str:
     lines += ["    memset(s, 0, sizeof *s);", "}", "", _c_signature(program), "{"]
     local = [*program.scratch, *(program.outputs if not several else ())]
     lines += [f"    {C_TYPES[each.kind]} {each.name};" for each in local]
-    lines += ["", *_block(program.body, written)]
+    lines += ["", *syntax.lines(program.body, 1)]
     if not program.states:
         lines.append("    (void)s;")
     if not several:
@@ -120,26 +123,8 @@ def _c_signature(program: Program) -> str:
 
 def python_class(program: Program) -> str:
     """Class in plain Python, without further packages."""
-    own = {each.name for each in (*program.states, *program.constants)}
-
-    def places(text: str) -> str:
-        def place(found: re.Match[str]) -> str:
-            word = found.group()
-            if word == "true":
-                return "True"
-            return f"self.{word}" if word in own else word
-
-        return re.sub(r"\b[a-z_]\w*\b", place, text)
-
-    def written(statement: Statement) -> list[str]:
-        if isinstance(statement, If):
-            condition = ("not " if statement.negated else "") + places(statement.condition)
-            lines = [f"if {condition}:", *_block(statement.then, written)]
-            if statement.otherwise:
-                lines += ["else:", *_block(statement.otherwise, written)]
-            return lines
-        return [f"{places(statement.target)} = {places(statement.expression)}"]
-
+    own = {each.name: f"self.{each.name}" for each in (*program.states, *program.constants)}
+    syntax = _Syntax("if {}:", "else:", [], "not ", "{} = {}", own | {"true": "True"})
     lines = [f'"""{plain(program.words[0])}."""', "", "", f"class {program.name}:"]
     lines += [f'    """{plain(program.words[0])}.', ""]
     lines += [f"    {plain(line)}" for line in program.words[1:]]
@@ -158,18 +143,6 @@ def python_class(program: Program) -> str:
     ]
     lines += ["", f"    def step(self, {', '.join(given)}):"]
     lines += [f'        """Return {", ".join(each.name for each in program.outputs)}."""']
-    lines += _block(_block_lines(program.body, written), lambda line: [line], 2)
+    lines += syntax.lines(program.body, 2)
     lines.append(f"        return {', '.join(each.name for each in program.outputs)}")
     return "\n".join([*lines, ""])
-
-
-def _block_lines(
-    statements: tuple[Statement, ...], written: Callable[[Statement], list[str]]
-) -> tuple[str, ...]:
-    return tuple(line for each in statements for line in written(each))
-
-
-def _block(
-    statements: tuple[Any, ...], written: Callable[[Any], list[str]], depth: int = 1
-) -> list[str]:
-    return [f"{'    ' * depth}{line}" for each in statements for line in written(each)]

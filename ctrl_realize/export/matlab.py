@@ -12,9 +12,9 @@ import numpy as np
 from .._checks import one_of
 from ..delayed import DelayedStateSpace, DelaySystem
 from ..design import ContinuousModel, PIDAlgorithm, PIDController, ProcessModel, to_continuous
-from ..errors import OptionError, UnsuitableSystemError
+from ..errors import UnsuitableSystemError
 from ..io.atomic import write_text
-from .names import identifier, one_line
+from .names import ending, identifier, one_line
 
 CALLED = ("ss", "tf", "pid", "pid2", "zeros", "setDelayModel", "Inf")
 """Functions that the scripts call: a variable of that name hides them when a script runs again."""
@@ -74,9 +74,7 @@ def to_matlab(
     oven = tf(2, [40 1], 'InputDelay', 6);
     <BLANKLINE>
     """
-    target = Path(path)
-    if target.suffix != ".m":
-        raise OptionError(f"path={str(target)!r}; expected a name that ends in .m")
+    target = ending(path, ".m")
     if continuous and isinstance(system, DelayedStateSpace):
         system = to_continuous(system)
     elif continuous:

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import keyword
+import os
 import re
 import unicodedata
 from collections.abc import Container
+from pathlib import Path
 
 from ..errors import OptionError
 
@@ -109,3 +111,11 @@ def plain(text: str) -> str:
     'first ? second ? third'
     """
     return re.sub(r"\*\)|\*/|/\*|\(\*|\"\"\"|\\", "?", one_line(text))
+
+
+def ending(path: str | os.PathLike[str], suffix: str) -> Path:
+    """Path of a file whose name ends in a suffix."""
+    target = Path(path)
+    if target.suffix != suffix:
+        raise OptionError(f"path={str(target)!r}; expected a name that ends in {suffix}")
+    return target

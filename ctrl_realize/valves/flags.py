@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from ..numerics.constants import Z_95
@@ -20,37 +22,30 @@ def flags_of(
     steps: tuple[StepMetrics, ...],
     groups: tuple[SizeAndDirection, ...],
     parts: tuple[tuple[TestPart, ...], ...],
-) -> list[Flag]:
+) -> Iterator[Flag]:
     """List the flags of a test."""  # fmt: skip
-    flags = []
     if not steps and all(part.kind != "ramp" for own in parts for part in own):
-        flags.append(
-            Flag(
-                "no_valve_test",
-                "the command holds no level between its changes, and is no slow ramp: these are "
-                "records of operation; valve_test_plan writes a test, and diagnose_loop tells "
-                "whether the valve makes a loop oscillate",
-            )
+        yield Flag(
+            "no_valve_test",
+            "the command holds no level between its changes, and is no slow ramp: these are "
+            "records of operation; valve_test_plan writes a test, and diagnose_loop tells "
+            "whether the valve makes a loop oscillate",
         )
     still = [one for one in steps if not one.moved]
     if still:
         sizes = sorted({round(abs(one.size), 2) for one in still})
-        flags.append(
-            Flag(
-                "did_not_move",
-                f"the position did not follow {len(still)} of {len(steps)} steps (sizes "
-                f"{', '.join(f'{one:g}' for one in sizes[:6])} %): resolution or dead band is of "
-                "this size, or the noise hides it",
-            )
+        yield Flag(
+            "did_not_move",
+            f"the position did not follow {len(still)} of {len(steps)} steps (sizes "
+            f"{', '.join(f'{one:g}' for one in sizes[:6])} %): resolution or dead band is of "
+            "this size, or the noise hides it",
         )
     unsettled = [one for one in steps if one.moved and not one.settled]
     if unsettled:
-        flags.append(
-            Flag(
-                "not_settled",
-                f"{len(unsettled)} of {len(steps)} responses had not settled when the next step "
-                "came: only their dead time is used; hold longer",
-            )
+        yield Flag(
+            "not_settled",
+            f"{len(unsettled)} of {len(steps)} responses had not settled when the next step "
+            "came: only their dead time is used; hold longer",
         )
     known = [one for one in groups if one.estimates["dead_time"].is_known and not one.stroke]
     if len(known) > 1:
@@ -61,12 +56,9 @@ def flags_of(
         chance = homogeneity(times, errors)[1]
         late, early = known[int(np.argmax(times))], known[int(np.argmin(times))]
         if chance < _BY_CHANCE and times.max() > _LATER * times.min():
-            flags.append(
-                Flag(
-                    "dead_time_varies",
-                    f"the dead time depends on the step: {times.max():.3g} s for {late.size:.3g} % "
-                    f"{late.direction}, {times.min():.3g} s for {early.size:.3g} % "
-                    f"{early.direction} (p = {chance:.1g}): friction, play, or a rate limit",
-                )
+            yield Flag(
+                "dead_time_varies",
+                f"the dead time depends on the step: {times.max():.3g} s for {late.size:.3g} % "
+                f"{late.direction}, {times.min():.3g} s for {early.size:.3g} % "
+                f"{early.direction} (p = {chance:.1g}): friction, play, or a rate limit",
             )
-    return flags

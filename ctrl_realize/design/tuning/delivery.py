@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Self
 from ..._checks import positive
 from ...errors import OptionError
 from .algorithm import INF, PIDAlgorithm
-from .entered import from_form
+from .entered import Scaling, from_form
 from .forms import PIDForm, to_form
 from .layouts import LAYOUTS
 
@@ -89,9 +89,7 @@ class Delivered:
         return to_form(
             self.ideal,
             form,
-            measured_range=measured_range,
-            output_range=output_range,
-            time_unit=time_unit,
+            Scaling(measured_range, output_range, time_unit),
             gain_unit=self.gain_unit,
             weights=None if setpoint_weight is None else (setpoint_weight, derivative_weight),
         )
@@ -148,13 +146,8 @@ class Delivered:
         >>> cr.design.PIDController.from_form("rockwell_pide_dependent", values)
         <PIDController 'PI': kp = 2, ti = 90 s, continuous>
         """
-        kp, ti, td, tf = from_form(
-            form,
-            values,
-            measured_range=measured_range,
-            output_range=output_range,
-            time_unit=time_unit,
-        )
+        scaling = Scaling(measured_range, output_range, time_unit)
+        kp, ti, td, tf = from_form(form, values, scaling)
         ratio = positive(derivative_filter, "derivative_filter", "td / tf")
         return cls(kp, ti, td, tf or td / ratio, **settings)
 

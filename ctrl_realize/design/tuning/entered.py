@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 
 from ..._checks import band, one_of, real
 from ..._parameters import SECONDS, checked_time_unit
@@ -13,16 +14,30 @@ from .structures import INF, Ideal, ideal_of_series
 PERCENT = (0.0, 100.0)
 
 
-def from_form(
-    form: str,
-    values: Mapping[str, float],
-    *,
-    measured_range: tuple[float, float] | None = None,
-    output_range: tuple[float, float] | None = None,
-    time_unit: str | None = None,
-) -> Ideal:
+@dataclass(frozen=True)
+class Scaling:
+    """Ranges and unit of time that the parameters of a form refer to, as given."""
+
+    measured_range: tuple[float, float] | None = None
+    output_range: tuple[float, float] | None = None
+    time_unit: str | None = None
+
+    def of(self, form: str) -> tuple[Layout, float, str]:
+        """Layout of a form, factor of the gain and unit of time."""
+        layout = LAYOUTS[one_of(form, "form", tuple(LAYOUTS))]
+        given = self.time_unit
+        if given is not None and layout.unit is not None and given != layout.unit:
+            raise OptionError(f"time_unit={given!r}; form={form!r} has its times in {layout.unit}")
+        unit = checked_time_unit(given or layout.unit or "s")
+        measured = _span(self.measured_range, "measured_range")
+        output = _span(self.output_range, "output_range")
+        scale = {"none": 1.0, "output": 100 / output, "both": measured / output}[layout.percent]
+        return layout, scale, unit
+
+
+def from_form(form: str, values: Mapping[str, float], scaling: Scaling) -> Ideal:
     """Parameters of the ideal form from those of another; see `PIDController.from_form`."""
-    layout, scale, unit = setting(form, measured_range, output_range, time_unit)
+    layout, scale, unit = scaling.of(form)
     labels = labels_of(layout)
     unknown = sorted(set(values) - {*labels, *layout.weights})
     if unknown or layout.gain not in values:
@@ -69,23 +84,6 @@ def _filter(layout: Layout, number: Mapping[str, float], td: float, seconds: flo
         return layout.filter_ratio * td
     given = number.get(layout.filter_label or "", 0.0)
     return given * (seconds if layout.filter_kind == "time" else td)
-
-
-def setting(
-    form: str,
-    measured_range: tuple[float, float] | None,
-    output_range: tuple[float, float] | None,
-    time_unit: str | None,
-) -> tuple[Layout, float, str]:
-    """Layout, factor of the gain and unit of time."""
-    layout = LAYOUTS[one_of(form, "form", tuple(LAYOUTS))]
-    if time_unit is not None and layout.unit is not None and time_unit != layout.unit:
-        raise OptionError(f"time_unit={time_unit!r}; form={form!r} has its times in {layout.unit}")
-    unit = checked_time_unit(time_unit or layout.unit or "s")
-    measured = _span(measured_range, "measured_range")
-    output = _span(output_range, "output_range")
-    scale = {"none": 1.0, "output": 100 / output, "both": measured / output}[layout.percent]
-    return layout, scale, unit
 
 
 def _span(given: tuple[float, float] | None, name: str) -> float:

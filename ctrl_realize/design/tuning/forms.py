@@ -11,7 +11,7 @@ from ..._parameters import SECONDS, slope_unit
 from ..._wording import in_digits
 from ...errors import OptionError
 from ...results import Result
-from .entered import PERCENT, from_form, labels_of, setting
+from .entered import PERCENT, Scaling, from_form, labels_of
 from .layouts import LAYOUTS, Layout
 from .structures import INF, Ideal, structured
 
@@ -156,30 +156,23 @@ def pid_forms() -> pd.DataFrame:
 def to_form(
     ideal: Ideal,
     form: str,
+    scaling: Scaling,
     *,
-    measured_range: tuple[float, float] | None = None,
-    output_range: tuple[float, float] | None = None,
-    time_unit: str | None = None,
     gain_unit: str = "",
     weights: tuple[float, float] | None = None,
 ) -> PIDForm:
     """Write the parameters of the ideal form in another form; see `PIDController.as_form`."""
-    layout, scale, unit = setting(form, measured_range, output_range, time_unit)
+    layout, scale, unit = scaling.of(form)
     *_, td, tf = ideal
     if td and not layout.derivative_allowed:
         raise OptionError(
             f"form={form!r} is known for P and PI only, since no description of its derivative "
             f"was available; got td={td:g} s. Tune a PI controller: design.pid(sys, kind='PI')"
         )
-    physical = layout.percent == "none" or (layout.percent == "output" and output_range is None)
+    whole = scaling.output_range is None
+    physical = layout.percent == "none" or (layout.percent == "output" and whole)
     shown = _shown(ideal, layout, scale, unit, gain_unit if physical else "")
-    typed = from_form(
-        form,
-        {each.name: each.value for each in shown},
-        measured_range=measured_range,
-        output_range=output_range,
-        time_unit=time_unit,
-    )
+    typed = from_form(form, {each.name: each.value for each in shown}, scaling)
     reverse = ideal[0] < 0 and not layout.signed
     if reverse:
         typed = (-typed[0], *typed[1:])
@@ -195,7 +188,7 @@ def to_form(
         typed,
         layout.source,
         _notes(layout, ideal, typed, weights),
-        (*_ranges(layout, measured_range, output_range), f"source: {layout.source}"),
+        (*_ranges(layout, scaling), f"source: {layout.source}"),
     )
 
 
@@ -247,15 +240,11 @@ def _notes(
     return tuple(notes)
 
 
-def _ranges(
-    layout: Layout,
-    measured_range: tuple[float, float] | None,
-    output_range: tuple[float, float] | None,
-) -> list[str]:
+def _ranges(layout: Layout, scaling: Scaling) -> list[str]:
     """Ranges that the gain refers to."""
-    low, high = output_range or PERCENT
+    low, high = scaling.output_range or PERCENT
     if layout.percent == "both":
-        bottom, top = measured_range or PERCENT
+        bottom, top = scaling.measured_range or PERCENT
         return [
             f"gain in percent of range: measured value {bottom:g}...{top:g}, output "
             f"{low:g}...{high:g}"

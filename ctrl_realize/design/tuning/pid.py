@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import numpy as np
@@ -140,9 +140,8 @@ def pid(
     >>> controller.check.margins
     <Margins stable: gain 3.142, phase 61.35 deg, modulus 0.6287, delay 0.06211 s>
     """
-    options = TuningOptions(
-        closed_loop_time, max_sensitivity, derivative_filter, reduction, method, dt, name
-    )
+    given = locals()
+    options = TuningOptions(**{one.name: given[one.name] for one in fields(TuningOptions)})
     made, plant = tuned(system, rule, kind, options)
     check = loop_check(plant, made)
     if not check.stable or check.flags:

@@ -54,9 +54,13 @@ class PIDComparison(Result):
     """
 
     controllers: tuple[PIDController, ...]
-    margins: tuple[Margins, ...]
     performance: tuple[Performance, ...]
     refused: tuple[tuple[str, str, str], ...] = ()
+
+    @property
+    def margins(self) -> tuple[Margins, ...]:
+        """Margins of the loops."""
+        return tuple(c.check.margins for c in self.controllers if c.check is not None)
 
     def table(self) -> pd.DataFrame:
         """One row for each controller; times in s, phase margin in degrees."""
@@ -199,7 +203,7 @@ def compare_pid(
     settings = TuningOptions(**options)
     plant, _, _ = reference_plant(system, settings.dt)
     total = _span(system, plant)
-    made: list[tuple[PIDController, Margins, Performance]] = []
+    made: list[tuple[PIDController, Performance]] = []
     refused: list[tuple[str, str, str]] = []
     for rule in tried:
         for kind in kinds:
@@ -217,12 +221,12 @@ def compare_pid(
             sampled = controller if controller.dt else controller.discretised(plant.dt)
             check = loop_check(exact, controller)
             reached = _performance(plant, sampled, total) if check.stable else UNSTABLE
-            made.append((controller.checked(check), check.margins, reached))
+            made.append((controller.checked(check), reached))
     if not made:
         reasons = "; ".join(f"{kind} {rule}: {why}" for rule, kind, why in refused)
         raise OptionError(f"no rule could tune this plant: {reasons or 'none has these kinds'}")
-    controllers, found_margins, found_performance = zip(*made, strict=True)
-    return PIDComparison(controllers, found_margins, found_performance, tuple(refused))
+    controllers, performance = zip(*made, strict=True)
+    return PIDComparison(controllers, performance, tuple(refused))
 
 
 def _performance(plant: DelayedStateSpace, controller: Any, total: float) -> Performance:

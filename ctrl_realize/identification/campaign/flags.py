@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Iterator
 
 import numpy as np
 
@@ -20,24 +21,23 @@ _SAME_HEIGHT = 1e-6  # relative difference up to which heights count as equal
 
 def campaign_flags(rows: Rows, good: Rows, failed: Rows, method: str) -> tuple[Flag, ...]:
     """List the flags of a campaign: of all its rows, of those identified, and of those not."""
-    found = (
-        _failed(rows, failed),
+    return (
+        *_failed(rows, failed),
         *_different_gains(good),
         *_different_times(good),
-        _same_records(good),
-        _amplitude_trend(good, method),
+        *_same_records(good),
+        *_amplitude_trend(good, method),
     )
-    return tuple(flag for flag in found if flag is not None)
 
 
-def _different_gains(rows: Rows) -> list[Flag]:
+def _different_gains(rows: Rows) -> Iterator[Flag]:
     """Test whether all records have the same gain, by chi-square if the errors are known."""
     gains = np.array([row.gain for row in rows])
     errors = np.array([row.gain_std for row in rows])
     known = np.isfinite(gains)
     gains, errors = gains[known], errors[known]
     if gains.size < 2 or not np.median(gains):
-        return []
+        return
     ratios = gains / float(np.median(gains))
     apart = float(np.max(np.abs(ratios - 1)))
     statistic, chance = homogeneity(gains, errors)
@@ -46,31 +46,23 @@ def _different_gains(rows: Rows) -> list[Flag]:
     if not np.isfinite(errors).any():
         # The error of a gain from a scan is unknown; noise causes a few percent.
         differ, statistics = apart > NO_COMMON_GAIN, "their errors are unknown"
-    if not differ:
-        return []
-    flags = [
-        Flag(
+    if differ and apart > NO_COMMON_GAIN:
+        yield Flag(
+            "no_common_gain",
+            f"no single gain fits all records: the gains are {gains.min():.3g} to "
+            f"{gains.max():.3g}; identify(records, gains='own') fits one for each, with "
+            "common dynamics",
+        )
+    if differ:
+        yield Flag(
             "gains_differ",
             f"the gains of the records differ, {gains.min():.3g} to {gains.max():.3g} "
             f"({statistics}): the plant is nonlinear, or has changed between the records",
         )
-    ]
-    if apart > NO_COMMON_GAIN:
-        flags.insert(
-            0,
-            Flag(
-                "no_common_gain",
-                f"no single gain fits all records: the gains are {gains.min():.3g} to "
-                f"{gains.max():.3g}; identify(records, gains='own') fits one for each, with "
-                "common dynamics",
-            ),
-        )
-    return flags
 
 
-def _different_times(rows: Rows) -> list[Flag]:
+def _different_times(rows: Rows) -> Iterator[Flag]:
     """Test dead times and total delays for equality, by chi-square about their weighted means."""
-    flags = []
     dead_times = [(row.dead_time, *row.interval) for row in rows]
     totals = [(row.total_delay, *row.total_delay_interval) for row in rows]
     for code, what, times in (
@@ -85,31 +77,28 @@ def _different_times(rows: Rows) -> list[Flag]:
         statistic, chance = homogeneity(values, errors)
         known = values[np.isfinite(errors)]
         if chance < BY_CHANCE and np.ptp(known) > time_apart(float(np.median(known)), rows[0].dt):
-            flags.append(
-                Flag(
-                    code,
-                    f"the {what} differs between records by more than the intervals allow, "
-                    f"{in_time(values.min())} to {in_time(values.max())} (chi-square "
-                    f"{statistic:.3g}, p = {chance:.2g}): trigger jitter, friction, or a "
-                    "plant that is nonlinear or has changed",
-                )
+            yield Flag(
+                code,
+                f"the {what} differs between records by more than the intervals allow, "
+                f"{in_time(values.min())} to {in_time(values.max())} (chi-square "
+                f"{statistic:.3g}, p = {chance:.2g}): trigger jitter, friction, or a "
+                "plant that is nonlinear or has changed",
             )
-    return flags
 
 
-def _failed(rows: Rows, failed: Rows) -> Flag | None:
+def _failed(rows: Rows, failed: Rows) -> Iterator[Flag]:
     if not failed:
-        return None
+        return
     names = ", ".join(row.name for row in failed[:5])
     more = "" if len(failed) <= 5 else f" and {len(failed) - 5} more"
-    return Flag(
+    yield Flag(
         "failed_records",
         f"{len(failed)} of {len(rows)} records failed: {names}{more}; see the table for the "
         "reasons",
     )
 
 
-def _same_records(rows: Rows) -> Flag | None:
+def _same_records(rows: Rows) -> Iterator[Flag]:
     """Find records whose results agree in every digit, which noise excludes."""
     alike: dict[tuple[float, ...], list[str]] = {}
     for row in rows:
@@ -117,18 +106,18 @@ def _same_records(rows: Rows) -> Flag | None:
         alike.setdefault(results, []).append(row.name)
     twice = [names for names in alike.values() if len(names) > 1]
     if not twice:
-        return None
+        return
     extra = sum(len(names) - 1 for names in twice)
     names = ", ".join(twice[0][:4]) + (", ..." if len(twice[0]) > 4 else "")
     more = "" if len(twice) == 1 else f" (and {len(twice) - 1} more such groups)"
-    return Flag(
+    yield Flag(
         "same_records",
         f"{extra} of {len(rows)} records are duplicates: {names} have the same results to the "
         f"last digit{more}; the scatter and its interval are too small",
     )
 
 
-def _amplitude_trend(rows: Rows, method: str) -> Flag | None:
+def _amplitude_trend(rows: Rows, method: str) -> Iterator[Flag]:
     """Test whether the delay depends on the height of the step, by rank correlation."""
     from scipy.stats import pearsonr, spearmanr  # scipy.stats takes a while to import
 
@@ -141,7 +130,7 @@ def _amplitude_trend(rows: Rows, method: str) -> Flag | None:
     known = np.isfinite(heights) & np.isfinite(delays)
     heights, delays = heights[known], delays[known]
     if heights.size < 8 or np.ptp(heights) <= _SAME_HEIGHT * heights.max() or np.ptp(delays) == 0:
-        return None
+        return
     correlation, chance = spearmanr(heights, delays)
     if heights.size < 10:
         # So few ranks may be in order by chance (1 in 35 campaigns of four and four records, where
@@ -150,7 +139,7 @@ def _amplitude_trend(rows: Rows, method: str) -> Flag | None:
     # 1 %: one false alarm in a hundred campaigns of a linear plant.
     trend = abs(np.polyfit(heights, delays, 1)[0]) * np.ptp(heights)
     if not chance < 0.01 or trend <= time_apart(float(np.median(delays)), 1.0) / 2:
-        return None
+        return
     way = "longer" if correlation > 0 else "shorter"
     # Noise is larger relative to a smaller step: the bias of a scan grows, and a fit misses fast
     # lags.
@@ -162,7 +151,7 @@ def _amplitude_trend(rows: Rows, method: str) -> Flag | None:
         )
     elif len({row.order for row in rows if np.isfinite(row.delay)}) > 1:
         doubt = "; or a lag that only large steps show above the noise, since the orders differ"
-    return Flag(
+    yield Flag(
         "amplitude_trend",
         f"the delay is {way} for larger steps (rank correlation {correlation:.2f}, p = "
         f"{chance:.1g}): friction, a rate limit or another nonlinearity; no single linear "

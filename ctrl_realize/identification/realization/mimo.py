@@ -24,8 +24,7 @@ from .mimo_cores import (
     RealizationOptions,
     aligned_core,
     channel_iae,
-    cores_by_columns,
-    cores_by_rows,
+    cores_one_by_one,
 )
 from .realize import HANKEL
 
@@ -271,9 +270,9 @@ def realize_mimo(
         candidates = [aligned_core(data, count, *split, options) for split in splits]
         models["common"] = min(candidates, key=lambda c: float(channel_iae(c, data).sum()))
     if choice in ("rows", "auto"):
-        models["rows"] = cores_by_rows(data, count, found, options)
+        models["rows"] = cores_one_by_one(data, count, found, options, 0)
     if choice in ("columns", "auto"):
-        models["columns"] = cores_by_columns(data, count, found, options)
+        models["columns"] = cores_one_by_one(data, count, found, options, 1)
     errors = {way: channel_iae(pieces, data) for way, pieces in models.items()}
     # The fewest states among those that explain the data about as well as the best.
     enough = max(ALIKE * min(m.sum() for m in errors.values()), EXACT * len(markov))

@@ -119,44 +119,23 @@ def aligned_core(
     return Assembly(core, before, behind, (core[0].shape[0],), flags)
 
 
-def cores_by_rows(
-    data: ImpulseResponse,
-    order: int,
-    found: IntArray,
-    options: RealizationOptions,
+def cores_one_by_one(
+    data: ImpulseResponse, order: int, found: IntArray, options: RealizationOptions, axis: int
 ) -> Assembly:
-    """Realize every output separately, with tapped input delay lines."""
+    """Realize every output (`axis` 0) or input (1) separately, with tapped delay lines."""
     markov = channels(data)
-    first, full = _first_taps(found, axis=0)
-    rows = [_aligned(markov[[i]], full[[i]]) for i in range(full.shape[0])]
-    parts, flags = _each_alone(data, rows, order, options)
-    return Assembly(
-        joined_rows(parts, full - first),
-        tuple(int(d) for d in first),
-        (0,) * full.shape[0],
-        tuple(part[0].shape[0] for part in parts),
-        flags,
-    )
-
-
-def cores_by_columns(
-    data: ImpulseResponse,
-    order: int,
-    found: IntArray,
-    options: RealizationOptions,
-) -> Assembly:
-    """Realize every input separately, with tapped output delay lines."""
-    markov = channels(data)
-    first, full = _first_taps(found, axis=1)
-    columns = [_aligned(markov[:, [j]], full[:, [j]]) for j in range(full.shape[1])]
-    parts, flags = _each_alone(data, columns, order, options)
-    return Assembly(
-        joined_columns(parts, full - first[:, None]),
-        (0,) * full.shape[1],
-        tuple(int(d) for d in first),
-        tuple(part[0].shape[0] for part in parts),
-        flags,
-    )
+    first, full = _first_taps(found, axis)
+    count = full.shape[axis]
+    aligned = [_aligned(markov.take([k], axis), full.take([k], axis)) for k in range(count)]
+    realized = [_realized(data, part, order, options) for part in aligned]
+    parts = [core for core, _ in realized]
+    join = joined_columns if axis else joined_rows
+    core = join(parts, full - np.expand_dims(first, axis))
+    taps, none = tuple(int(d) for d in first), (0,) * count
+    flags = {flag.code: flag for _, notes in realized for flag in notes}  # one of each kind
+    inputs, outputs = (none, taps) if axis else (taps, none)
+    orders = tuple(part[0].shape[0] for part in parts)
+    return Assembly(core, inputs, outputs, orders, tuple(flags.values()))
 
 
 def _first_taps(found: IntArray, axis: int) -> tuple[IntArray, IntArray]:
@@ -168,12 +147,3 @@ def _first_taps(found: IntArray, axis: int) -> tuple[IntArray, IntArray]:
     first = np.where(known, found, found.max() + 1).min(axis=axis)
     first = np.where(known.any(axis=axis), first, 0)
     return first, np.where(known, found, np.expand_dims(first, axis))
-
-
-def _each_alone(
-    data: ImpulseResponse, aligned: list[FloatArray], order: int, options: RealizationOptions
-) -> tuple[list[Matrices], tuple[Flag, ...]]:
-    """Realize rows or columns of the channels; keep one flag of each kind."""
-    realized = [_realized(data, part, order, options) for part in aligned]
-    flags = {flag.code: flag for _, notes in realized for flag in notes}
-    return [core for core, _ in realized], tuple(flags.values())

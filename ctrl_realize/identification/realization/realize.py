@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import control as ct
 import numpy as np
 from numpy.typing import ArrayLike
@@ -135,7 +137,11 @@ def realize(
         error_bound=model.rest_bound if padded else None,
         iae=_iae(markov[:, :, : delay + samples + 1], model, D, delay),
         impulse=data,
-        flags=filter_flags(data) + _pole_flags(model.A, samples) + _gap_flags(model, order),
+        flags=(
+            *filter_flags(data),
+            *_pole_flags(model.A, samples),
+            *_gap_flags(model, order),
+        ),
     )
     core = ct.ss(model.A, model.B, model.C, D, data.dt)
     return DelayedStateSpace(core, delay, fit=fit)
@@ -161,49 +167,39 @@ def _iae(window: FloatArray, model: OneModel, D: FloatArray, delay: int) -> floa
     return iae if np.isfinite(iae) else np.inf
 
 
-def _pole_flags(A: FloatArray, samples: int) -> tuple[Flag, ...]:
+def _pole_flags(A: FloatArray, samples: int) -> Iterator[Flag]:
     poles = np.linalg.eigvals(A)
-    flags = []
     largest = float(np.abs(poles).max())
     if largest >= 1:
-        flags.append(
-            Flag(
-                "unstable",
-                f"the largest pole has magnitude {largest:.5f}: the plant integrates, the "
-                "data are noisy, or the order is too high; hankel='padded' gives a stable "
-                "model by construction",
-            )
+        yield Flag(
+            "unstable",
+            f"the largest pole has magnitude {largest:.5f}: the plant integrates, the "
+            "data are noisy, or the order is too high; hankel='padded' gives a stable "
+            "model by construction",
         )
     elif largest**samples > DIED_AWAY:
-        flags.append(
-            Flag(
-                "not_died_away",
-                f"the largest pole has magnitude {largest:.5f} and keeps "
-                f"{100 * largest**samples:.0f} % of its response at the end of the {samples} "
-                "samples: the plant integrates, or the data end too early to determine the "
-                "gain",
-            )
+        yield Flag(
+            "not_died_away",
+            f"the largest pole has magnitude {largest:.5f} and keeps "
+            f"{100 * largest**samples:.0f} % of its response at the end of the {samples} "
+            "samples: the plant integrates, or the data end too early to determine the "
+            "gain",
         )
     negative = poles[(np.abs(poles.imag) < 1e-9) & (poles.real < 0)].real
     if negative.size:
-        flags.append(
-            Flag(
-                "negative_pole",
-                f"there is a pole at z = {negative.min():.4f}, which no sampled first-order "
-                "lag has: the order is probably too high",
-            )
+        yield Flag(
+            "negative_pole",
+            f"there is a pole at z = {negative.min():.4f}, which no sampled first-order "
+            "lag has: the order is probably too high",
         )
-    return tuple(flags)
 
 
-def _gap_flags(model: OneModel, order: int) -> tuple[Flag, ...]:
+def _gap_flags(model: OneModel, order: int) -> Iterator[Flag]:
     last = float(model.singular_values[order - 1])
     if model.following < NO_GAP * last:
-        return ()
-    return (
-        Flag(
-            "no_gap",
-            f"singular values {order} and {order + 1} are {last:.4g} and "
-            f"{model.following:.4g}: without a gap between them the data do not show the order",
-        ),
+        return
+    yield Flag(
+        "no_gap",
+        f"singular values {order} and {order + 1} are {last:.4g} and "
+        f"{model.following:.4g}: without a gap between them the data do not show the order",
     )

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from ...numerics.arrays import FloatArray
@@ -41,55 +43,44 @@ def local_minima(iae: FloatArray, delay: int, rounding: float) -> int:
     return int(np.count_nonzero(inside[1:] & ~inside[:-1]))
 
 
-def curve_flags(iae: FloatArray, delay: int, rounding: float) -> tuple[Flag, ...]:
+def curve_flags(iae: FloatArray, delay: int, rounding: float) -> Iterator[Flag]:
     """List the flags that follow from the curve itself."""
-    flags = []
     last = iae.size - 1
     least = float(iae[delay])
     contrast = float(iae[0]) / least if least > 0 else np.inf
     low, high = flat_set(iae, delay, rounding)
     if high == last and last > 0:
         best = "the best delay is" if delay == last else "delays that fit equally well reach up to"
-        flags.append(Flag("delay_at_bound", f"{best} max_delay={last}; try a larger one"))
+        yield Flag("delay_at_bound", f"{best} max_delay={last}; try a larger one")
     if contrast < CONTRAST:
-        flags.append(
-            Flag(
-                "no_delay_resolved",
-                f"the IAE without delay is only {contrast:.2f} times the smallest (at {delay} "
-                "samples): the data do not show whether there is a delay",
-            )
+        yield Flag(
+            "no_delay_resolved",
+            f"the IAE without delay is only {contrast:.2f} times the smallest (at {delay} "
+            "samples): the data do not show whether there is a delay",
         )
     minima = local_minima(iae, delay, rounding)
     if minima > 1:
-        flags.append(
-            Flag(
-                "several_minima",
-                f"{minima} separate minima of the IAE between {low} and {high} samples are "
-                "within 5 % of the smallest IAE; lower the order, or filter more",
-            )
+        yield Flag(
+            "several_minima",
+            f"{minima} separate minima of the IAE between {low} and {high} samples are "
+            "within 5 % of the smallest IAE; lower the order, or filter more",
         )
-    return tuple(flags)
 
 
-def noise_flags(singular_value: float, floor: float | None, order: int) -> tuple[Flag, ...]:
+def noise_flags(singular_value: float, floor: float | None, order: int) -> Iterator[Flag]:
     """Compare the last singular value of the model with that of pure noise."""
     if floor is None or floor <= 0:
-        return ()
+        return
     ratio = singular_value / floor
     seen = f"singular value {order} is {ratio:.2f} times the noise level"
     if ratio < NOISE_REFUSE:
-        return (
-            Flag(
-                "order_in_noise",
-                f"{seen}: the delay is determined by noise; use a lower order, a lower "
-                "cut-off frequency, or the output-error fit",
-            ),
+        yield Flag(
+            "order_in_noise",
+            f"{seen}: the delay is determined by noise; use a lower order, a lower "
+            "cut-off frequency, or the output-error fit",
         )
-    if ratio < NOISE_CAUTION:
-        return (
-            Flag(
-                "order_near_noise",
-                f"{seen}: expect errors of several samples; a lower cut-off frequency helps",
-            ),
+    elif ratio < NOISE_CAUTION:
+        yield Flag(
+            "order_near_noise",
+            f"{seen}: expect errors of several samples; a lower cut-off frequency helps",
         )
-    return ()

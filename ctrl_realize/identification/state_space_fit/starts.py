@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -122,24 +122,22 @@ def _from_start(
                 f"the highest order tried, {best.order}, is the best: try higher ones",
             ),
         )
-    flags += _marginal(search.as_good(moved, CLOSE * PLAUSIBLE))
+    flags += tuple(_marginal(search.as_good(moved, CLOSE * PLAUSIBLE)))
     choices = _choices(moved, bic, shares)
     system = fitted_system(search.finish(moved), group, bic, choices, flags)
     return Outcome(moved.bic, system, unseen == 0, search, moved)
 
 
-def _marginal(others: Sequence[Candidate]) -> tuple[Flag, ...]:
+def _marginal(others: Sequence[Candidate]) -> Iterator[Flag]:
     """Flag a choice so close that rounding may change it."""
     if not others:
-        return ()
+        return
     one = others[0]
-    return (
-        Flag(
-            "marginal_decision",
-            f"order {one.order} with delays of {one.inputs} and {one.outputs} samples "
-            f"{'and' if one.feedthrough else 'and no'} feedthrough fits as well as the model "
-            "chosen, so that rounding on another processor may decide otherwise",
-        ),
+    yield Flag(
+        "marginal_decision",
+        f"order {one.order} with delays of {one.inputs} and {one.outputs} samples "
+        f"{'and' if one.feedthrough else 'and no'} feedthrough fits as well as the model "
+        "chosen, so that rounding on another processor may decide otherwise",
     )
 
 

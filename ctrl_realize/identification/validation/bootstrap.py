@@ -93,21 +93,15 @@ class Bootstrap(Result):
     @property
     def flags(self) -> tuple[Flag, ...]:
         """Warnings about failed draws, and about quantisation, which draws do not contain."""
-        found = []
-        if self.failed:
-            found.append(
-                Flag("failed_draws", f"the estimator raised an error for {self.failed} draws")
-            )
+        failed = Flag("failed_draws", f"the estimator raised an error for {self.failed} draws")
+        coarse = Flag(
+            "coarse_quantisation",
+            "the output is quantised more coarsely than its noise; the quantisation error is "
+            "the same in every draw, so all intervals are too narrow",
+        )
         fitted = () if self.system.fit is None else self.system.fit.flags
-        if any(flag.code == "coarse_quantisation" for flag in fitted):
-            found.append(
-                Flag(
-                    "coarse_quantisation",
-                    "the output is quantised more coarsely than its noise; the quantisation "
-                    "error is the same in every draw, so all intervals are too narrow",
-                )
-            )
-        return tuple(found)
+        found = (failed,) if self.failed else ()
+        return found + ((coarse,) if any(flag.code == coarse.code for flag in fitted) else ())
 
     def poles(self) -> list[Any]:
         """Poles of every model in the z-plane, without delays."""

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from ..._checks import integer
@@ -20,7 +22,7 @@ from ..realization.delay_scan import estimate_delay
 from ..realization.delay_scan_result import DelayScan
 from ..step.impulse import impulse_from_step
 from ..step.steps import unit_step
-from .delay_estimates_result import DelayComparison, DelayEstimate, common_dead_time
+from .delay_estimates_result import DelayComparison, DelayEstimate
 
 TOP_BAND = 1 / 3
 """Upper part of the band in which the slope of the phase is estimated, as a fraction."""
@@ -107,32 +109,22 @@ def compare_delay_estimates(
         integer(max_delay, "max_delay", 0)
     if order is not None:
         integer(order, "order", 1)
-    estimates: list[DelayEstimate] = []
-    flags: list[Flag] = []
+    found: list[DelayEstimate | Flag] = []
     if record is not None:
-        _from_record(record, max_delay, order, estimates, flags)
+        found += _from_record(record, max_delay, order)
     if frf is not None:
-        _from_frf(frf, estimates, flags)
+        found += _from_frf(frf)
+    estimates = tuple(one for one in found if isinstance(one, DelayEstimate))
+    flags = tuple(one for one in found if isinstance(one, Flag))
     if not estimates:
         raise DataError("no method found a delay: " + "; ".join(map(str, flags)))
-    common, conflicts = common_dead_time(estimates)
-    return DelayComparison(
-        estimates=tuple(estimates),
-        agree=common is not None,
-        common=common,
-        conflicts=conflicts,
-        dt=None if record is None else record.dt,
-        flags=tuple(flags),
-    )
+    return DelayComparison(estimates, None if record is None else record.dt, flags)
 
 
 def _from_record(
-    record: Record,
-    max_delay: int | None,
-    order: int | None,
-    estimates: list[DelayEstimate],
-    flags: list[Flag],
-) -> None:
+    record: Record, max_delay: int | None, order: int | None
+) -> Iterator[DelayEstimate | Flag]:
+    """Estimates of the methods for records, and a flag for each that fails."""
     check_complete(record, "compare_delay_estimates")
     if not record.issiso():
         raise DataError(f"{record!r} has several channels; expected one input and one output")
@@ -141,41 +133,32 @@ def _from_record(
     try:
         fit = fit_of(fit_output_error(record), OutputErrorFit)
     except CtrlRealizeError as problem:
-        flags.append(Flag("no_output_error", f"output error: {problem}"))
+        yield Flag("no_output_error", f"output error: {problem}")
     else:
-        estimates.append(
-            DelayEstimate("output error", "record", "dead time", fit.dead_time, *fit.interval)
-        )
+        yield DelayEstimate("output error", "record", "dead time", fit.dead_time, *fit.interval)
         stepped = bool(np.isfinite(fit.onset))
         if stepped:
             # Back to the last sample at the baseline; the motion started within the sample before.
             first = max(fit.onset, 0.0)
-            estimates.append(
-                DelayEstimate("onset", "record", "upper bound", first, 0.0, first + dt)
-            )
+            yield DelayEstimate("onset", "record", "upper bound", first, 0.0, first + dt)
         total, model_order = max(fit.total_delay, fit.dead_time), min(fit.order, 3)
     most = int(np.ceil(total / dt)) + 10 if max_delay is None else max_delay
     try:
-        estimates.append(_scan(record, stepped, most, order or model_order, total))
+        yield _scan(record, stepped, most, order or model_order, total)
     except CtrlRealizeError as problem:
-        flags.append(Flag("no_scan", f"scan: {problem}"))
+        yield Flag("no_scan", f"scan: {problem}")
     if not stepped:
-        _from_correlation(record, most, estimates, flags)
+        yield _from_correlation(record, most)
 
 
-def _from_correlation(
-    record: Record, most: int, estimates: list[DelayEstimate], flags: list[Flag]
-) -> None:
+def _from_correlation(record: Record, most: int) -> DelayEstimate | Flag:
     lags = int(min(MOST_LAGS, max(most, 20), record.n_samples // 4))
     seen = correlation_onset(record.input.ravel(), record.output.ravel(), lags, 1 - UNSEEN)
     if seen.onset < 0:
-        flags.append(
-            Flag("no_correlation", f"cross-correlation: no significant peak up to lag {lags}")
-        )
-        return
+        return Flag("no_correlation", f"cross-correlation: no significant peak up to lag {lags}")
     # With a hold, the first visible response at lag k started within the sample before.
     value = seen.onset * record.dt
-    estimates.append(DelayEstimate("cross-correlation", "record", "upper bound", value, 0.0, value))
+    return DelayEstimate("cross-correlation", "record", "upper bound", value, 0.0, value)
 
 
 def _scan(record: Record, stepped: bool, most: int, order: int, total: float) -> DelayEstimate:
@@ -204,7 +187,8 @@ def _doubt(flags: tuple[Flag, ...]) -> str:
     return "; ".join(str(flag) for flag in flags if flag.code in DOUBTFUL)
 
 
-def _from_frf(frf: MeasuredFRF, estimates: list[DelayEstimate], flags: list[Flag]) -> None:
+def _from_frf(frf: MeasuredFRF) -> Iterator[DelayEstimate | Flag]:
+    """Estimates of the methods for frequency responses, and a flag for each that fails."""
     # Not imported at the top: most comparisons have no FRF, and its fit is a large part of the
     # package.
     from ...frequency.fit_frf import fit_frf
@@ -213,19 +197,16 @@ def _from_frf(frf: MeasuredFRF, estimates: list[DelayEstimate], flags: list[Flag
     try:
         fit = fit_of(fit_frf(frf), FRFFit)
     except CtrlRealizeError as problem:
-        flags.append(Flag("no_frf_fit", f"FRF fit: {problem}"))
+        yield Flag("no_frf_fit", f"FRF fit: {problem}")
     else:
-        low, high = fit.interval
         doubt = _doubt(fit.flags)
-        estimates.append(
-            DelayEstimate("FRF fit", "FRF", "dead time", fit.dead_time, low, high, doubt)
-        )
+        yield DelayEstimate("FRF fit", "FRF", "dead time", fit.dead_time, *fit.interval, doubt)
     omega = 2 * np.pi * np.asarray(frf.frequency_hz)
     values = np.asarray(frf.complex, dtype=np.complex128).ravel()
     if omega.size < 4:
-        flags.append(Flag("no_phase_slope", f"phase slope: {omega.size} lines are too few"))
+        yield Flag("no_phase_slope", f"phase slope: {omega.size} lines are too few")
         return
     phase = unwrap_with_dead_time(omega, values, dead_time_from_phase(omega, values))
     slope, std = phase_slope(omega, phase, TOP_BAND)
     low, high = max(slope - 2 * std, 0.0), slope + 2 * std
-    estimates.append(DelayEstimate("phase slope", "FRF", "upper bound", slope, low, high))
+    yield DelayEstimate("phase slope", "FRF", "upper bound", slope, low, high)

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import combinations, product
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Literal, get_args
 
 from ..._wording import interval_in_time, time_within
 from ...results import Flag, Result
@@ -94,11 +95,31 @@ class DelayComparison(Result):
     """
 
     estimates: tuple[DelayEstimate, ...]
-    agree: bool
-    common: tuple[float, float] | None
-    conflicts: tuple[tuple[str, str], ...]
     dt: float | None
     flags: tuple[Flag, ...] = ()
+
+    @cached_property
+    def common(self) -> tuple[float, float] | None:
+        """Dead times in s that no estimate rules out; None if there is none."""
+        known = counted(self.estimates)
+        low = max((each.low for each in known if each.kind == "dead time"), default=0.0)
+        high = min((each.high for each in known), default=-1.0)
+        return (low, high) if low <= high else None
+
+    @property
+    def agree(self) -> bool:
+        """Whether there are dead times that no estimate rules out."""
+        return self.common is not None
+
+    @property
+    def conflicts(self) -> tuple[tuple[str, str], ...]:
+        """Pairs of estimates that exclude each other, if all of them do not agree."""
+        if self.agree:
+            return ()
+        known = counted(self.estimates)
+        times, bounds = ([one for one in known if one.kind == kind] for kind in get_args(Kind))
+        pairs = [*combinations(times, 2), *product(times, bounds)]
+        return tuple((one.method, other.method) for one, other in pairs if _apart(one, other))
 
     @property
     def rely_on(self) -> str | None:
@@ -159,23 +180,6 @@ class DelayComparison(Result):
 def counted(estimates: Sequence[DelayEstimate]) -> list[DelayEstimate]:
     """Leave out the estimates in doubt."""
     return [estimate for estimate in estimates if not estimate.doubt]
-
-
-def common_dead_time(
-    estimates: Sequence[DelayEstimate],
-) -> tuple[tuple[float, float] | None, tuple[tuple[str, str], ...]]:
-    """Find the dead times that no estimate rules out, or the pairs that exclude each other."""
-    estimates = counted(estimates)
-    times = [estimate for estimate in estimates if estimate.kind == "dead time"]
-    bounds = [estimate for estimate in estimates if estimate.kind == "upper bound"]
-    if not estimates:
-        return None, ()
-    low = max((estimate.low for estimate in times), default=0.0)
-    high = min(estimate.high for estimate in estimates)
-    if low <= high:
-        return (low, high), ()
-    pairs = [*combinations(times, 2), *product(times, bounds)]
-    return None, tuple((one.method, other.method) for one, other in pairs if _apart(one, other))
 
 
 def _apart(time: DelayEstimate, other: DelayEstimate) -> bool:

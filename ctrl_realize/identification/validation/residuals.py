@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import control as ct
 import numpy as np
 from scipy.special import ndtri
@@ -120,7 +122,7 @@ def analyse_residuals(
         independent=not later.any(),
         confidence=level,
         record=record,
-        flags=_flags(later, earlier, cross[:, :, count:]),
+        flags=tuple(_flags(later, earlier, cross[:, :, count:])),
     )
 
 
@@ -134,28 +136,22 @@ def _outside(cross: FloatArray, bounds: FloatArray, level: float) -> BoolArray:
     return np.asarray(np.abs(cross) > wider * bounds[:, :, None])
 
 
-def _flags(later: BoolArray, earlier: BoolArray, cross: FloatArray) -> tuple[Flag, ...]:
+def _flags(later: BoolArray, earlier: BoolArray, cross: FloatArray) -> Iterator[Flag]:
     """Flag significant correlations: `later` is `cross` at lags 0...L, `earlier` at -L...0."""
-    flags = []
     if later.any():
         size = np.where(later, np.abs(cross), 0.0)
         _, _, lag = np.unravel_index(np.argmax(size), size.shape)
-        flags.append(
-            Flag(
-                "input_in_residual",
-                f"the residual is correlated with past inputs, most at lag {lag}: the order "
-                "or the delay of the model is wrong, or the plant is nonlinear",
-            )
+        yield Flag(
+            "input_in_residual",
+            f"the residual is correlated with past inputs, most at lag {lag}: the order "
+            "or the delay of the model is wrong, or the plant is nonlinear",
         )
     if earlier.any():
-        flags.append(
-            Flag(
-                "feedback",
-                "the input is correlated with past residuals: the record was taken in closed "
-                "loop, which biases estimates that assume an independent input",
-            )
+        yield Flag(
+            "feedback",
+            "the input is correlated with past residuals: the record was taken in closed "
+            "loop, which biases estimates that assume an independent input",
         )
-    return tuple(flags)
 
 
 def _first_response(system: ct.StateSpace) -> FloatArray:

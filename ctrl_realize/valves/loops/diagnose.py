@@ -145,11 +145,11 @@ def diagnose_loop(
         methods.movements(moved, kind, note),
         methods.stiction_fit(fit, note),
     )
-    flags = flags_of(data, cycles)
+    flags = tuple(flags_of(data, cycles))
     verdict, reason = judge(state, data.op.size, found, flags)
     return LoopDiagnosis(
         verdict, reason, state, found, kind, data, cycles, correlation, halves_op, halves_pv,
-        ellipse, fit, tuple(flags), (f"process: {kind}, as given or by default",),
+        ellipse, fit, flags, (f"process: {kind}, as given or by default",),
     )  # fmt: skip
 
 

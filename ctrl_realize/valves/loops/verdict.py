@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Literal, TypeAlias
 
 import numpy as np
@@ -41,77 +41,58 @@ def oscillates(cycles: Cycles | None) -> bool | None:
     return None if sum(published) > 1 else False
 
 
-def flags_of(data: LoopData, cycles: Cycles | None) -> list[Flag]:
+def flags_of(data: LoopData, cycles: Cycles | None) -> Iterator[Flag]:
     """List what the record lacks."""
-    flags = []
     if data.left_out:
-        flags.append(
-            Flag(
-                "missing_samples",
-                f"only the longest part without gaps is used: {data.op.size} samples of "
-                f"{data.op.size + data.left_out}",
-            )
+        yield Flag(
+            "missing_samples",
+            f"only the longest part without gaps is used: {data.op.size} samples of "
+            f"{data.op.size + data.left_out}",
         )
     if data.filled:
-        flags.append(
-            Flag(
-                "filled_samples",
-                f"{data.filled} of {data.op.size} samples were missing, in gaps of at most "
-                f"{LONGEST_GAP}: they are interpolated",
-            )
+        yield Flag(
+            "filled_samples",
+            f"{data.filled} of {data.op.size} samples were missing, in gaps of at most "
+            f"{LONGEST_GAP}: they are interpolated",
         )
     for name, signal in (("controller output", data.op), ("process value", data.pv)):
         if np.ptp(signal) == 0:
-            flags.append(
-                Flag(
-                    "constant_signal",
-                    f"the {name} is constant: the controller is in manual, or the signal is not "
-                    "that of the loop",
-                )
+            yield Flag(
+                "constant_signal",
+                f"the {name} is constant: the controller is in manual, or the signal is not "
+                "that of the loop",
             )
         elif np.ptp(signal) < _COARSE * resolution(signal):
-            flags.append(
-                Flag(
-                    "coarse_quantisation",
-                    f"the {name} has {np.ptp(signal) / resolution(signal) + 1:.0f} levels: half "
-                    "cycles have no shape; record it with more digits, and without compression",
-                )
+            yield Flag(
+                "coarse_quantisation",
+                f"the {name} has {np.ptp(signal) / resolution(signal) + 1:.0f} levels: half "
+                "cycles have no shape; record it with more digits, and without compression",
             )
     limited = _at_limits(data.op)
     if limited > _SATURATED:
-        flags.append(
-            Flag(
-                "saturated_output",
-                f"the controller output is at its smallest or largest value in {limited:.0%} of "
-                "the samples: this shapes the oscillation, whatever its cause",
-            )
+        yield Flag(
+            "saturated_output",
+            f"the controller output is at its smallest or largest value in {limited:.0%} of "
+            "the samples: this shapes the oscillation, whatever its cause",
         )
     if data.sp is not None and np.std(data.sp) > 0.2 * np.std(data.pv - data.sp):
-        flags.append(
-            Flag(
-                "set_point_moves",
-                "the set point moves: the oscillation may come with it, from an outer loop; judge "
-                "that loop, or a record with a constant set point",
-            )
+        yield Flag(
+            "set_point_moves",
+            "the set point moves: the oscillation may come with it, from an outer loop; judge "
+            "that loop, or a record with a constant set point",
         )
     if cycles is not None and oscillates(cycles) is not False:
         if cycles.period < 2 * SHORTEST_PERIOD:
-            flags.append(
-                Flag(
-                    "few_samples_per_cycle",
-                    f"{cycles.period:.1f} samples in a cycle: half cycles have no shape; sample "
-                    "faster",
-                )
+            yield Flag(
+                "few_samples_per_cycle",
+                f"{cycles.period:.1f} samples in a cycle: half cycles have no shape; sample faster",
             )
         if cycles.count < 2 * FEWEST_CYCLES:
-            flags.append(
-                Flag(
-                    "few_cycles",
-                    f"{cycles.count:.1f} cycles of the oscillation; record at least "
-                    f"{2 * FEWEST_CYCLES:.0f}",
-                )
+            yield Flag(
+                "few_cycles",
+                f"{cycles.count:.1f} cycles of the oscillation; record at least "
+                f"{2 * FEWEST_CYCLES:.0f}",
             )
-    return flags
 
 
 SPOILS = {"constant_signal", "saturated_output", "set_point_moves", "coarse_quantisation"}

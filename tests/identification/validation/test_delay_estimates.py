@@ -9,7 +9,6 @@ import ctrl_realize as cr
 from ctrl_realize.identification.validation.delay_estimates_result import (
     DelayComparison,
     DelayEstimate,
-    common_dead_time,
 )
 from tests import measured
 from tests.rigs import R2
@@ -60,8 +59,9 @@ def test_random_input_and_frequency_response_are_seen_in_five_ways_that_agree(bo
 def test_a_view_in_doubt_is_shown_and_does_not_count():
     views = [view("a", 1.0, 3.0), view("b", 0.5, 4.0), view("c", 0.0, 2.5, "upper bound")]
     doubted = [*views, replace(view("d", 8.0, 9.0), doubt="says so itself")]
-    assert common_dead_time(doubted) == common_dead_time(views) == ((1.0, 2.5), ())
-    check = DelayComparison(tuple(doubted), True, (1.0, 2.5), (), 0.1)
+    check = DelayComparison(tuple(doubted), 0.1)
+    for each in (check, DelayComparison(tuple(views), 0.1)):
+        assert (each.common, each.conflicts) == ((1.0, 2.5), ())
     assert check.rely_on == "a"
     assert "says so itself" in check.report()
     assert "narrowest" in check.report()
@@ -117,15 +117,16 @@ A, B = view("a", 1.0, 3.0), view("b", 2.5, 3.5)
 def test_only_pairs_that_rule_each_other_out_are_in_conflict():
     late = view("late", 4.0, 5.0)
     views = [A, B, late, bound("p", 2.0), bound("q", 4.5)]
-    common, pairs = common_dead_time(views)
-    assert common is None
-    told = DelayComparison(tuple(views), False, None, pairs, 0.5)
+    told = DelayComparison(tuple(views), 0.5)
+    assert told.common is None
     assert "no: " in told.report()
     assert "do not agree" in repr(told)
-    assert pairs == (("a", "late"), ("b", "late"), ("b", "p"), ("late", "p"))
+    assert told.conflicts == (("a", "late"), ("b", "late"), ("b", "p"), ("late", "p"))
     # those that touch do not
     touching = [A, view("b", 3.0, 3.5), view("c", 3.5, 4.0)]
     for order in (touching, touching[::-1]):
-        assert [set(pair) for pair in common_dead_time(order)[1]] == [{"a", "c"}]
+        check = DelayComparison(tuple(order), 0.5)
+        assert [set(pair) for pair in check.conflicts] == [{"a", "c"}]
     # the interval of an upper bound begins where nothing is said: only its end counts
-    assert common_dead_time([A, view("r", 3.5, 6.0, "upper bound")]) == ((1.0, 3.0), ())
+    check = DelayComparison((A, view("r", 3.5, 6.0, "upper bound")), 0.5)
+    assert (check.common, check.conflicts) == ((1.0, 3.0), ())
