@@ -170,6 +170,18 @@ def time_within(value: float, low: float, high: float) -> str:
     return f"{number_within(factor * value, factor * low, factor * high)} {name}"
 
 
+def time_and_interval(value: float, low: float, high: float) -> str:
+    """Write an estimate of a time with its interval.
+
+    Examples
+    --------
+    >>> from ctrl_realize._wording import time_and_interval
+    >>> time_and_interval(0.12486, 0.12473, 0.12612)
+    '124.9 ms (124.7 to 126.1 ms)'
+    """
+    return f"{time_within(value, low, high)} ({interval_in_time(low, high)})"
+
+
 def number_within(value: float, low: float, high: float) -> str:
     """Write an estimate rounded to the same digit as the ends of its interval.
 

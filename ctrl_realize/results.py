@@ -7,10 +7,10 @@ the result.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, Literal
 
+from ._flags import Flag
 from ._parameters import Parameter, checked_time_unit, formula, parameter_table
 from ._shown import html_card, text_card
 from ._wording import ASSUMED, shown_unit, times_in
@@ -43,34 +43,6 @@ INTERVAL_LABELS: dict[IntervalKind | None, str] = {
 _SAID = f"time in {ASSUMED}: the file names no unit; time_unit= says which it is"
 
 
-@dataclass(frozen=True)
-class Flag:
-    """Warning about a result.
-
-    Attributes
-    ----------
-    code : str
-        Short fixed name for programs: ``"delay_at_bound"``.
-    message : str
-        What was found, with its numbers, and what to try.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> import ctrl_realize as cr
-    >>> pulse = np.r_[np.zeros(38), 0.1 * 0.9 ** np.arange(300)]
-    >>> for flag in cr.estimate_delay(pulse, 1, max_delay=37, dt=0.01).fit.flags:
-    ...     print(f"{flag.code}: {flag}")
-    delay_at_bound: the best delay is max_delay=37; try a larger one
-    """
-
-    code: str
-    message: str
-
-    def __str__(self) -> str:
-        return self.message
-
-
 class Drawable:
     """Base of everything that has a plot in `ctrl_realize.plots`.
 
@@ -99,8 +71,7 @@ class Result(Drawable):
 
     Examples
     --------
-    >>> from dataclasses import dataclass
-    >>> from ctrl_realize.results import Result
+    >>>     >>> from ctrl_realize.results import Result
     >>> @dataclass(frozen=True)
     ... class Weight(Result):
     ...     kilograms: float

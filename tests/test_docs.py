@@ -4,8 +4,10 @@ import ast
 import importlib.util
 import inspect
 import re
+import tomllib
 from importlib import import_module
 from pathlib import Path
+from string import Formatter
 
 import numpy as np
 import pytest
@@ -200,6 +202,24 @@ def test_every_flag_has_its_words_on_the_page_of_flags():
     for _, function, _ in listed_flags:
         home, _, name = f"ctrl_realize.{function}".rpartition(".")
         assert callable(getattr(import_module(home), name)), function
+
+
+def test_every_flag_is_raised_with_the_values_that_its_words_ask_for():
+    keys = extension("flag_table").keys
+    package = Path(cr.__file__).parent
+    table = tomllib.loads((package / "flags.toml").read_text(encoding="utf-8"))
+    raised = set()
+    for tree in parsed().values():
+        for call in ast.walk(tree):
+            if isinstance(call, ast.Call) and getattr(call.func, "id", "") == "flagged":
+                given = {value.arg for value in call.keywords}
+                for key in keys(call):
+                    code, _, case = key.partition(".")
+                    words = table[code][case or "words"]
+                    asked = {name for _, name, _, _ in Formatter().parse(words) if name}
+                    assert asked <= given, key
+                    raised.add((code, case or "words"))
+    assert raised == {(c, case) for c, row in table.items() for case in row if case != "marks"}
 
 
 def test_docstrings_of_everything_public_are_those_of_numpydoc(reference):

@@ -17,7 +17,7 @@ FLOORS = [
     {"errors"},
     {"_checks", "_facts", "_shown", "numerics"},
     {"_wording", "paper"},
-    {"_parameters"},
+    {"_parameters", "_flags"},
     {"results"},
     {"data"},
     {"delayed", "actuators"},

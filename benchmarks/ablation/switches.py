@@ -373,7 +373,7 @@ SWITCHES = (
     ),
     Switch(
         "held output",
-        {f"{PUBLIC}.checks:held_flags": giving(([], 0.0))},
+        {f"{PUBLIC}.checks:hold_time": giving(None)},
     ),
     Switch(
         "step of generalised least squares", {f"{PUBLIC}.checks:generalised_step": giving(None)}

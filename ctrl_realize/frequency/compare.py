@@ -9,13 +9,13 @@ import control as ct
 import numpy as np
 
 from .._checks import one_of
+from .._flags import Flag, flagged
 from ..delayed import DelayedStateSpace
 from ..errors import DataError, OptionError, UnsuitableSystemError
 from ..numerics.arrays import ComplexArray, FloatArray, locked, read_only
 from ..numerics.blas_threads import single_threaded
 from ..numerics.constants import SMALLEST
 from ..numerics.rational.spectra import hold_response, unwrapped_phase
-from ..results import Flag
 from .comparison import FRFComparison, decibels, hertz
 from .disagreement import disagreement
 from .points import MeasuredPoints, check_single_channel, measured_points, same_time, sampled_every
@@ -172,13 +172,8 @@ def _comparable(
         beyond = frequency >= 0.5 / dt
         usable &= ~beyond
         if beyond.any():
-            flags.append(
-                Flag(
-                    "beyond_nyquist",
-                    f"{int(beyond.sum())} points at or above the model's Nyquist frequency of "
-                    f"{hertz(0.5 / dt)} are left out",
-                )
-            )
+            nyquist = hertz(0.5 / dt)
+            flags.append(flagged("beyond_nyquist", count=beyond.sum(), nyquist=nyquist))
     if not usable.any():
         raise DataError(
             f"nothing to compare: the FRF has {frequency.size} points from "

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from .._flags import Flag, flagged
 from ..numerics.rational.bands import running_median, widest_run
-from ..results import Flag
 from .comparison import FRFComparison, hertz
 
 CLOSE, FAR = 0.05, 0.2
@@ -24,16 +24,10 @@ def disagreement(comparison: FRFComparison) -> Flag | None:
     beyond = float(np.sqrt(max(error**2 - noise**2, 0.0)))
     if beyond < CLOSE:
         return None
-    said = (
-        f"{100 * error:.3g} % (rms) away from the measured frequency response, {_worst(comparison)}"
-    )
-    if beyond < FAR:
-        return Flag("frf_differs", f"the model is {said}")
-    return Flag(
-        "frf_disagrees",
-        f"the measured frequency response contradicts the model, which is {said}: the "
-        "operating point or the direction differs, the plant is nonlinear, or the model is "
-        "wrong. Compare both at the intended operating point before designing a controller",
+    return flagged(
+        "frf_differs" if beyond < FAR else "frf_disagrees",
+        error=100 * error,
+        worst=_worst(comparison),
     )
 
 

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
+from .._flags import Flag, flagged
 from .._wording import plainly
 from ..delayed import DelayedStateSpace, delayed_ss
 from ..numerics.arrays import locked, read_only
@@ -24,7 +26,6 @@ from ..numerics.rational.search import (
     fit_structures,
 )
 from ..numerics.statistics import mixture_quantile
-from ..results import Flag
 from .frf_fit import FRFFit, FRFStructure
 from .frf_structures import ComparedFits, compared_fits, key_of, residual_ratio
 from .points import FRFPoints
@@ -90,21 +91,18 @@ def chosen_model(
         interval, systematic = _of_lower_orders(data, compared, unit, interval)
         flags.extend(systematic)
     if noise_known and ratio > _POOR_MISFIT:
-        flags.append(
-            Flag(
-                "misfit",
-                f"the residual is {plainly(ratio, 2)} times the measured noise: the "
-                f"plant is not exactly of order {n}, or is nonlinear; the interval is widened "
-                "accordingly",
-            )
-        )
+        flags.append(flagged("misfit", ratio=plainly(ratio, 2), order=n))
     flags.extend(_leading_phase(data, fits, chosen, unit))
     poles, pole_std = pole_deviations(data, chosen, scales[key_of(best)], robust=not noise_known)
     A, B, C, D = modal_state_space(data, chosen)
     used = best.dead_time
     if r == 0:
-        used, rounded = _whole_samples(best.dead_time, dt)
-        flags.extend(rounded)
+        # more than any model can hold are refused when it is made
+        used = round(min(used / dt, 1e9)) * dt
+        if abs(used - best.dead_time) > 1e-9 * dt:
+            flags.append(
+                flagged("dead_time_rounded", used=1e3 * used, dead_time=1e3 * best.dead_time)
+            )
     result = FRFFit(
         order=n,
         relative_degree=r,
@@ -133,25 +131,9 @@ def chosen_model(
     return delayed_ss(result.core, dead_time=used, dt=dt, fit=result, name=name)
 
 
-def _whole_samples(dead_time: float, dt: float) -> tuple[float, list[Flag]]:
-    """Round a dead time to samples, and say so where it matters."""
-    # more than any model can hold are refused when it is made
-    used = round(min(dead_time / dt, 1e9)) * dt
-    if abs(used - dead_time) <= 1e-9 * dt:
-        return used, []
-    return used, [
-        Flag(
-            "dead_time_rounded",
-            "a model with feedthrough needs a whole number of samples: its dead time is "
-            f"{1e3 * used:.5g} ms, not {1e3 * dead_time:.5g} ms; a shorter dt reduces the "
-            "rounding",
-        )
-    ]
-
-
 def _leading_phase(
     data: FRFData, fits: dict[Structure, Candidate], chosen: Candidate, unit: float
-) -> list[Flag]:
+) -> Iterator[Flag]:
     """Say so where a response that comes before its input fits far better.
 
     At high order a chain of zeros imitates the lead, so a low order is asked.
@@ -159,25 +141,16 @@ def _leading_phase(
     # Half a radian at the highest frequency: what is less may as well be none.
     half_radian = 0.5 / float(np.abs(data.s).max())
     if chosen.dead_time > half_radian:
-        return []
+        return
     n = min(chosen.structure.order, _ORDER_OF_LEAD)
     as_is = [fit.cost for key, fit in fits.items() if key.order == n] or [chosen.cost]
     lead = dead_time_bound(data.response.conj(), np.abs(data.s), 1 / data.weight)
     turned = replace(data, response=data.response * np.exp(-data.s * lead), max_dead_time=lead)
     earlier = min(fit_structures(turned, (n,), (1,)).values(), key=lambda fit: fit.cost)
     dead_time = earlier.dead_time - lead
-    if dead_time > -half_radian or earlier.cost > _FAR_BETTER * min(as_is):
-        return []
-    return [
-        Flag(
-            "phase_leads",
-            f"the response is non-causal: at order {n} a negative dead time of "
-            f"{1e3 * dead_time / unit:.3g} ms leaves "
-            f"{100 * np.sqrt(earlier.cost / min(as_is)):.2g} % of the residual; the FRF's time "
-            "axis starts late, perhaps because a delay was removed: add it back before the "
-            "fit",
-        )
-    ]
+    if dead_time <= -half_radian and earlier.cost <= _FAR_BETTER * min(as_is):
+        left = 100 * np.sqrt(earlier.cost / min(as_is))
+        yield flagged("phase_leads", order=n, dead_time=1e3 * dead_time / unit, left=left)
 
 
 def _of_lower_orders(
@@ -201,16 +174,14 @@ def _of_lower_orders(
     high = max(interval[1], *(last / unit for _, last in ends))
     least, most = best[min(best)], rows[0]
     above, left = (100 * residual_ratio(data, fits[key_of(row)]) for row in (least, most))
-    return (low, high), [
-        Flag(
-            "systematic_error",
-            f"order {least.order} leaves {above:.2g} % of the response, order {most.order} "
-            f"{left:.2g} %: so small an error may be the measurement's, the same in all points, "
-            "and not poles of the plant; the interval covers orders "
-            f"{least.order} to {most.order}; repeat the measurement for its standard deviation, or "
-            "state the order",
-        )
-    ]
+    systematic = flagged(
+        "systematic_error",
+        least=least.order,
+        left_by_least=above,
+        most=most.order,
+        left_by_most=left,
+    )
+    return (low, high), [systematic]
 
 
 def _cover(
@@ -228,22 +199,10 @@ def _cover(
     flags = []
     low, high = max(low, 0.0), min(high, bound)
     if high >= (1 - 1e-9) * bound:
-        flags.append(
-            Flag(
-                "delay_at_bound",
-                "the dead time may be larger than the upper bound of the search, "
-                f"{1e3 * bound:.4g} ms; try a larger max_dead_time",
-            )
-        )
-    more = high - low - (interval[1] - interval[0])
-    worth = max(0.5 * (interval[1] - interval[0]), _SHARE * best.dead_time)
-    if more > max(worth, _SMALL_WIDTH * shortest):
-        flags.append(
-            Flag(
-                "structures_disagree",
-                "structures that fit equally well split the phase differently between dead "
-                f"time and lags: the interval is {1e3 * (high - low):.3g} ms wide, within the "
-                f"chosen structure {1e3 * (interval[1] - interval[0]):.3g} ms",
-            )
-        )
+        flags.append(flagged("delay_at_bound.frf", bound=1e3 * bound))
+    chosen = interval[1] - interval[0]
+    worth = max(0.5 * chosen, _SHARE * best.dead_time, _SMALL_WIDTH * shortest)
+    if high - low - chosen > worth:
+        wide = 1e3 * (high - low)
+        flags.append(flagged("structures_disagree.frf", wide=wide, chosen=1e3 * chosen))
     return (low, high), flags

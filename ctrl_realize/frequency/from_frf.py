@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Literal
 
 import control as ct
 import numpy as np
 
 from .._checks import integer, one_of, positive
+from .._flags import Flag, flagged
 from ..data.impulse_estimate import ImpulseEstimate
 from ..errors import DataError
 from ..numerics.arrays import ComplexArray, FloatArray
@@ -15,7 +17,6 @@ from ..numerics.blas_threads import single_threaded
 from ..numerics.rational.spectra import hold_response
 from ..numerics.regression.fir import cautious_std, fit_kernel
 from ..numerics.regression.normal_equations import NormalEquations
-from ..results import Flag
 from .points import FRFPoints, frf_points, held_every, same_time
 
 _BLOCK = 256
@@ -140,6 +141,7 @@ def impulse_from_frf(
     equations = _equations(omega * step, response / unit, unit / sigma, count)
     fit = fit_kernel(equations, count, kernel)
     markov = unit * fit.markov[0]
+    variance = fit.noise_variance / equations.power[0, 0]
     return ImpulseEstimate(
         markov,
         step,
@@ -147,7 +149,7 @@ def impulse_from_frf(
         noise_std=np.array([np.sqrt(fit.noise_variance) * float(np.median(sigma))]),
         method=f"{kernel} kernel on {omega.size} points, {fit.effective:.0f} free parameters",
         rows=2 * omega.size,
-        flags=_flags(points, response, markov, step, fit.noise_variance / equations.power[0, 0]),
+        flags=tuple(_flags(points, response, markov, step, variance)),
         name=str(frf.name or ""),
     )
 
@@ -172,47 +174,20 @@ def _equations(
 
 def _flags(
     points: FRFPoints, response: ComplexArray, markov: FloatArray, dt: float, variance: float
-) -> tuple[Flag, ...]:
+) -> Iterator[Flag]:
     """Flag estimates with little support in the data; `variance` is relative to the power."""
-    flags = []
     unexplained = variance * 2 * response.size
     if unexplained > _UNEXPLAINED:
-        flags.append(
-            Flag(
-                "unexplained",
-                f"{100 * unexplained:.2g} % of the power of the response is not explained: "
-                "noise, or the response is longer than the given length",
-            )
-        )
+        yield flagged("unexplained", share=100 * unexplained)
     f = points.frequency_hz
     size = np.abs(response)
     last = float(np.median(size[f >= 0.9 * f[-1]]) / size.max())
     if f[-1] < 0.45 / dt and last > _STILL_ALIVE:
-        flags.append(
-            Flag(
-                "ends_early",
-                f"at {f[-1]:.4g} Hz, the highest frequency, the response is still "
-                f"{100 * last:.2g} % of its largest value; above it, up to {0.5 / dt:.4g} Hz, "
-                "only the prior determines the estimate: use a longer dt, or fit_frf",
-            )
-        )
+        yield flagged("ends_early", highest=f[-1], share=100 * last, nyquist=0.5 / dt)
     duration = markov.size * dt
     if f[0] * duration > 1:
-        flags.append(
-            Flag(
-                "starts_late",
-                f"the lowest frequency of {f[0]:.4g} Hz has {f[0] * duration:.2g} periods in "
-                f"the requested {duration:.4g} s: gain and slow modes are extrapolated",
-            )
-        )
+        yield flagged("starts_late", lowest=f[0], periods=f[0] * duration, duration=duration)
     tail = markov[-max(2, markov.size // 10) :]
     left = float(np.abs(tail).max() / np.abs(markov).max())
     if left > _TAIL:
-        flags.append(
-            Flag(
-                "cut_off",
-                f"the last tenth still reaches {100 * left:.2g} % of the largest value: the "
-                "response has not decayed; use a larger length",
-            )
-        )
-    return tuple(flags)
+        yield flagged("cut_off", share=100 * left)

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from .._flags import Flag, flagged
 from ..data import Record
 from ..numerics.signals.excitation import lively_start
-from ..results import Flag
 
 MOST_SAMPLES = 100_000
 """Largest number of samples, of all records together, for a state-space fit. More do not improve a
@@ -26,12 +26,8 @@ def lively_parts(
     starts = [lively_start(np.atleast_2d(record.input), share) for record in records]
     parts = tuple(_part(*pair, share) for pair in zip(records, starts, strict=True))
     longest = int(np.argmax(lengths))
-    flag = Flag(
-        "cut",
-        f"{share} samples were fitted, from sample {starts[longest]} on, of a record of "
-        f"{lengths[longest]}; select the best part with `between`",
-    )
-    return parts, (flag,)
+    first, samples = starts[longest], lengths[longest]
+    return parts, (flagged("cut", used=share, first=first, samples=samples, others=""),)
 
 
 def _part(record: Record, start: int, count: int) -> Record:

@@ -13,6 +13,7 @@ from dataclasses import replace
 import control as ct
 import numpy as np
 
+from .._flags import Flag, flagged, marked
 from .._wording import in_time, interval_in_time
 from ..data import Record
 from ..delayed import DelayedStateSpace, fit_of
@@ -21,7 +22,6 @@ from ..numerics.arrays import FloatArray
 from ..numerics.output_error.any_input.data import MOST_SAMPLES
 from ..numerics.signals.noise import correlation_time
 from ..numerics.signals.noise_model import coloured_criterion
-from ..results import Flag
 from .long_records import lively_parts
 from .output_error.checks import Shown, against_one_model, nonlinear_flags
 from .output_error.own_gains import at_model_gain
@@ -38,18 +38,6 @@ MOST_STARTS = 3
 """Largest number of impulse-response estimates from which the state-space fit starts."""
 HOPELESS = 2.0
 """Largest ratio of residuals, lags to state space, for which the lags' interval is included."""
-_KEPT = (
-    "records_differ",
-    "gains_differ",
-    "amplitude_trend",
-    "same_records",
-    "feedback",
-    "unstable",
-    "cancelled_pair",
-    "held_output",
-    "output_at_limit",
-)
-"""Flags of the record, which do not depend on the model."""
 _FAR_APART = 0.5  # width of an interval, in dead times, from which models disagree
 _NOTHING = 0.5  # samples
 _ROUNDING = 1e-12
@@ -100,12 +88,7 @@ def with_modes_judged(
             why = f"no state-space model: {refused}"
     if left is None:
         return system
-    flag = Flag(
-        "input_in_residual",
-        f"the residual of {sum(follows)} of {len(follows)} record(s) is still correlated with "
-        "the input: the plant has more dynamics than this transfer function with dead time, "
-        f"or is nonlinear; {why}",
-    )
+    flag = flagged("input_in_residual.lags", count=sum(follows), records=len(follows), why=why)
     return system.replace(fit=replace(fit, flags=(*fit.flags, flag)))
 
 
@@ -153,8 +136,8 @@ def _chosen(
     if lags.residual <= HOPELESS * float(modes.noise_std[0]):
         low, high = min(low, lags.interval[0]), max(high, lags.interval[1])
     dead_time = dt * _delay(system)
-    known = {flag.code for flag in modes.flags}
-    kept = [flag for flag in lags.flags if flag.code in _KEPT and flag.code not in known]
+    staying = marked("stays_with_states") - {flag.code for flag in modes.flags}
+    kept = [flag for flag in lags.flags if flag.code in staying]
     flags, notes = [*cut, *modes.flags, *kept], list[str]()
     if len(modes.checks) == 1 and all(flag.code != "feedback" for flag in flags):
         check = modes.checks[0]
@@ -165,19 +148,13 @@ def _chosen(
         if total is not None and all(flag.code != "not_linear" for flag in flags):
             flags += nonlinear_flags(shown, _delay(system), total / dt)
     if own[0] <= _NOTHING:
-        flags.append(
-            Flag(
-                "no_delay_resolved",
-                f"a model without dead time fits as well (up to {in_time(high)})",
-            )
-        )
+        flags.append(flagged("no_delay_resolved", high=in_time(high)))
     if high - low > max(_FAR_APART * max(dead_time, dt), 2 * dt * (own[1] - own[0])):
         flags.append(
-            Flag(
-                "structures_disagree",
-                "the state-space model gives a dead time of "
-                f"{interval_in_time(dt * own[0], dt * own[1])}, the transfer function with "
-                f"dead time {interval_in_time(*lags.interval)}",
+            flagged(
+                "structures_disagree.state_space",
+                chosen=interval_in_time(dt * own[0], dt * own[1]),
+                lags=interval_in_time(*lags.interval),
             )
         )
     reasons = (

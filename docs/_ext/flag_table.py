@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import ast
+import re
+import tomllib
 from pathlib import Path
 
 RAISED_BY = {
@@ -33,51 +35,35 @@ RAISED_BY = {
 }
 """File or folder of the source -> public function whose results carry the flag."""
 
-COMPOSED = {
-    "outliers": "… sample(s), the first at index …, are …, far from the others: if this value "
-    "marks missing data, replace it by NaN before the fit",
-    "outlying_records": "outlying records, excluded from the mean: …",
-    "frf_contradicts_records": "records and frequency response have no common model (likelihood "
-    "ratio …): the joint model is outside of the 95 % circles of … points of the frequency "
-    "response, by most at …, mainly from … to …, and is up to … residuals of the records away from "
-    "their own model, mainly at …. Neither another gain nor another dead time explains it: the "
-    "dynamics differ. The interval spans those of each alone",
-    "structured_misfit": "no model fits down to the noise level: the plant is nonlinear or has "
-    "unmodelled dynamics; the dead time is the median of five delay estimates and the interval is "
-    "their range; actuator='auto' also fits what a valve or drive does before or behind the lags",
-    "gain_not_resolved": "structures that the data cannot rule out differ in gain or total delay, "
-    "or the interval of the gain contains zero",
-    "actuator_not_resolved": "S, J, or another parameter of an actuator, lies between … and …, and "
-    "the records do not determine it more closely; … would",
-    "output_at_limit": "… samples are at …, the output saturates there: they were left out of the "
-    "fit, and what the plant does beyond is extrapolated; or gain and lags are those of the "
-    "clipped signal",
-    "estimates_disagree": "delay estimates far from their median: …",
-}
-"""Messages that are put together from parts."""
 
-
-def _message(node: ast.expr, code: str) -> str:
-    if isinstance(node, ast.Constant):
-        return str(node.value)
+def _message(node: ast.expr) -> str:
     if isinstance(node, ast.JoinedStr):
         parts = (v.value if isinstance(v, ast.Constant) else "…" for v in node.values)
         return "".join(map(str, parts)).replace("……", "…")
-    return COMPOSED.get(code, "…")
+    return str(node.value) if isinstance(node, ast.Constant) else "…"
+
+
+def keys(call: ast.Call) -> list[str]:
+    """Keys of the table with which a flag may be made."""
+    constants = [one for one in ast.walk(call.args[0]) if isinstance(one, ast.Constant)]
+    return [one.value for one in constants if isinstance(one.value, str)]
 
 
 def flags(package: Path) -> list[tuple[str, str, str]]:
     """List code, function and message of every flag, sorted by code."""
+    words = tomllib.loads((package / "flags.toml").read_text(encoding="utf-8"))
     found = set()
     for path in package.rglob("*.py"):
+        place = path.relative_to(package).with_suffix("").as_posix()
+        by = RAISED_BY.get(place) or RAISED_BY.get(place.rpartition("/")[0], "")
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-            if not (isinstance(node, ast.Call) and getattr(node.func, "id", "") == "Flag"):
-                continue
-            if len(node.args) > 1 and isinstance(node.args[0], ast.Constant):
-                code = str(node.args[0].value)
-                place = path.relative_to(package).with_suffix("").as_posix()
-                by = RAISED_BY.get(place) or RAISED_BY[place.rpartition("/")[0]]
-                found.add((code, by, _message(node.args[1], code)))
+            called = getattr(node.func, "id", "") if isinstance(node, ast.Call) else ""
+            if called == "flagged":
+                for code, _, case in (key.partition(".") for key in keys(node)):
+                    said = re.sub(r"\{[^}]*\}", "…", words[code][case or "words"])
+                    found.add((code, by, said))
+            elif called == "Flag" and isinstance(node.args[0], ast.Constant):
+                found.add((str(node.args[0].value), by, _message(node.args[1])))
     return sorted(found)
 
 

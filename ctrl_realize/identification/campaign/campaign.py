@@ -232,7 +232,7 @@ class Campaign(Result):
     @property
     def flags(self) -> tuple[Flag, ...]:
         """Warnings about failed or duplicate records, and about delays or gains that differ."""
-        return campaign_flags(self.rows, self.good, self.failed, self.method)
+        return tuple(campaign_flags(self.rows, self.good, self.failed, self.method))
 
     def _title(self) -> str:
         return f"Campaign of {len(self.rows)} records ({self.method})"

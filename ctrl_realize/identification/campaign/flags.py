@@ -7,10 +7,10 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from ..._flags import Flag, flagged
 from ..._wording import in_time
 from ...numerics.constants import Z_95
 from ...numerics.validation.own_response import homogeneity
-from ...results import Flag
 from ..output_error.repeat_flags import BY_CHANCE, NO_COMMON_GAIN, SAME, time_apart
 from .rows import CampaignRow
 
@@ -19,15 +19,16 @@ Rows = tuple[CampaignRow, ...]
 _SAME_HEIGHT = 1e-6  # relative difference up to which heights count as equal
 
 
-def campaign_flags(rows: Rows, good: Rows, failed: Rows, method: str) -> tuple[Flag, ...]:
+def campaign_flags(rows: Rows, good: Rows, failed: Rows, method: str) -> Iterator[Flag]:
     """List the flags of a campaign: of all its rows, of those identified, and of those not."""
-    return (
-        *_failed(rows, failed),
-        *_different_gains(good),
-        *_different_times(good),
-        *_same_records(good),
-        *_amplitude_trend(good, method),
-    )
+    if failed:
+        more = "" if len(failed) <= 5 else f" and {len(failed) - 5} more"
+        names = ", ".join(row.name for row in failed[:5]) + more
+        yield flagged("failed_records", failed=len(failed), records=len(rows), names=names)
+    yield from _different_gains(good)
+    yield from _different_times(good)
+    yield from _same_records(good)
+    yield from _amplitude_trend(good, method)
 
 
 def _different_gains(rows: Rows) -> Iterator[Flag]:
@@ -46,29 +47,18 @@ def _different_gains(rows: Rows) -> Iterator[Flag]:
     if not np.isfinite(errors).any():
         # The error of a gain from a scan is unknown; noise causes a few percent.
         differ, statistics = apart > NO_COMMON_GAIN, "their errors are unknown"
+    low, high = gains.min(), gains.max()
     if differ and apart > NO_COMMON_GAIN:
-        yield Flag(
-            "no_common_gain",
-            f"no single gain fits all records: the gains are {gains.min():.3g} to "
-            f"{gains.max():.3g}; identify(records, gains='own') fits one for each, with "
-            "common dynamics",
-        )
+        yield flagged("no_common_gain.campaign", low=low, high=high)
     if differ:
-        yield Flag(
-            "gains_differ",
-            f"the gains of the records differ, {gains.min():.3g} to {gains.max():.3g} "
-            f"({statistics}): the plant is nonlinear, or has changed between the records",
-        )
+        yield flagged("gains_differ.campaign", low=low, high=high, statistics=statistics)
 
 
 def _different_times(rows: Rows) -> Iterator[Flag]:
     """Test dead times and total delays for equality, by chi-square about their weighted means."""
     dead_times = [(row.dead_time, *row.interval) for row in rows]
     totals = [(row.total_delay, *row.total_delay_interval) for row in rows]
-    for code, what, times in (
-        ("records_differ", "dead time", dead_times),
-        ("lags_differ", "total delay (dead time plus lags)", totals),
-    ):
+    for times in (dead_times, totals):
         values, low, high = np.array(times).reshape(-1, 3).T
         with np.errstate(invalid="ignore"):
             errors = (high - low) / (2 * Z_95)
@@ -77,25 +67,13 @@ def _different_times(rows: Rows) -> Iterator[Flag]:
         statistic, chance = homogeneity(values, errors)
         known = values[np.isfinite(errors)]
         if chance < BY_CHANCE and np.ptp(known) > time_apart(float(np.median(known)), rows[0].dt):
-            yield Flag(
-                code,
-                f"the {what} differs between records by more than the intervals allow, "
-                f"{in_time(values.min())} to {in_time(values.max())} (chi-square "
-                f"{statistic:.3g}, p = {chance:.2g}): trigger jitter, friction, or a "
-                "plant that is nonlinear or has changed",
+            yield flagged(
+                "records_differ.campaign" if times is dead_times else "lags_differ.campaign",
+                low=in_time(values.min()),
+                high=in_time(values.max()),
+                chi_square=statistic,
+                chance=chance,
             )
-
-
-def _failed(rows: Rows, failed: Rows) -> Iterator[Flag]:
-    if not failed:
-        return
-    names = ", ".join(row.name for row in failed[:5])
-    more = "" if len(failed) <= 5 else f" and {len(failed) - 5} more"
-    yield Flag(
-        "failed_records",
-        f"{len(failed)} of {len(rows)} records failed: {names}{more}; see the table for the "
-        "reasons",
-    )
 
 
 def _same_records(rows: Rows) -> Iterator[Flag]:
@@ -105,16 +83,14 @@ def _same_records(rows: Rows) -> Iterator[Flag]:
         results = (row.delay, row.residual, row.gain, row.amplitude, *row.interval)
         alike.setdefault(results, []).append(row.name)
     twice = [names for names in alike.values() if len(names) > 1]
-    if not twice:
-        return
-    extra = sum(len(names) - 1 for names in twice)
-    names = ", ".join(twice[0][:4]) + (", ..." if len(twice[0]) > 4 else "")
-    more = "" if len(twice) == 1 else f" (and {len(twice) - 1} more such groups)"
-    yield Flag(
-        "same_records",
-        f"{extra} of {len(rows)} records are duplicates: {names} have the same results to the "
-        f"last digit{more}; the scatter and its interval are too small",
-    )
+    if twice:
+        yield flagged(
+            "same_records.campaign",
+            again=sum(len(names) - 1 for names in twice),
+            records=len(rows),
+            names=", ".join(twice[0][:4]) + (", ..." if len(twice[0]) > 4 else ""),
+            more="" if len(twice) == 1 else f" (and {len(twice) - 1} more such groups)",
+        )
 
 
 def _amplitude_trend(rows: Rows, method: str) -> Iterator[Flag]:
@@ -140,7 +116,6 @@ def _amplitude_trend(rows: Rows, method: str) -> Iterator[Flag]:
     trend = abs(np.polyfit(heights, delays, 1)[0]) * np.ptp(heights)
     if not chance < 0.01 or trend <= time_apart(float(np.median(delays)), 1.0) / 2:
         return
-    way = "longer" if correlation > 0 else "shorter"
     # Noise is larger relative to a smaller step: the bias of a scan grows, and a fit misses fast
     # lags.
     doubt = ""
@@ -151,9 +126,7 @@ def _amplitude_trend(rows: Rows, method: str) -> Iterator[Flag]:
         )
     elif len({row.order for row in rows if np.isfinite(row.delay)}) > 1:
         doubt = "; or a lag that only large steps show above the noise, since the orders differ"
-    yield Flag(
-        "amplitude_trend",
-        f"the delay is {way} for larger steps (rank correlation {correlation:.2f}, p = "
-        f"{chance:.1g}): friction, a rate limit or another nonlinearity; no single linear "
-        f"model is valid at all amplitudes{doubt}",
+    way = "longer" if correlation > 0 else "shorter"
+    yield flagged(
+        "amplitude_trend.campaign", way=way, correlation=correlation, chance=chance, doubt=doubt
     )

@@ -9,13 +9,13 @@ from typing import Literal
 import numpy as np
 
 from ..._checks import integer, one_of
+from ..._flags import Flag, flagged
 from ...data import Record
 from ...data.given import as_records
 from ...data.impulse_estimate import ImpulseEstimate
 from ...errors import DataError, DataWarning, OptionError
 from ...numerics.blas_threads import single_threaded
 from ...numerics.signals.onset import correlation_onset
-from ...results import Flag
 from .estimator import Choice, choose_estimate
 from .regression import PulseRegression, through_arx, with_prior, without_prior
 
@@ -217,14 +217,8 @@ def _tail_flags(found: PulseRegression) -> tuple[Flag, ...]:
     alive = (share > TAIL) & (size > 3 * noise)
     if not np.any(alive):
         return ()
-    return (
-        Flag(
-            "not_died_away",
-            f"at the end of {count} samples the response is still "
-            f"{100 * share[alive].max():.0f} % of its largest value; the part cut off biases "
-            "the rest. Choose a larger length, or method='okid'",
-        ),
-    )
+    share = 100 * share[alive].max()
+    return (flagged("not_died_away.impulse", samples=count, share=share),)
 
 
 def as_group(records: Record | Sequence[Record]) -> tuple[Record, ...]:

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from scipy.special import fdtrc, ndtri
 
 from ..._checks import integer
+from ..._flags import Flag, flagged
 from ...data import Record
 from ...errors import DataError
 from ...numerics.arrays import FloatArray
@@ -27,7 +28,6 @@ from ...numerics.regression.arx import (
 )
 from ...numerics.regression.fir import cautious_std, fit_kernel
 from ...numerics.regression.normal_equations import NormalEquations, normal_equations
-from ...results import Flag
 
 OKID_ORDERS = (2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64, 96, 128)
 """Candidate ARX orders for BIC."""
@@ -97,12 +97,7 @@ def with_prior(
         raise DataError(_unexcited(excited, wanted) + " or a richer input")
     flags: tuple[Flag, ...] = ()
     if excited < wanted:
-        note = Flag(
-            "partly_excited",
-            f"the input excites {excited} of {wanted} lags; the others are determined by the "
-            "prior alone",
-        )
-        flags = (note,)
+        flags = (flagged("partly_excited", excited=excited, lags=wanted),)
     single = [
         NormalEquations(
             equations.gram,
@@ -253,10 +248,4 @@ def _check_rows(equations: Sequence[NormalEquations], needed: int, past: int) ->
 
 def _silence(silent: NDArray[np.bool_]) -> tuple[Flag, ...]:
     """Flag the outputs that do not respond to the input."""
-    return tuple(
-        Flag(
-            "no_response",
-            f"output {a} shows no response to the input above the noise level",
-        )
-        for a in np.flatnonzero(silent)
-    )
+    return tuple(flagged("no_response", output=a) for a in np.flatnonzero(silent))

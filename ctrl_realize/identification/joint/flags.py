@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 from scipy.stats import chi2
 
+from ..._flags import Flag, flagged
 from ..._wording import in_time, interval_in_time
 from ...frequency.comparison import hertz
 from ...numerics.joint.agreement import BY_CHANCE
 from ...numerics.rational.bands import running_median, widest_run
-from ...results import Flag
 from ..output_error.flags import model_flags
 from .result import JointFit
 
@@ -19,31 +21,25 @@ _MUCH = 0.5  # of the largest shift of a response: where it is reported to be
 
 def joint_flags(fit: JointFit, max_delay: float | None) -> tuple[Flag, ...]:
     """List the flags of the joint model, and that of a contradiction first."""
-    length = fit.data.length
-    return tuple(
-        flag
-        for flag in (_contradiction(fit), *model_flags(fit.estimate, fit.dt, length, max_delay))
-        if flag is not None
-    )
+    of_model = model_flags(fit.estimate, fit.dt, fit.data.length, max_delay)
+    return (*_contradiction(fit), *of_model)
 
 
-def _contradiction(fit: JointFit) -> Flag | None:
+def _contradiction(fit: JointFit) -> Iterator[Flag]:
     agreed = fit.agreement
     if not agreed.contradicts:
-        return None
+        return
     limit = float(chi2.isf(BY_CHANCE, agreed.parameters))
-    largest = max(agreed.record_rise, agreed.frf_rise)
-    where = []
-    if agreed.frf_rise > min(limit, 0.999 * largest):
-        where.append(_points_outside(fit))
-    if agreed.record_rise > min(limit, 0.999 * largest):
-        where.append(_times_outside(fit))
-    return Flag(
+    limit = min(limit, 0.999 * max(agreed.record_rise, agreed.frf_rise))
+    where = [_points_outside(fit)] if agreed.frf_rise > limit else []
+    where += [_times_outside(fit)] if agreed.record_rise > limit else []
+    yield flagged(
         "frf_contradicts_records",
-        f"records and frequency response have no common model (likelihood ratio "
-        f"{agreed.statistic:.3g} for {agreed.parameters} parameters, p = {agreed.p_value:.2g}): "
-        f"the joint model {', and '.join(where)}. {_difference(fit)}. The interval spans those "
-        "of each alone; take the model of the one that was measured as the plant will be used",
+        statistic=agreed.statistic,
+        parameters=agreed.parameters,
+        chance=agreed.p_value,
+        where=", and ".join(where),
+        difference=_difference(fit),
     )
 
 

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from ..._flags import Flag, flagged
 from ..._wording import named
 from ...data import Record
 from ...errors import DataError
@@ -21,7 +22,6 @@ from ...numerics.output_error.step_data import bare_data
 from ...numerics.signals.counters import counter_period
 from ...numerics.signals.noise import mad_sigma
 from ...numerics.validation.own_response import OwnResponse
-from ...results import Flag
 from .averaging import common_sample_time, compared, delay_outliers, widened
 from .flags import sampled_flags
 from .own_gains import unlike_records
@@ -101,7 +101,7 @@ def _fit(
     outputs, inputs = zip(*signals, strict=True)
     found = fit_sampled(outputs, inputs, dt, latest=latest, **settings)
     if refuses and found.explained < FOLLOWS:
-        codes = [code for y in found.data.measured if (code := missing_code(y))]
+        codes = [str(code) for y in found.data.measured if (code := missing_code(y))]
         raise UnrelatedError(
             f"{_named(records)}: the output does not respond to the input (the best model "
             f"lowers the sum of squares by {found.explained:.3g} noise variances, expected at "
@@ -225,11 +225,4 @@ def _cut(records: tuple[Record, ...], used: tuple[int, ...], found: SampledFit) 
         return ()
     fits, size, offset = max(long)
     others = f", and so of {len(long) - 1} more" if len(long) > 1 else ""
-    return (
-        Flag(
-            "cut",
-            f"{size} samples were fitted, from sample {offset} on, of a record of "
-            f"{fits}{others}; select the best part with `between`, or pass parts as several "
-            "records",
-        ),
-    )
+    return (flagged("cut", used=size, first=offset, samples=fits, others=others),)

@@ -6,17 +6,18 @@ measured at every sample, and a constant input before the record.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ..._flags import Flag, flagged
 from ..._wording import in_time
 from ...data import Record
 from ...numerics.arrays import FloatArray, IntArray
 from ...numerics.constants import Z_95
 from ...numerics.validation.innovations import nonlinear_chance
 from ...numerics.validation.parameter_change import ParameterChange, parameter_change
-from ...results import Flag
 from .flags import right_zeros
 from .loop_flags import (
     RARE,
@@ -29,7 +30,7 @@ from .loop_flags import (
 )
 from .repeat_flags import time_apart
 from .result import OutputErrorFit
-from .sensor_flags import held_flags, sensor_flags
+from .sensor_flags import hold_time, sensor_flags
 
 # The following thresholds for flags are a matter of presentation.
 _GAINS_APART = 0.1  # least relative difference between groups of samples for a flag
@@ -72,10 +73,10 @@ def checked(fit: OutputErrorFit, *, alone: bool = True) -> OutputErrorFit:
     if len(fit.records) == 1:
         shown = _shown(fit)
         flags += sensor_flags(fit, shown.output, shown.fitted)
-        if "coarse_quantisation" not in codes:
-            held, hold = held_flags(shown.output, shown.fitted, fit.dt * shown.spacing)
-            flags += held
-            low = max(low - hold, 0.0)
+        held = hold_time(shown.output, shown.fitted, fit.dt * shown.spacing)
+        if held is not None and "coarse_quantisation" not in codes:
+            low = max(low - held[0], 0.0)
+            flags.append(held[1])
         if stepped:
             flags += _earlier_input(fit, codes)
         white = bool(fit.estimate.residual.noise_lags)
@@ -148,34 +149,24 @@ def against_one_model(shown: Shown, delay: float) -> tuple[list[Flag], list[str]
 
     Returns flags, and a note where the differences are too small to matter.
     """
-    fitted, residual, size = shown.fitted, shown.residual, shown.fitted.size
-    late = shown.earlier(round(delay))
-    parts = np.minimum(3 * np.arange(size) // size, 2)
+    fitted, size = shown.fitted, shown.fitted.size
+
+    def change(groups: IntArray) -> ParameterChange | None:
+        return parameter_change(shown.residual, fitted, groups, shown.rows)
+
+    between_thirds = change(np.minimum(3 * np.arange(size) // size, 2))
     flags = []
-    change = parameter_change(residual, fitted, parts, shown.rows)
-    if changes := _changes(change, delay):
-        flags.append(
-            Flag(
-                "time_varying",
-                f"between the thirds of the record, {changes}: the plant is time-varying; the "
-                "model reported is an average",
-            )
-        )
+    if changes := _changes(between_thirds, delay):
+        flags.append(flagged("time_varying", changes=changes))
     for what, groups in (
-        ("level of the input", _thirds(late)),
+        ("level of the input", _thirds(shown.earlier(round(delay)))),
         ("level of the output", _thirds(fitted)),
         ("direction", (np.gradient(fitted) > 0).astype(np.int64)),
     ):
-        if changes := _changes(parameter_change(residual, fitted, groups, shown.rows), delay):
-            flags.append(
-                Flag(
-                    "not_linear",
-                    f"depending on the {what}, {changes}: the plant is nonlinear; the model "
-                    "reported is an average",
-                )
-            )
+        if changes := _changes(change(groups), delay):
+            flags.append(flagged("not_linear", what=what, changes=changes))
             break
-    return flags, [] if flags else _small_changes(change)
+    return flags, [] if flags else _small_changes(between_thirds)
 
 
 def nonlinear_flags(shown: Shown, delay: float, total: float) -> tuple[Flag, ...]:
@@ -192,15 +183,7 @@ def nonlinear_flags(shown: Shown, delay: float, total: float) -> tuple[Flag, ...
     chance, part = nonlinear_chance(output, drive, past)
     if chance >= RARE or part < _EXPLAINED:
         return ()
-    return (
-        Flag(
-            "not_linear",
-            f"products of past inputs predict {100 * part:.0f} % of the innovations of the "
-            f"output (p = {chance:.1g}): the plant is nonlinear, or its dead time depends on "
-            "the level; the model reported is an average. Fit records of one operating point "
-            "each",
-        ),
-    )
+    return (flagged("not_linear.products", part=100 * part, chance=chance),)
 
 
 def _thirds(values: FloatArray) -> IntArray:
@@ -236,7 +219,7 @@ def _small_changes(change: ParameterChange | None) -> list[str]:
     ]
 
 
-def _earlier_input(fit: OutputErrorFit, codes: set[str]) -> list[Flag]:
+def _earlier_input(fit: OutputErrorFit, codes: set[str]) -> Iterator[Flag]:
     """Test whether an input change before the record may explain the start of the response.
 
     This is possible if the response starts together with the step; or if the response to an earlier
@@ -249,21 +232,12 @@ def _earlier_input(fit: OutputErrorFit, codes: set[str]) -> list[Flag]:
     moving, short = "not_at_rest" in codes, rest < fit.total_delay
     at_once = "no_delay_resolved" in codes
     detour = rest < fit.interval[1] and right_zeros(fit.estimate).size > 0
-    if not ((at_once and moving) or (short and (at_once or moving)) or detour):
-        return []
-    facts = ["the output starts to move together with the input"] * at_once
-    facts += ["the model has zeros in the right half-plane"] * detour
-    facts += ["the output was moving before the step"] * moving
-    facts += [f"only {in_time(rest)} was recorded before the step"] * short
-    return [
-        Flag(
-            "earlier_input",
-            f"{' and '.join(facts)}: "
-            "an input change before the record began would explain the response as well, "
-            "with any dead time; gain and lags would then be wrong too. Let the plant settle "
-            "for longer before the step",
-        )
-    ]
+    if (at_once and moving) or (short and (at_once or moving)) or detour:
+        facts = ["the output starts to move together with the input"] * at_once
+        facts += ["the model has zeros in the right half-plane"] * detour
+        facts += ["the output was moving before the step"] * moving
+        facts += [f"only {in_time(rest)} was recorded before the step"] * short
+        yield flagged("earlier_input", facts=" and ".join(facts))
 
 
 def _first_move(record: Record) -> float:

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 from scipy.special import ndtr
 
+from ..._flags import Flag, flagged
 from ..._wording import in_time
 from ...data import Record
 from ...numerics.arrays import FloatArray
@@ -14,7 +17,6 @@ from ...numerics.signals.excitation import lively_start
 from ...numerics.validation.innovations import feedback_chance
 from ...numerics.validation.instability import unstable_chance
 from ...numerics.validation.white_step import WhiteStep, white_step
-from ...results import Flag
 from .result import OutputErrorFit
 
 RARE = 1e-4
@@ -23,10 +25,7 @@ RARE = 1e-4
 were below 1e-4."""
 REGRESSED = 4000
 """Largest number of samples in the long regressions."""
-_LEAST_PAST, _MOST_PAST = (
-    30,
-    150,
-)  # past inputs in them; time grows with the square
+_LEAST_PAST, _MOST_PAST = 30, 150  # past inputs in them; time grows with the square
 _OFF = 0.2  # relative difference of gains or total delays that is worth a flag: presentation
 
 
@@ -37,15 +36,7 @@ def feedback_flags(records: tuple[Record, ...], delay: float) -> tuple[Flag, ...
     ]
     if min(chances) >= RARE / len(chances):
         return ()
-    return (
-        Flag(
-            "feedback",
-            f"the innovations of input and output are correlated (p = {min(chances):.1g}): a "
-            "controller or an operator closes the loop, or the output responds within the "
-            "same sample; dead time, gain and lags may be those of the inverse of the "
-            "controller: repeat the test in open loop",
-        ),
-    )
+    return (flagged("feedback", chance=min(chances)),)
 
 
 def unstable_flags(records: tuple[Record, ...], delay: float) -> tuple[Flag, ...]:
@@ -57,15 +48,7 @@ def unstable_flags(records: tuple[Record, ...], delay: float) -> tuple[Flag, ...
     ]
     if min(chances) >= RARE / len(chances):
         return ()
-    return (
-        Flag(
-            "unstable",
-            "the autocorrelation of the output is that of an unstable plant, stabilised by a "
-            f"controller (p = {min(chances):.1g}): fitted models are always stable, so the dead "
-            "time, gain and lags of this one are wrong; do not design with it. Identify the closed "
-            "loop, from set-point to output, or use a physical model",
-        ),
-    )
+    return (flagged("unstable", chance=min(chances)),)
 
 
 def _stretches(records: tuple[Record, ...]) -> list[tuple[FloatArray, FloatArray]]:
@@ -106,46 +89,29 @@ def _step(
 
 def coloured_flags(
     fit: OutputErrorFit, step: WhiteStep, output: FloatArray, drive: FloatArray
-) -> list[Flag]:
+) -> Iterator[Flag]:
     """Flags for what generalised least squares say otherwise than output error.
 
     Where the fit itself is one of generalised least squares, its dead time may lie at a local
     minimum that is not negative: least squares show whether it leads to a negative one.
     """
+    gain_error, total_error = Z_95 * step.gain_error, Z_95 * step.total_error
+    gains = abs(step.gain - fit.gain) + gain_error
+    totals = abs(step.total - fit.total_delay) + total_error
+    if not (gains <= _OFF * abs(fit.gain) and totals <= _OFF * abs(fit.total_delay)):
+        yield flagged(
+            "gain_not_resolved.coloured",
+            gain=step.gain,
+            gain_error=gain_error,
+            total=in_time(step.total),
+            total_error=in_time(total_error),
+        )
     before = fit.estimate.unweighted
     first: WhiteStep | None = step
     if before is not None:
         first = _step(fit, before, output, drive) if np.all(before.poles) else None
-    return [*_unresolved(fit, step), *(_noncausal(first) if first else ())]
-
-
-def _unresolved(fit: OutputErrorFit, step: WhiteStep) -> list[Flag]:
-    gains = abs(step.gain - fit.gain) + Z_95 * step.gain_error
-    totals = abs(step.total - fit.total_delay) + Z_95 * step.total_error
-    if gains <= _OFF * abs(fit.gain) and totals <= _OFF * abs(fit.total_delay):
-        return []
-    gain, total = Z_95 * step.gain_error, Z_95 * step.total_error
-    return [
-        Flag(
-            "gain_not_resolved",
-            "the disturbances are coloured: weighted accordingly, gain and total delay are "
-            f"{step.gain:.3g} +- {gain:.2g} and {in_time(step.total)} -+ {in_time(total)}: "
-            "neither is well determined; use a longer record, or one with smaller "
-            "disturbances",
-        )
-    ]
-
-
-def _noncausal(step: WhiteStep) -> list[Flag]:
-    if not step.dead_time_error or ndtr(step.dead_time / step.dead_time_error) >= RARE:
-        return []
-    error = Z_95 * step.dead_time_error
-    return [
-        Flag(
-            "noncausal",
-            "the disturbances are coloured: weighted accordingly, the dead time is negative, "
-            f"-{in_time(-step.dead_time)} +- {in_time(error)}: the output leads the input. Causes "
-            "are an unmeasured signal that acts on both, feedback, or different clocks of input "
-            "and output; dead time and lags are not those of the plant",
-        )
-    ]
+    if first is None or not first.dead_time_error:
+        return
+    if ndtr(first.dead_time / first.dead_time_error) < RARE:
+        error = in_time(Z_95 * first.dead_time_error)
+        yield flagged("noncausal.coloured", lead=in_time(-first.dead_time), error=error)

@@ -24,12 +24,12 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ..._flags import Flag, flagged
 from ...data import Record
 from ...numerics.arrays import FloatArray
 from ...numerics.constants import Z_95
 from ...numerics.output_error.result import OutputErrorEstimate
 from ...numerics.validation.own_response import disagreeing, homogeneity
-from ...results import Flag
 from .averaging import middle_gain
 from .record_gains import (
     ONE_POINT,
@@ -189,11 +189,11 @@ def _flags(gains: RecordGains) -> tuple[Flag, ...]:
     if not gains.differ:
         return ()
     return (
-        Flag(
-            "gains_differ",
-            f"the gains of the records differ by more than their noise explains (chi-square "
-            f"{gains.chi_square:.3g}, p = {gains.p_value:.2g}), the model has their median "
-            f"{gains.reference:.4g}; fit.gains.at is that at an operating point: "
-            f"{gains.in_words()}",
+        flagged(
+            "gains_differ.own",
+            chi_square=gains.chi_square,
+            chance=gains.p_value,
+            median=gains.reference,
+            schedule=gains.in_words(),
         ),
     )

@@ -6,12 +6,13 @@ from collections.abc import Iterable
 
 import numpy as np
 
+from ..._flags import Flag, marked
 from ..._wording import in_time, interval_in_time, numbers_alike, time_within
+from ...numerics.engine.problem import Structure
 from ...numerics.families.equal_lags import LagChain
 from ...numerics.families.flow import DispersedFlow
 from ...numerics.families.process_form import ProcessForm
-from ...numerics.output_error.result import OutputErrorEstimate, RobustKey
-from ...results import Flag
+from ...numerics.output_error.result import OutputErrorEstimate, RobustKey, StructureFit
 
 ESTIMATE_WORDS: dict[RobustKey, str] = {
     "onset": "visible onset",
@@ -23,25 +24,6 @@ ESTIMATE_WORDS: dict[RobustKey, str] = {
 }
 
 _FIRM = 0.1  # relative half width of the interval of a total delay that is called well determined
-
-_TOTAL_IN_DOUBT = frozenset(
-    {
-        "not_settled",
-        "integrating",
-        "gain_not_resolved",
-        "cancelled_pair",
-        "structured_misfit",
-        "input_in_residual",
-        "feedback",
-        "not_linear",
-        "time_varying",
-        "output_at_limit",
-        "earlier_input",
-        "load_disturbance",
-        "noncausal",
-    }
-)
-"""Flags with which the total delay is not well determined."""
 
 
 def model_words(model: LagChain | DispersedFlow) -> str:
@@ -60,9 +42,14 @@ def form_words(form: ProcessForm) -> str:
     return form.name + (f" with {', '.join(said)}" if said else "")
 
 
+def order_words(structure: Structure | StructureFit) -> str:
+    """Name a structure by its numbers of poles and zeros."""
+    return f"order {structure.order}, relative degree {structure.relative_degree}"
+
+
 def structure_words(fit: OutputErrorEstimate) -> str:
     """Name the structure of a model, or the process model that was prescribed."""
-    plain = f"order {fit.structure.order}, relative degree {fit.structure.relative_degree}"
+    plain = order_words(fit.structure)
     return plain if fit.process.form is None else f"{form_words(fit.process.form)} ({plain})"
 
 
@@ -73,7 +60,7 @@ def total_in_words(total: float, interval: tuple[float, float], flags: Iterable[
         return "not determined: the record is much shorter than the slowest time constant"
     if np.isnan(high):
         return f"{in_time(total, 5)} (dead time plus lags)"
-    doubted = any(flag.code in _TOTAL_IN_DOUBT for flag in flags)
+    doubted = any(flag.code in marked("total_in_doubt") for flag in flags)
     firm = "well determined, " if not doubted and is_firm(total, interval) else ""
     said = f"dead time plus lags; {firm}{interval_in_time(low, high)}"
     return f"{time_within(total, low, high)} ({said})"

@@ -8,12 +8,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..._checks import integer
+from ..._flags import Flag, flagged
 from ...data import ImpulseResponse
 from ...errors import DataError, DelayRangeError, OptionError, OrderError
 from ...numerics.arrays import FloatArray
 from ...numerics.hankel.delay_models import hankel_size
 from ...numerics.hankel.lanczos import largest_magnitude
-from ...results import Flag
 
 SETTLING_BAND = 0.02
 """Distance from the final value, relative to the range, within which a step response is settled."""
@@ -145,11 +145,10 @@ def filter_flags(impulse: ImpulseResponse) -> tuple[Flag, ...]:
     if still is None or still.zero_phase:
         return ()
     return (
-        Flag(
+        flagged(
             "filter_delay",
-            f"the data are still filtered ({still}), which adds {still.group_delay:.1f} "
-            f"samples ({1e3 * still.group_delay * impulse.dt:.3g} ms) of lag that does not "
-            "belong to the plant; use a zero-phase filter, or divide it out of the frequency "
-            "response",
+            filter=still,
+            samples=still.group_delay,
+            time=1e3 * still.group_delay * impulse.dt,
         ),
     )

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..._checks import integer, one_of
+from ..._flags import Flag, flagged
 from ...data import ImpulseResponse
 from ...delayed import DelayedStateSpace
 from ...errors import OrderError
@@ -16,7 +17,6 @@ from ...numerics.arrays import FloatArray, read_only
 from ...numerics.blas_threads import single_threaded
 from ...numerics.hankel.delay_models import OneModel, realize_at
 from ...numerics.state_space import responses
-from ...results import Flag
 from .impulses import as_impulse, channels, check_samples, filter_flags
 from .result import Realization
 
@@ -137,11 +137,7 @@ def realize(
         error_bound=model.rest_bound if padded else None,
         iae=_iae(markov[:, :, : delay + samples + 1], model, D, delay),
         impulse=data,
-        flags=(
-            *filter_flags(data),
-            *_pole_flags(model.A, samples),
-            *_gap_flags(model, order),
-        ),
+        flags=(*filter_flags(data), *_model_flags(model, order, samples)),
     )
     core = ct.ss(model.A, model.B, model.C, D, data.dt)
     return DelayedStateSpace(core, delay, fit=fit)
@@ -167,39 +163,18 @@ def _iae(window: FloatArray, model: OneModel, D: FloatArray, delay: int) -> floa
     return iae if np.isfinite(iae) else np.inf
 
 
-def _pole_flags(A: FloatArray, samples: int) -> Iterator[Flag]:
-    poles = np.linalg.eigvals(A)
+def _model_flags(model: OneModel, order: int, samples: int) -> Iterator[Flag]:
+    """List the flags that follow from poles and singular values."""
+    poles = np.linalg.eigvals(model.A)
     largest = float(np.abs(poles).max())
     if largest >= 1:
-        yield Flag(
-            "unstable",
-            f"the largest pole has magnitude {largest:.5f}: the plant integrates, the "
-            "data are noisy, or the order is too high; hankel='padded' gives a stable "
-            "model by construction",
-        )
+        yield flagged("unstable.realization", largest=largest)
     elif largest**samples > DIED_AWAY:
-        yield Flag(
-            "not_died_away",
-            f"the largest pole has magnitude {largest:.5f} and keeps "
-            f"{100 * largest**samples:.0f} % of its response at the end of the {samples} "
-            "samples: the plant integrates, or the data end too early to determine the "
-            "gain",
-        )
+        share = 100 * largest**samples
+        yield flagged("not_died_away", largest=largest, share=share, samples=samples)
     negative = poles[(np.abs(poles.imag) < 1e-9) & (poles.real < 0)].real
     if negative.size:
-        yield Flag(
-            "negative_pole",
-            f"there is a pole at z = {negative.min():.4f}, which no sampled first-order "
-            "lag has: the order is probably too high",
-        )
-
-
-def _gap_flags(model: OneModel, order: int) -> Iterator[Flag]:
-    last = float(model.singular_values[order - 1])
-    if model.following < NO_GAP * last:
-        return
-    yield Flag(
-        "no_gap",
-        f"singular values {order} and {order + 1} are {last:.4g} and "
-        f"{model.following:.4g}: without a gap between them the data do not show the order",
-    )
+        yield flagged("negative_pole", pole=negative.min())
+    last, following = float(model.singular_values[order - 1]), model.following
+    if following >= NO_GAP * last:
+        yield flagged("no_gap", order=order, next=order + 1, last=last, following=following)

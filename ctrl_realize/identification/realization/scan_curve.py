@@ -6,8 +6,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from ..._flags import Flag, flagged
 from ...numerics.arrays import FloatArray
-from ...results import Flag
 
 FLAT = 1.05
 """IAE relative to the smallest, up to which delays count as equally good."""
@@ -51,20 +51,12 @@ def curve_flags(iae: FloatArray, delay: int, rounding: float) -> Iterator[Flag]:
     low, high = flat_set(iae, delay, rounding)
     if high == last and last > 0:
         best = "the best delay is" if delay == last else "delays that fit equally well reach up to"
-        yield Flag("delay_at_bound", f"{best} max_delay={last}; try a larger one")
+        yield flagged("delay_at_bound.scan", best=best, max_delay=last)
     if contrast < CONTRAST:
-        yield Flag(
-            "no_delay_resolved",
-            f"the IAE without delay is only {contrast:.2f} times the smallest (at {delay} "
-            "samples): the data do not show whether there is a delay",
-        )
+        yield flagged("no_delay_resolved.scan", contrast=contrast, delay=delay)
     minima = local_minima(iae, delay, rounding)
     if minima > 1:
-        yield Flag(
-            "several_minima",
-            f"{minima} separate minima of the IAE between {low} and {high} samples are "
-            "within 5 % of the smallest IAE; lower the order, or filter more",
-        )
+        yield flagged("several_minima", minima=minima, low=low, high=high)
 
 
 def noise_flags(singular_value: float, floor: float | None, order: int) -> Iterator[Flag]:
@@ -72,15 +64,7 @@ def noise_flags(singular_value: float, floor: float | None, order: int) -> Itera
     if floor is None or floor <= 0:
         return
     ratio = singular_value / floor
-    seen = f"singular value {order} is {ratio:.2f} times the noise level"
     if ratio < NOISE_REFUSE:
-        yield Flag(
-            "order_in_noise",
-            f"{seen}: the delay is determined by noise; use a lower order, a lower "
-            "cut-off frequency, or the output-error fit",
-        )
+        yield flagged("order_in_noise", order=order, ratio=ratio)
     elif ratio < NOISE_CAUTION:
-        yield Flag(
-            "order_near_noise",
-            f"{seen}: expect errors of several samples; a lower cut-off frequency helps",
-        )
+        yield flagged("order_near_noise", order=order, ratio=ratio)

@@ -7,12 +7,13 @@ from dataclasses import dataclass
 import control as ct
 import numpy as np
 
+from ..._flags import Flag, flagged
 from ..._wording import in_percent, in_time, interval_in_time, time_within
 from ...data import Record
 from ...delayed import DelayedStateSpace
 from ...numerics.arrays import FloatArray, read_only
 from ...numerics.state_space.balancing import balanced_truncation
-from ...results import Flag, IntervalKind, ModelFit
+from ...results import IntervalKind, ModelFit
 from ..output_error.loop_flags import unstable_flags
 from ..output_error.result import OutputErrorFit
 from ..validation.residuals import analyse_residuals
@@ -231,11 +232,8 @@ def fitted_system(
                 "and output (np.diff of both), each channel by fit_output_error, or a "
                 "frequency response (spectral_frf, fit_frf)"
             )
-        seen["coloured_residual"] = Flag(
-            "coloured_residual",
-            f"neighbouring residuals have a correlation of {neighbours:.2g}: a drifting "
-            "disturbance, or a nonlinear plant. BIC assumes independent residuals, so the "
-            f"order may be too high, with slow poles that follow the drift; {advice}",
+        seen["coloured_residual"] = flagged(
+            "coloured_residual.state_space", correlation=neighbours, advice=advice
         )
     fit = StateSpaceFit(
         order=core.nstates,

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..._flags import Flag, flagged
 from ...data import Record
 from ...delayed import DelayedStateSpace, fit_of
 from ...errors import DataError, DataWarning
@@ -16,7 +17,6 @@ from ...numerics.arrays import IntArray
 from ...numerics.engine.structures import PLAUSIBLE
 from ...numerics.output_error.margins import CLOSE
 from ...numerics.state_space.delay_split import split_delays
-from ...results import Flag
 from ..impulse.from_io import Method, Start, impulse_from_io
 from ..realization.mimo import delay_matrix, given_delays
 from .result import StateSpaceFit, fitted_system
@@ -116,12 +116,7 @@ def _from_start(
     bic = {c.order: c.bic for c in fits} | {moved.order: moved.bic}
     flags = _silence(moved)
     if len(orders) > 1 and best.order == max(asked or ORDERS):
-        flags += (
-            Flag(
-                "highest_order",
-                f"the highest order tried, {best.order}, is the best: try higher ones",
-            ),
-        )
+        flags += (flagged("highest_order", order=best.order),)
     flags += tuple(_marginal(search.as_good(moved, CLOSE * PLAUSIBLE)))
     choices = _choices(moved, bic, shares)
     system = fitted_system(search.finish(moved), group, bic, choices, flags)
@@ -133,11 +128,12 @@ def _marginal(others: Sequence[Candidate]) -> Iterator[Flag]:
     if not others:
         return
     one = others[0]
-    yield Flag(
-        "marginal_decision",
-        f"order {one.order} with delays of {one.inputs} and {one.outputs} samples "
-        f"{'and' if one.feedthrough else 'and no'} feedthrough fits as well as the model "
-        "chosen, so that rounding on another processor may decide otherwise",
+    yield flagged(
+        "marginal_decision.state_space",
+        order=one.order,
+        inputs=one.inputs,
+        outputs=one.outputs,
+        feedthrough="and" if one.feedthrough else "and no",
     )
 
 
@@ -147,13 +143,8 @@ def _silence(best: Candidate) -> tuple[Flag, ...]:
     # Parameters of one output: its row of C and D, and the initial state.
     count = 2 * best.order + best.found.model.D.shape[1] * best.feedthrough
     gain = found.counts * np.log(found.spread / found.variance)
-    return tuple(
-        Flag(
-            "no_response",
-            f"output {a} shows no response to the input above the noise level",
-        )
-        for a in np.flatnonzero(gain < count * np.log(found.counts))
-    )
+    silent = np.flatnonzero(gain < count * np.log(found.counts))
+    return tuple(flagged("no_response", output=a) for a in silent)
 
 
 def _choices(best: Candidate, bic: dict[int, float], begun: Shares) -> tuple[str, ...]:

@@ -9,6 +9,7 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from ..._checks import integer, numbers
+from ..._flags import Flag, flagged
 from ..._wording import in_time, interval_in_time, time_within
 from ...data import Record
 from ...data.given import as_records
@@ -17,7 +18,7 @@ from ...errors import CtrlRealizeError, DataError, OptionError
 from ...numerics.arrays import FloatArray
 from ...numerics.blas_threads import single_threaded
 from ...numerics.signals.noise import correlation_time, kept_in_blocks
-from ...results import Flag, Result
+from ...results import Result
 from ..output_error.fit import fit_output_error
 
 Estimator: TypeAlias = Callable[[Any], DelayedStateSpace]
@@ -93,15 +94,10 @@ class Bootstrap(Result):
     @property
     def flags(self) -> tuple[Flag, ...]:
         """Warnings about failed draws, and about quantisation, which draws do not contain."""
-        failed = Flag("failed_draws", f"the estimator raised an error for {self.failed} draws")
-        coarse = Flag(
-            "coarse_quantisation",
-            "the output is quantised more coarsely than its noise; the quantisation error is "
-            "the same in every draw, so all intervals are too narrow",
-        )
+        failed = [flagged("failed_draws", failed=self.failed)] if self.failed else []
         fitted = () if self.system.fit is None else self.system.fit.flags
-        found = (failed,) if self.failed else ()
-        return found + ((coarse,) if any(flag.code == coarse.code for flag in fitted) else ())
+        coarse = any(flag.code == "coarse_quantisation" for flag in fitted)
+        return (*failed, *([flagged("coarse_quantisation.draws")] if coarse else []))
 
     def poles(self) -> list[Any]:
         """Poles of every model in the z-plane, without delays."""

@@ -9,6 +9,7 @@ import numpy as np
 from scipy.special import ndtri
 
 from ..._checks import integer, real
+from ..._flags import Flag, flagged
 from ...data import Record
 from ...data.given import as_record
 from ...delayed import DelayedStateSpace
@@ -17,7 +18,6 @@ from ...errors import DataError, OptionError
 from ...numerics.arrays import BoolArray, FloatArray, read_only
 from ...numerics.blas_threads import single_threaded
 from ...numerics.signals.correlation import correlation, cross_bound, fit_percent, whiteness
-from ...results import Flag
 from .residuals_result import ResidualAnalysis
 
 EXACT = 1e-8
@@ -141,17 +141,9 @@ def _flags(later: BoolArray, earlier: BoolArray, cross: FloatArray) -> Iterator[
     if later.any():
         size = np.where(later, np.abs(cross), 0.0)
         _, _, lag = np.unravel_index(np.argmax(size), size.shape)
-        yield Flag(
-            "input_in_residual",
-            f"the residual is correlated with past inputs, most at lag {lag}: the order "
-            "or the delay of the model is wrong, or the plant is nonlinear",
-        )
+        yield flagged("input_in_residual", lag=lag)
     if earlier.any():
-        yield Flag(
-            "feedback",
-            "the input is correlated with past residuals: the record was taken in closed "
-            "loop, which biases estimates that assume an independent input",
-        )
+        yield flagged("feedback.residual")
 
 
 def _first_response(system: ct.StateSpace) -> FloatArray:

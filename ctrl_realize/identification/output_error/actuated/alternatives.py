@@ -1,4 +1,4 @@
-"""The actuators that can be requested, what identifies each, and how each is shown."""
+"""The actuators that can be requested, what identifies each, and the words about them."""
 
 from __future__ import annotations
 
@@ -7,6 +7,8 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
+from ...._parameters import Parameter
+from ...._wording import plainly
 from ....actuators import (
     Actuator,
     Backlash,
@@ -86,6 +88,39 @@ ASKED: tuple[str, ...] = ("auto", *ALTERNATIVES)
 def alternative_of(kind: Kind) -> Alternative:
     """Last entry that has a kind."""
     return [one for one in ALTERNATIVES.values() if kind in one.kinds][-1]
+
+
+def missing_tests(names: Sequence[str]) -> str:
+    """Say which tests would identify what the command cannot."""
+    every = [ALTERNATIVES[name] for name in names]
+    tests = "; ".join(f"{one.words} ({one.test.rstrip(',')})" for one in every)
+    return f"not tried, since the command cannot identify them (with a test that can): {tests}"
+
+
+def cannot_tell(name: str) -> str:
+    """Say why an actuator that was requested is not fitted."""
+    one = ALTERNATIVES[name]
+    return (
+        f"actuator={name!r}: expected {one.expected}, got records that cannot distinguish "
+        f"{one.words} from gain and dead time; try {one.test} or actuator='auto'"
+    )
+
+
+def not_needed(names: Sequence[str], evidence: float) -> str:
+    """Say that a linear model is enough."""
+    tried = " or ".join(ALTERNATIVES[name].words for name in names)
+    return (
+        f"linear: the evidence for {tried} is not very strong (information criterion "
+        f"{plainly(abs(evidence), 3)} {'lower' if evidence > 0 else 'higher'} with it)"
+    )
+
+
+def unresolved(parameter: Parameter, test: str) -> str:
+    """Say that the records determine a parameter badly, and which test would help."""
+    return (
+        f"{parameter.label} lies between {parameter.low:.3g} and {parameter.high:.3g}, and the "
+        f"records do not determine it more closely; {test} would"
+    )
 
 
 def model_of(motion: Motion, start: float) -> Actuator:

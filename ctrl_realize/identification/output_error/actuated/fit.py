@@ -7,7 +7,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from ...._flags import flagged, marked
 from ...._parameters import Parameter
+from ...._wording import plainly
 from ....data import Record
 from ....errors import DataError, NoStepError
 from ....numerics.actuated.choice import ActuatedFit, fit_actuated
@@ -34,17 +36,16 @@ from ....numerics.signals.noise import mad_sigma
 from ...step.steps import found_step
 from ..flags import model_flags
 from ..result import OutputErrorFit
-from .alternatives import ALTERNATIVES, alternative_of, model_of
-from .result import ActuatorFit
-from .words import (
+from .alternatives import (
+    ALTERNATIVES,
+    alternative_of,
     cannot_tell,
     missing_tests,
+    model_of,
     not_needed,
-    not_told,
-    of_the_record,
-    structured,
     unresolved,
 )
+from .result import ActuatorFit
 
 _MOST_EDGES = 24  # of a command with noise, whose levels are then found
 _WELL = 0.25  # relative half width of an interval up to which a parameter is resolved
@@ -188,15 +189,16 @@ def _replaced(
         flags=(),
         actuator=actuator,
     )
-    flags = [
-        flag for flag in result.flags if of_the_record(flag.code, load=result.data.load is not None)
-    ]
-    of_model = model_flags(estimate, result.dt, scales.length, None)
-    flags += [flag for flag in of_model if flag is not None]
+    staying = marked("stays_with_actuator")
+    if result.data.load is not None:
+        staying |= {"load_disturbance"}
+    flags = [flag for flag in result.flags if flag.code in staying]
+    flags += model_flags(estimate, result.dt, scales.length, None)
     if actuator.unresolved:
-        flags.append(not_told(actuator.unresolved))
+        flags.append(flagged("actuator_not_resolved", parameters="; ".join(actuator.unresolved)))
     if not estimate.adequate:
-        flags.append(structured(replaced.normalized_rms))
+        ratio = plainly(replaced.normalized_rms, 3)
+        flags.append(flagged("structured_misfit.actuator", ratio=ratio))
     return replace(replaced, flags=tuple(flags))
 
 

@@ -10,12 +10,12 @@ from dataclasses import replace
 
 import numpy as np
 
+from ...._flags import Flag, flagged
 from ....data import Record
 from ....delayed.simulation import simulate_record
 from ....errors import DataError, UnsuitableSystemError
 from ....numerics.arrays import BoolArray, FloatArray
 from ....numerics.validation.limits import at_limit, clips, ends, passed, plateaus
-from ....results import Flag
 from ..arguments import FEWEST_SAMPLES, step_data_of
 from ..result import OutputErrorFit
 from ..summary import fitted_core, fitted_model
@@ -47,15 +47,10 @@ def without_cut_noise(record: Record) -> tuple[Record, tuple[Flag, ...]]:
 
 
 def _at_limit(limit: float, samples: BoolArray, *, left_out: bool) -> Flag:
-    return Flag(
-        "output_at_limit",
-        f"{np.count_nonzero(samples)} samples are at {limit:.4g} or among such samples, without "
-        "noise beyond: the output saturates there"
-        + (
-            "; they were left out of the fit, and what the plant does beyond is extrapolated"
-            if left_out
-            else ", and gain and lags are those of the clipped signal"
-        ),
+    return flagged(
+        "output_at_limit" if left_out else "output_at_limit.kept",
+        count=np.count_nonzero(samples),
+        limit=limit,
     )
 
 
@@ -97,12 +92,8 @@ def _without_plateaus(record: Record, linear: OutputErrorFit, fit: Fit) -> Outpu
         return None
     if not clips(output[rows], linear.fitted, beyond[rows], held[rows]):
         return None
-    flag = Flag(
-        "output_at_limit",
-        f"{np.count_nonzero(held)} samples are at {_levels(output, held)}, which the output "
-        "reaches with a kink and does not pass: it saturates there, before the noise; they were "
-        "left out of the fit, and what the plant does beyond is extrapolated",
-    )
+    count, levels = np.count_nonzero(held), _levels(output, held)
+    flag = flagged("output_at_limit.plateau", count=count, limits=levels)
     return replace(found, flags=(*found.flags, flag))
 
 

@@ -1,0 +1,75 @@
+"""Flags of results, in the words of one table, `flags.toml`."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache
+from typing import Any
+
+from ._facts import facts
+
+
+@dataclass(frozen=True)
+class Flag:
+    """Warning about a result.
+
+    Attributes
+    ----------
+    code : str
+        Short fixed name for programs: ``"delay_at_bound"``.
+    message : str
+        What was found, with its numbers, and what to try.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import ctrl_realize as cr
+    >>> pulse = np.r_[np.zeros(38), 0.1 * 0.9 ** np.arange(300)]
+    >>> for flag in cr.estimate_delay(pulse, 1, max_delay=37, dt=0.01).fit.flags:
+    ...     print(f"{flag.code}: {flag}")
+    delay_at_bound: the best delay is max_delay=37; try a larger one
+    """
+
+    code: str
+    message: str
+
+    def __str__(self) -> str:
+        return self.message
+
+
+@cache
+def _table() -> dict[str, dict[str, Any]]:
+    return facts("flags.toml")
+
+
+def flagged(key: str, /, **values: object) -> Flag:
+    """Make a flag from the words of the table, with `values` in them.
+
+    Parameters
+    ----------
+    key : str
+        Code of the flag, or ``"code.case"`` for the words of one case.
+    **values
+        What stands in braces in the words.
+
+    Examples
+    --------
+    >>> from ctrl_realize._flags import flagged
+    >>> flagged("drift", rate="0.2 per s")
+    Flag(code='drift', message='a drift of 0.2 per s was estimated together with the model')
+    """
+    code, _, case = key.partition(".")
+    return Flag(code, _table()[code][case or "words"].format(**values))
+
+
+@cache
+def marked(mark: str) -> frozenset[str]:
+    """Codes that have a mark in the table.
+
+    Examples
+    --------
+    >>> from ctrl_realize._flags import marked
+    >>> sorted(marked("wrong_dead_time"))
+    ['delay_at_bound', 'no_delay_resolved', 'order_in_noise']
+    """
+    return frozenset(code for code, row in _table().items() if mark in row.get("marks", ()))
