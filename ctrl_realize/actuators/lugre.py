@@ -15,7 +15,7 @@ from .base import Actuator, State
 
 
 @dataclass(frozen=True)
-class LuGreFriction(Actuator):
+class LuGreFriction(LuGre, Actuator):
     """A stem, a mass on a spring, with friction by the LuGre model.
 
     The drive would hold the stem at the command if there were no friction. Static friction holds it
@@ -65,15 +65,6 @@ class LuGreFriction(Actuator):
     [0.0, 0.0, 9.0]
     """
 
-    mass: float
-    spring: float
-    coulomb: float
-    static: float
-    stribeck: float
-    bristle: float
-    damping: float
-    viscous: float
-
     _states: ClassVar[tuple[str, ...]] = ("position", "velocity", "deflection")
     _timed: ClassVar[bool] = True
 
@@ -93,16 +84,12 @@ class LuGreFriction(Actuator):
             f"{self.coulomb / self.spring:g} in units of the command"
         )
 
-    @property
-    def _stem(self) -> LuGre:
-        return LuGre(**vars(self))
-
     def _rest(self, command: float) -> State:
         return (command, 0.0, 0.0)
 
     def _advance(self, state: State, command: float, dt: float) -> tuple[State, float]:
-        after = lugre_step(np.array(state), command, self._stem, dt)
+        after = lugre_step(np.array(state), command, self, dt)
         return tuple(after.tolist()), state[0]
 
     def _simulated(self, command: FloatArray, dt: float) -> FloatArray:
-        return lugre_stem(command, self._stem, dt)
+        return lugre_stem(command, self, dt)

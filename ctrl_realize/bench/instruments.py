@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Protocol
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -13,41 +13,12 @@ from ..errors import DataError
 from ..numerics.arrays import FloatArray
 from .imperfections import band_limited_noise, converted, drive_spikes
 
+if TYPE_CHECKING:
+    from .control_valve import Valve
+
 STROKE_MM = 2.0
 AD_RANGE_V = 10.0
 VOLT_PER_MA = 0.25
-
-
-class Disturbances(Protocol):
-    """Properties of a simulated set-up for `recorded`; see `Valve`."""
-
-    @property
-    def anti_aliasing(self) -> object:
-        """Kind of filter before the converter, or None."""
-
-    @property
-    def noise(self) -> float:
-        """Of the output, over the stroke."""
-
-    @property
-    def drift(self) -> float:
-        """Of the output, in strokes per second."""
-
-    @property
-    def hum(self) -> float:
-        """Amplitude at 50 Hz, over the stroke."""
-
-    @property
-    def input_noise(self) -> float:
-        """Of the input, over its range."""
-
-    @property
-    def spikes(self) -> float:
-        """On the input, per second."""
-
-    @property
-    def bits(self) -> int | None:
-        """Of the converter; None for no rounding."""
 
 
 def held_input(values: ArrayLike, name: str, limits: tuple[float, float], unit: str) -> FloatArray:
@@ -69,7 +40,7 @@ def held_input(values: ArrayLike, name: str, limits: tuple[float, float], unit: 
 
 
 def recorded(
-    valve: Disturbances,
+    valve: Valve,
     time: FloatArray,
     current: FloatArray,
     displacement: FloatArray,

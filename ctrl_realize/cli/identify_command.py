@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from ..data import MeasuredFRF
-from ..delayed import fit_of
+from ..delayed import DelayedStateSpace, fit_of
 from ..errors import CtrlRealizeError, DataError, OptionError
 from ..frequency import FRFComparison, compare_frf
 from ..identification.campaign.campaign import Campaign
@@ -59,27 +60,31 @@ def run_identify(
     run = Run(typed_call("identify", words), (*files, *([frf] if frf else [])), overwrite)
     words += ["--output", str(output)]
     calls = calls_again(files, settings, how, words, None if frf is None else (frf, response))
-    sources = how.sources(files)
+    sources, task = how.sources(files), _Task(settings, measured, run, report)
     if separate and len(sources) > 1:
-        return _each_alone(sources, output, settings, how, measured, words, run, report)
+        return _each_alone(task, sources, output, how, words)
     refuse_other_results(output, run)
     if len(sources) > 1 and not joint:
-        return _many(sources, output, settings, measured, calls, jobs, run, report)
+        return _many(task, sources, output, calls, jobs)
     with appearing(output, run) as folder:
-        written = _one(sources, folder, settings, measured, calls, report)
+        written = _one(task, sources, folder, calls)
     _say_what_is_written(output, ["model.json"], report and written)
     return 0 if written else 1
 
 
-def _one(
-    sources: list[Source],
-    folder: Path,
-    settings: Settings,
-    frf: MeasuredFRF | None,
-    calls: list[tuple[str, str]],
-    report: bool,
-) -> bool:
+@dataclass(frozen=True)
+class _Task:
+    """What is the same for all records of a command."""
+
+    settings: Settings
+    frf: MeasuredFRF | None
+    run: Run
+    report: bool
+
+
+def _one(task: _Task, sources: list[Source], folder: Path, calls: list[tuple[str, str]]) -> bool:
     """Identify one model into a folder; return whether its report was written as asked."""
+    settings, frf = task.settings, task.frf
     records = [source.record() for source in sources]
     options = {**settings.choices, **({} if frf is None or not settings.joint else {"frf": frf})}
     with working("identifying"):
@@ -87,13 +92,11 @@ def _one(
         comparison = None if frf is None else compare_frf(system, frf)
     for source, record in zip(sources, records, strict=True):
         say(printable(f"{source.file}: {record!r}"))
-    say(fit_of(system, ModelFit).report())
-    if comparison is not None:
-        say()
-        say(comparison.report())
+    _say_model(system, comparison)
     return write_record_files(
         folder, system, records[0], [source.file for source in sources],
-        frf=frf, comparison=comparison, settings=settings.given, calls=calls, with_report=report,
+        frf=frf, comparison=comparison, settings=settings.given, calls=calls,
+        with_report=task.report,
     )  # fmt: skip
 
 
@@ -102,16 +105,21 @@ def _say_what_is_written(output: Path, names: list[str], reported: bool) -> None
     say(f"\nwritten to {printable(str(output))}: {', '.join([*names, *more])}")
 
 
+def _say_model(system: DelayedStateSpace, comparison: FRFComparison | None) -> None:
+    say(fit_of(system, ModelFit).report())
+    if comparison is not None:
+        say()
+        say(comparison.report())
+
+
 def _many(
+    task: _Task,
     sources: list[Source],
     output: Path,
-    settings: Settings,
-    frf: MeasuredFRF | None,
     calls: list[tuple[str, str]],
     jobs: int | None,
-    run: Run,
-    report: bool,
 ) -> int:
+    settings, frf = task.settings, task.frf
     n_jobs = jobs if jobs is not None else -1 if len(sources) >= _MANY else 1
     with kept_rows(output) as store:
         campaign = identify_campaign(
@@ -120,27 +128,17 @@ def _many(
         )  # fmt: skip
         _refuse_useless(campaign)
         comparison = None if frf is None else compare_frf(campaign.system, frf)
-        _say_campaign(campaign, comparison)
-        with appearing(output, run) as folder:
+        say(f"{campaign_table(campaign)}\n\n{campaign.report()}\n\nFinal model")
+        _say_model(campaign.system, comparison)
+        with appearing(output, task.run) as folder:
             written = write_campaign_files(
                 folder, campaign, [source.file for source in sources],
                 frf=frf, comparison=comparison, settings=settings.given, calls=calls,
-                with_report=report,
+                with_report=task.report,
             )  # fmt: skip
-    _say_what_is_written(output, ["model.json", "records.csv", "models/"], report and written)
+    names = ["model.json", "records.csv", "models/"]
+    _say_what_is_written(output, names, task.report and written)
     return 1 if campaign.failed or not written else 0
-
-
-def _say_campaign(campaign: Campaign, comparison: FRFComparison | None) -> None:
-    say(campaign_table(campaign))
-    say()
-    say(campaign.report())
-    say()
-    say("Final model")
-    say(fit_of(campaign.system, ModelFit).report())
-    if comparison is not None:
-        say()
-        say(comparison.report())
 
 
 def _refuse_useless(campaign: Campaign) -> None:
@@ -156,21 +154,14 @@ def _refuse_useless(campaign: Campaign) -> None:
 
 
 def _each_alone(
-    sources: list[Source],
-    output: Path,
-    settings: Settings,
-    how: Reading,
-    frf: MeasuredFRF | None,
-    words: list[str],
-    run: Run,
-    report: bool,
+    task: _Task, sources: list[Source], output: Path, how: Reading, words: list[str]
 ) -> int:
     """Identify each record into its own folder; failures do not stop the rest."""
     refuse_a_file(output)
     failed = 0
     names = unique_names([source.name for source in sources])
     for name in names:
-        refuse_other_results(output / name, run)
+        refuse_other_results(output / name, task.run)
 
     def position(source: Source) -> int:
         """Number of a test in its file."""
@@ -179,9 +170,10 @@ def _each_alone(
     for source, name in progress(zip(sources, names, strict=True), len(sources), "identify"):
         try:
             # each folder appears as soon as it is finished, so that an interruption loses no other
-            with appearing(output / name, run) as folder:
-                calls = calls_again([source.file], settings, how, words, None, position(source))
-                failed += not _one([source], folder, settings, frf, calls, report)
+            with appearing(output / name, task.run) as folder:
+                test = position(source)
+                calls = calls_again([source.file], task.settings, how, words, None, test)
+                failed += not _one(task, [source], folder, calls)
         except (CtrlRealizeError, OSError) as error:
             failed += 1
             complain(f"{printable(str(source.file))}: {one_line(error)}")

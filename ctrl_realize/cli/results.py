@@ -159,7 +159,7 @@ def campaign_table(campaign: Campaign) -> str:
     scale, unit = time_unit(float(np.median([row.dead_time for row in campaign.good])))
     rows = []
     for row in campaign.rows:
-        if row.model is None:
+        if row.system is None:
             rows.append([printable(row.name), in_digits(row.amplitude), "", "", "", "",
                          printable(row.error or "failed")])  # fmt: skip
             continue

@@ -9,52 +9,17 @@ import unicodedata
 from collections.abc import Container
 from pathlib import Path
 
+from .._facts import facts
 from ..errors import OptionError
 
-TYPES = """
-bool byte char dint dt date date_and_time dword int ldate ldate_and_time ldt lint lreal ltime
-ltime_of_day ltod lword real sint string time time_of_day tod udint uint ulint usint wchar word
-wstring
-"""
-"""Elementary types: IEC 61131-3:2003 and 2013, table 10."""
-STANDARD = """
-any any_bit any_chars any_date any_derived any_duration any_elementary any_int any_magnitude any_num
-any_real any_signed any_string any_unsigned
-abs acos add asin atan atan2 concat cos delete div divtime eq exp expt find ge gt insert le left len
-limit ln log lt max mid min mod move mul multime mux ne replace right rol ror sel shl shr sin sqrt
-sub tan trunc
-add_dt_time add_ltime add_time add_tod_time concat_date concat_date_tod concat_dt concat_tod
-day_of_week div_ltime div_time is_valid is_valid_bcd lower_bound mul_ltime mul_time split_date
-split_dt split_tod sub_date_date sub_dt_dt sub_dt_time sub_ltime sub_time sub_tod_time sub_tod_tod
-upper_bound
-ctd ctu ctud f_trig r_trig rs rtc sema sr tof ton tp
-"""
-"""Generic types, standard functions and function blocks: tables 11 and 22 to 46 of 2013, and those
-of 2003 that were dropped. Their names are keywords: annex C of 2003, table C.2."""
-WORDS = """
-abstract action and array at by case class configuration constant continue do else elsif en end
-end_action end_case end_class end_configuration end_for end_function end_function_block end_if
-end_interface end_method end_namespace end_program end_repeat end_resource end_step end_struct
-end_transition end_type end_var end_while eno exit extends f_edge false final for from function
-function_block if implements initial_step interface internal interval method namespace non_retain
-not null of on or overlap override priority private program protected public r_edge read_only
-read_write ref ref_to repeat resource retain return single step struct super task then this to
-transition true type until using var var_access var_config var_external var_global var_in_out
-var_input var_output var_temp while with xor
-andn cal calc calcn jmp jmpc jmpcn ld ldn orn ret retc retcn st stn xorn
-"""
-"""Keywords of all languages of the standard, and operators of its instruction list."""
-C = """
-auto break char const default double enum extern float goto inline int long register restrict short
-signed sizeof static switch typedef union unsigned void volatile
-"""
-MATLAB = "catch classdef end function otherwise parfor persistent spmd"
+_WORDS = {kind: words.split() for kind, words in facts("export/reserved.toml").items()}
 RESERVED = frozenset(
-    f"{TYPES} {STANDARD} {WORDS} {C} {MATLAB}".split()
+    [word for words in _WORDS.values() for word in words]
     + [word.lower() for word in (*keyword.kwlist, *keyword.softkwlist, "type")]
 )
 """Words of any of the languages that are no names (in lower case)."""
-CONVERSION = re.compile(rf"({'|'.join(TYPES.split())}|bcd|)_?to_({'|'.join(TYPES.split())}|bcd)")
+_TYPES = "|".join(_WORDS["types"])
+CONVERSION = re.compile(rf"({_TYPES}|bcd|)_?to_({_TYPES}|bcd)")
 """Names of the standard's conversion functions, such as ``real_to_int`` and ``to_int``."""
 LONGEST = 48
 """Characters of a name: MATLAB cuts a variable at 63, and the scripts add up to 14."""

@@ -33,14 +33,4 @@ def lively_parts(
 def _part(record: Record, start: int, count: int) -> Record:
     if record.n_samples <= count:
         return record
-    part = slice(start, start + count)
-    return Record(
-        record.time[part],
-        record.input[..., part],
-        record.output[..., part],
-        name=record.name,
-        input_labels=record.input_labels,
-        units=record.units,
-        output_labels=record.output_labels,
-        missing="keep" if record.n_missing else "refuse",
-    )
+    return record.between(*record.time[[start, start + count - 1]])

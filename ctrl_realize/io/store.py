@@ -12,7 +12,6 @@ from typing import Any
 
 from ..delayed import DelayedStateSpace
 from ..errors import DataError, FileFormatError, OptionError
-from ..identification.campaign.packed_model import PackedModel
 from ..identification.campaign.rows import CampaignRow, versions
 from ..results import Flag
 from .atomic import write_text
@@ -191,7 +190,7 @@ def _row_from(content: Any, key: str) -> CampaignRow:
         name=field(content, "name", str),
         **numbers,
         **intervals,
-        model=PackedModel.of(system),
+        system=system,
         flags=flags,
         warnings=tuple(str(text) for text in field(content, "warnings", list)),
     )

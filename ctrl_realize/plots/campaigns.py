@@ -169,9 +169,8 @@ def _by_amplitude(
     for position, rows in enumerate(groups.values()):
         spread = 0.6 * (np.arange(len(rows)) / max(len(rows) - 1, 1) - 0.5)
         at = position + (spread if len(rows) > 1 else np.zeros(1))
-        for x, row in zip(at, rows, strict=True):
-            low, high = (bound / dt for bound in row.interval)
-            axes.plot([x, x], [low, high], color=looks["color"], linewidth=1.2, alpha=0.45)
+        low, high = np.array([row.interval for row in rows]).T / dt
+        axes.vlines(at, low, high, color=looks["color"], linewidth=1.2, alpha=0.45)
         lines += axes.plot(at, [row.delay for row in rows], **looks)
     axes.set_xticks(range(len(groups)), [f"{height:g}" for height in groups])
     axes.set_xlabel("height of the step [unit of the input]")
@@ -182,11 +181,8 @@ def _by_amplitude(
 def _by_name(
     axes: Axes, rows: tuple[CampaignRow, ...], dt: float, looks: dict[str, Any]
 ) -> list[Line2D]:
-    for position, row in enumerate(rows):
-        low, high = (bound / dt for bound in row.interval)
-        axes.plot(
-            [low, high], [position, position], color=looks["color"], linewidth=1.6, alpha=0.45
-        )
+    low, high = np.array([row.interval for row in rows]).T / dt
+    axes.hlines(range(len(rows)), low, high, color=looks["color"], linewidth=1.6, alpha=0.45)
     names = [plain(row.name, 34) for row in rows]
     axes.set_yticks(range(len(rows)), names, fontsize=10)
     axes.set_ylim(len(rows) - 0.5, -0.5)

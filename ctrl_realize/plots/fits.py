@@ -21,6 +21,7 @@ from ..identification.step.steps import unit_step
 from ..numerics.signals.correlation import fit_percent
 from . import style
 from .names import plain, with_unit, wrapped
+from .records import draw_beside
 from .shared_docs import documented
 from .style import axis_time_unit
 
@@ -28,6 +29,7 @@ _RULED_OUT = 10.0
 """Structures with a larger difference of the criterion are not drawn."""
 _MOST_STRUCTURES = 8
 _MOST_RECORDS = 40  # drawn behind their mean
+_NO_FIT = "no output-error fit; use fit_output_error or identify(record)"
 MOST_BESIDE = 12
 """Most records that are drawn each beside the model."""
 
@@ -64,7 +66,7 @@ def fit_plot(
     >>> cplt.figure.axes[-1].get_xlabel()
     'dead time [ms]'
     """
-    result = _delay_fit(fit)
+    result = style.result_of(fit, OutputErrorFit, _NO_FIT)
     rows = evidence_height(result)
     rising = result.fitted[-1] >= result.fitted[0]
     with style.canvas(
@@ -108,7 +110,7 @@ def dead_time_plot(
     >>> cplt.figure.axes[0].get_xlabel()
     'dead time [ms]'
     """
-    result = _delay_fit(fit)
+    result = style.result_of(fit, OutputErrorFit, _NO_FIT)
     size = (8.0, 1.0 + evidence_height(result))
     with style.canvas(ax, title=title, default_title=_name(result), size=size) as (axes,):
         return style.finished([axes], [_evidence(axes, result, **kwargs)], legends=())
@@ -170,20 +172,12 @@ def each_record_plot(
     ) as axes:
         lines: list[list[Line2D]] = []
         for axis, record, name in zip(axes, shown, names, strict=False):
-            factor, unit = axis_time_unit(float(np.ptp(record.time)), axis)
             measured = np.atleast_2d(record.output)[output]
             model = simulate_record(system, record, "estimate", gaps=True)[output]
-            looks = {"color": style.MODEL, "linestyle": style.DASHES[0], "label": "model", **kwargs}
-            seen, time = ~np.isnan(measured), factor * record.time
-            drawn = list(
-                axis.plot(time[seen], measured[seen], color=style.MEASURED, label="measured")
-            )
-            lines.append([*drawn, *axis.plot(time, model, **looks)])
+            seen = ~np.isnan(measured)
+            lines.append(draw_beside(axis, record, output, [(model, {"label": "model", **kwargs})]))
             fit = float(fit_percent(measured[None, seen], model[None, seen])[0])
             axis.set_title(f"{plain(name, 30)}, {fit:.1f} %", loc="left", fontsize=10)
-            axis.set_xlabel(f"time [{unit}]")
-            label = with_unit(record.output_labels[output], record.output_units[output])
-            axis.set_ylabel(wrapped(label, 16))
         for axis in axes[len(shown) :]:
             axis.set_visible(False)
             lines.append([])
@@ -193,16 +187,6 @@ def each_record_plot(
 def each_record_rows(count: int) -> int:
     """Rows of axes of `each_record_plot` for a number of records."""
     return 1 if count == 1 else -(-min(count, MOST_BESIDE) // 2)
-
-
-def _delay_fit(given: Any) -> OutputErrorFit:
-    result = given.fit if isinstance(given, DelayedStateSpace) else given
-    if not isinstance(result, OutputErrorFit):
-        raise OptionError(
-            f"got {given!r}, which has no output-error fit; use fit_output_error or "
-            "identify(record)"
-        )
-    return result
 
 
 def _name(result: OutputErrorFit) -> str:

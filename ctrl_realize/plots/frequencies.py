@@ -13,7 +13,6 @@ from matplotlib.lines import Line2D
 from ..bench.truth import PlantTruth
 from ..data import MeasuredFRF
 from ..delayed import DelayedStateSpace
-from ..errors import OptionError
 from ..frequency.frf_fit import FRFFit
 from ..identification.joint.result import JointFit
 from ..numerics.arrays import FloatArray
@@ -175,9 +174,7 @@ def joint_fit_plot(
     >>> cplt.figure.axes[-1].get_ylabel()
     'phase [deg]'
     """
-    result = fit.fit if isinstance(fit, DelayedStateSpace) else fit
-    if not isinstance(result, JointFit):
-        raise OptionError(f"got {fit!r}, which has no joint fit; use identify(record, frf=frf)")
+    result = style.result_of(fit, JointFit, "no joint fit; use identify(record, frf=frf)")
     points = result.frf_fit
     hz = points.frequency_hz
     grid = np.geomspace(hz[0], hz[-1], _FINE)

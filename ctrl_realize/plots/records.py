@@ -160,6 +160,22 @@ def onset_plot(
         return style.finished([axes], [lines], loc="center left")
 
 
+def draw_beside(
+    axes: Axes, record: Record, row: int, curves: Sequence[tuple[FloatArray, dict[str, Any]]]
+) -> list[Line2D]:
+    """Draw a measured output, and curves over the same time with their line properties."""
+    factor, unit = axis_time_unit(float(np.ptp(record.time)), axes)
+    time, measured = factor * record.time, np.atleast_2d(record.output)[row]
+    seen = ~np.isnan(measured)
+    lines = axes.plot(time[seen], measured[seen], color=style.MEASURED, label="measured")
+    for values, looks in curves:
+        dashed = {"color": style.MODEL, "linestyle": style.DASHES[0], **looks}
+        lines += axes.plot(time, values, **dashed)
+    label = wrapped(with_unit(record.output_labels[row], record.output_units[row]), 16)
+    axes.set(xlabel=f"time [{unit}]", ylabel=label)
+    return list(lines)
+
+
 def _signals(
     axes: Axes, time: FloatArray, signals: FloatArray, labels: Sequence[str], **kwargs: Any
 ) -> list[Line2D]:

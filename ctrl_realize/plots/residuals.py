@@ -10,7 +10,6 @@ from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
 from .._checks import integer
-from ..data import Record
 from ..errors import OptionError
 from ..identification.state_space_fit.result import StateSpaceFit
 from ..identification.validation.comparison import ModelComparison
@@ -18,7 +17,8 @@ from ..identification.validation.prediction import Prediction
 from ..identification.validation.residuals_result import ResidualAnalysis
 from ..numerics.arrays import FloatArray
 from . import style
-from .names import plain, with_unit, wrapped
+from .names import plain
+from .records import draw_beside
 from .shared_docs import documented
 from .style import axis_time_unit
 
@@ -60,7 +60,7 @@ def residual_plot(
     with style.canvas(
         ax, 3, title=title, size=(8.0, 7.0), heights=(2.0, 1.0, 1.0), sharex=False
     ) as axes:
-        above = _signals(axes[0], check.record, simulated, row, label, kwargs)
+        above = draw_beside(axes[0], check.record, row, [(simulated, {"label": label, **kwargs})])
         own = _stems(axes[1], lags[lags >= 0], check.autocorrelation[row], check.bound)
         cross = _stems(axes[2], lags, check.cross[row, column], check.cross_bound[row, column])
         axes[1].set_ylabel("residual with\nitself")
@@ -108,14 +108,8 @@ def model_comparison_plot(
         size=(8.0, 8.4), heights=(2.2, 1.0, 1.0, 1.0), sharex=False,
     ) as axes:  # fmt: skip
         factor, unit = axis_time_unit(float(np.ptp(record.time)), axes[1])
-        time = factor * record.time
-        measured = np.atleast_2d(record.output)[row]
-        lines = [
-            list(axes[0].plot(time, measured, color=style.MEASURED, label="measured")),
-            [],
-            [],
-            [],
-        ]
+        curves: list[tuple[FloatArray, dict[str, Any]]] = []
+        lines: list[list[Line2D]] = [[], [], [], []]
         bound = max(float(check.cross_bound[row, column]) for check in comparison.checks)
         for axis, size in ((axes[2], first.bound), (axes[3], bound)):
             axis.axhspan(-size, size, color=style.BAND, alpha=0.3, linewidth=0)
@@ -131,19 +125,19 @@ def model_comparison_plot(
             simulated, left = (
                 np.atleast_2d(values)[row] for values in (check.simulated, check.residual)
             )
-            lines[0] += axes[0].plot(time, simulated, **{"label": label, **looks})
-            lines[1] += axes[1].plot(time, left, **{**looks, "linestyle": "-", "linewidth": 0.9})
+            curves.append((simulated, {"label": label, **looks}))
+            thin = {**looks, "linestyle": "-", "linewidth": 0.9}
+            lines[1] += axes[1].plot(factor * record.time, left, **thin)
             dots = {**looks, "marker": "o", "markersize": 3.0, "linewidth": 1.0}
             lines[2] += axes[2].plot(
                 check.lags[check.lags >= 0], check.autocorrelation[row], **dots
             )
             lines[3] += axes[3].plot(check.lags, check.cross[row, column], **dots)
+        lines[0] = draw_beside(axes[0], record, row, curves)
         axes[1].sharex(axes[0])
+        axes[0].set_xlabel("")
         axes[0].tick_params(labelbottom=False)
         axes[1].set_xlabel(f"time [{unit}]")
-        axes[0].set_ylabel(
-            wrapped(with_unit(record.output_labels[row], record.output_units[row]), 16)
-        )
         axes[1].set_ylabel("residual")
         axes[2].set_ylabel("residual with\nitself")
         axes[3].set_ylabel("residual with\ninput before")
@@ -208,23 +202,9 @@ def prediction_plot(
     label = f"{prediction.horizon} ahead, fit {prediction.fit_percent[row]:.1f} %"
     values = np.atleast_2d(prediction.output)[row]
     with style.canvas(ax, title=title) as (axes,):
-        lines = _signals(axes, prediction.record, values, row, label, kwargs)
+        curves = [(values, {"label": label, **kwargs})]
+        lines = draw_beside(axes, prediction.record, row, curves)
         return style.finished([axes], [lines], loc="above")
-
-
-def _signals(
-    axes: Axes, record: Record, values: FloatArray, row: int, label: str, looks: dict[str, Any]
-) -> list[Line2D]:
-    """Draw the measured and the simulated output."""
-    factor, unit = axis_time_unit(float(np.ptp(record.time)), axes)
-    time = factor * record.time
-    measured = np.atleast_2d(record.output)[row]
-    settings = {"color": style.MODEL, "linestyle": style.DASHES[0], "label": label, **looks}
-    lines = axes.plot(time, measured, color=style.MEASURED, label="measured")
-    lines += axes.plot(time, values, **settings)
-    axes.set_ylabel(wrapped(with_unit(record.output_labels[row], record.output_units[row]), 16))
-    axes.set_xlabel(f"time [{unit}]")
-    return list(lines)
 
 
 def _stems(axes: Axes, lags: FloatArray, rho: FloatArray, bound: float) -> list[Line2D]:

@@ -12,7 +12,6 @@ from matplotlib.ticker import MaxNLocator
 
 from .._wording import in_time
 from ..delayed import DelayedStateSpace
-from ..errors import OptionError
 from ..identification.realization.delay_scan_result import DelayScan
 from ..identification.realization.order_scan import OrderScan
 from ..identification.realization.result import Realization
@@ -51,12 +50,8 @@ def delay_plot(
     >>> cplt.axes[0, 0].get_xlabel()
     'delay [samples]'
     """
-    result = scan.fit if isinstance(scan, DelayedStateSpace) else scan
-    if not isinstance(result, DelayScan):
-        raise OptionError(
-            f"got {scan!r}, which has no delay scan; use estimate_delay or identify(record, "
-            "method='scan')"
-        )
+    advice = "no delay scan; use estimate_delay or identify(record, method='scan')"
+    result = style.result_of(scan, DelayScan, advice)
     looks = {"color": style.MODEL, "label": f"order {result.order}", **kwargs}
     low, high = result.delay_interval
     with style.canvas(ax, title=title, default_title=result.impulse.name) as (axes,):
@@ -110,7 +105,8 @@ def singular_value_plot(
     >>> [text.get_text() for text in cplt.figure.axes[0].get_legend().get_texts()]
     ['order 2']
     """
-    result = fit.fit if isinstance(fit, DelayedStateSpace) else fit
+    advice = "no singular values; use the result of realize, estimate_delay or scan_orders"
+    result = style.result_of(fit, (DelayScan, Realization, OrderScan), advice)
     values, order, floor, name = _singular_values(result, count)
     with style.canvas(ax, title=title, default_title=name) as (axes,):
         lines = _singular_values_on(axes, values, order, floor, **kwargs)
@@ -187,13 +183,8 @@ def _singular_values(result: Any, count: int) -> tuple[FloatArray, int, float | 
         return values, result.order, result.noise_floor, result.impulse.name
     if isinstance(result, Realization):
         return result.leading_singular_values(count), result.order, None, result.impulse.name
-    if isinstance(result, OrderScan):
-        values = result.singular_values[result.delay][:count]
-        return values, result.order, result.noise_floor, result.impulse.name
-    raise OptionError(
-        f"got a {type(result).__name__}, which has no singular values; use the result of "
-        "realize, estimate_delay or scan_orders"
-    )
+    values = result.singular_values[result.delay][:count]
+    return values, result.order, result.noise_floor, result.impulse.name
 
 
 def _singular_values_on(

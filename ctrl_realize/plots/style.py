@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from typing import Any
+from typing import Any, TypeVar
 
 import control as ct
 import matplotlib as mpl
@@ -22,6 +22,7 @@ from matplotlib.ticker import FuncFormatter, LogLocator, MultipleLocator, NullFo
 from numpy.typing import ArrayLike
 
 from .. import _wording
+from ..delayed import DelayedStateSpace
 from ..errors import OptionError
 from ..numerics.arrays import FloatArray
 from .names import plain
@@ -68,6 +69,8 @@ _SETTINGS: Any = {
     "ytick.color": INK,
     "axes.formatter.useoffset": False,
 }
+
+Kind = TypeVar("Kind")
 
 AxesLike = Any
 """None, Axes, a sequence of Axes, or a Figure."""
@@ -233,6 +236,14 @@ def _legend_over(axes: Axes) -> None:
     low, high = axes.get_ylim()
     axes.set_ylim(low, low + (high - low) / (1.0 - min(share, 0.6)))
     axes.legend(loc="upper center", ncols=columns)
+
+
+def result_of(given: Any, kinds: type[Kind] | tuple[type[Kind], ...], advice: str) -> Kind:
+    """Return a result of a kind: what was given, or the fit of the model that was."""
+    result = given.fit if isinstance(given, DelayedStateSpace) else given
+    if not isinstance(result, kinds):
+        raise OptionError(f"got {given!r}, which has {advice}")
+    return result
 
 
 HERTZ = 2 * np.pi

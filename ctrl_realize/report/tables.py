@@ -174,7 +174,7 @@ def campaign_table(campaign: Campaign) -> Table:
     best = campaign.best.name
     rows = []
     for row in campaign.rows:
-        if row.model is None:
+        if row.system is None:
             cells = (row.name, in_digits(row.amplitude), "", "", "", "", "", row.error or "")
             rows.append(Row(cells, "failed"))
             continue

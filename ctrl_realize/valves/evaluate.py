@@ -229,7 +229,8 @@ def _statics(
 
 def _fit_of_operation(records: tuple[Record, ...]) -> tuple[Interval, Flag] | None:
     """Dead time of a linear model of records that contain no test."""
-    fits = (linear_fit([_few(record)]) for record in records)
+    parts = (record.between(*record.time[:_MOST_SAMPLES][[0, -1]]) for record in records)
+    fits = (linear_fit([part]) for part in parts)
     first = next((found for found in fits if found is not None), None)
     if first is None:
         return None
@@ -240,11 +241,3 @@ def _fit_of_operation(records: tuple[Record, ...]) -> tuple[Interval, Flag] | No
         f"a linear model of the record has a dead time of {interval.value:.3g} s and a gain of "
         f"{fit.gain:.3g} in the units of the record{more}",
     )
-
-
-def _few(record: Record) -> Record:
-    """The beginning of a long record."""
-    return record if record.n_samples <= _MOST_SAMPLES else Record(
-        record.time[:_MOST_SAMPLES], np.ravel(record.input)[:_MOST_SAMPLES],
-        np.ravel(record.output)[:_MOST_SAMPLES],
-    )  # fmt: skip

@@ -66,12 +66,12 @@ class Campaign(Result):
     @cached_property
     def good(self) -> tuple[CampaignRow, ...]:
         """The rows with a model."""
-        return tuple(row for row in self.rows if row.model is not None)
+        return tuple(row for row in self.rows if row.system is not None)
 
     @property
     def failed(self) -> tuple[CampaignRow, ...]:
         """The rows with an error."""
-        return tuple(row for row in self.rows if row.model is None)
+        return tuple(row for row in self.rows if row.system is None)
 
     @property
     def dt(self) -> float:
@@ -139,7 +139,7 @@ class Campaign(Result):
         _ = self.dt
         if self.method == "output_error":
             pairs = zip(self.rows, self.sources, strict=True)
-            good = [read_source(source) for row, source in pairs if row.model is not None]
+            good = [read_source(source) for row, source in pairs if row.system is not None]
             return fit_records(good, **self.options)
         chosen = self._identified(self.best)
         scan = fit_of(chosen, DelayScan)

@@ -23,7 +23,6 @@ from ...results import Flag, ModelFit
 from ..methods import IdentifyOptions, Method, identify
 from ..realization.delay_scan_result import DelayScan
 from ..step.steps import detect_step
-from .packed_model import PackedModel
 
 RecordSource = Record | Callable[[], Record]
 
@@ -34,8 +33,7 @@ _LONGEST_ERROR = 1000  # characters; a longer text would fill table and report
 class CampaignRow:
     """Result of one record.
 
-    Exactly one of `system` and `error` is None; without a system all numbers are NaN. The model is
-    stored in packed form, a few kB, because a campaign may have thousands of rows.
+    Exactly one of `system` and `error` is None; without a system all numbers are NaN.
 
     Attributes
     ----------
@@ -57,8 +55,8 @@ class CampaignRow:
         Dead time plus lags in s; NaN if the method gives none.
     total_delay_interval : tuple of float
         95 % interval of the total delay, in s.
-    model : PackedModel or None
-        Core, delays and names of the model.
+    system : DelayedStateSpace or None
+        The model; None if the record failed.
     error : str or None
         The error that stopped this record, in one line.
     flags : tuple of Flag
@@ -87,25 +85,20 @@ class CampaignRow:
     gain_std: float = float("nan")
     total_delay: float = float("nan")
     total_delay_interval: tuple[float, float] = (float("nan"), float("nan"))
-    model: PackedModel | None = field(default=None, repr=False)
+    system: DelayedStateSpace | None = field(default=None, repr=False)
     error: str | None = None
     flags: tuple[Flag, ...] = ()
     warnings: tuple[str, ...] = ()
 
     @property
-    def system(self) -> DelayedStateSpace | None:
-        """The model, rebuilt on each access; None if the record failed."""
-        return None if self.model is None else self.model.unpack()
-
-    @property
     def order(self) -> int | None:
         """Order of the model without its delay."""
-        return None if self.model is None else self.model.order
+        return None if self.system is None else int(self.system.delay_free.nstates)
 
     @property
     def dt(self) -> float:
         """Sample time of the model in s; NaN without one."""
-        return float("nan") if self.model is None else self.model.dt
+        return float("nan") if self.system is None else float(self.system.dt)
 
     @property
     def delay_interval(self) -> tuple[float, float]:
@@ -113,7 +106,7 @@ class CampaignRow:
         return self.interval[0] / self.dt, self.interval[1] / self.dt
 
     def __repr__(self) -> str:
-        what = self.error if self.model is None else f"delay {self.delay:.4g} samples"
+        what = self.error if self.system is None else f"delay {self.delay:.4g} samples"
         return f"<CampaignRow {self.name!r}: {what}>"
 
 
@@ -170,7 +163,7 @@ def identify_row(
             text = spelled_out(" ".join(str(error).split())[:_LONGEST_ERROR])
             row = replace(row, error=f"{type(error).__name__}: {text}")
     row = replace(row, warnings=tuple(dict.fromkeys(str(entry.message) for entry in caught)))
-    if store is None or row.model is None:
+    if store is None or row.system is None:
         return row
     try:
         return store.save(key, row)
@@ -253,7 +246,7 @@ def _with_model(row: CampaignRow, system: DelayedStateSpace) -> CampaignRow:
         gain_std=_or_nan(fit.gain_std_given_structure),
         total_delay=_or_nan(fit.total_delay),
         total_delay_interval=fit.total_delay_interval or (np.nan, np.nan),
-        model=PackedModel.of(system),
+        system=system,
         flags=fit.flags,
     )
 

@@ -41,7 +41,10 @@ def choose_estimate(group: tuple[Record, ...], count: int, start: str) -> Choice
     p = group[0].noutputs
     free = ("auto",) * p
     splits = [round((1 - HELD_BACK) * record.n_samples) for record in group]
-    first = tuple(_until(record, split) for record, split in zip(group, splits, strict=True))
+    first = tuple(
+        record.between(*record.time[[0, split - 1]])
+        for record, split in zip(group, splits, strict=True)
+    )
     try:
         smooth = with_prior(first, count, start, free)
     except DataError:
@@ -69,12 +72,6 @@ def _percent(error: float) -> str:
     return f"{100 * error:.3g} %" if error < 10 else "100 % or more (unstable, or nearly)"
 
 
-def _until(record: Record, split: int) -> Record:
-    return Record(
-        record.time[:split], record.input[..., :split], record.output[..., :split], missing="keep"
-    )
-
-
 def _error(
     group: tuple[Record, ...], splits: list[int], found: PulseRegression, count: int
 ) -> float:
@@ -83,7 +80,7 @@ def _error(
     for record, split in zip(group, splits, strict=True):
         begin = max(split - max(2 * count, record.n_samples - split), 0)
         begin = max(begin, record.n_samples - MOST_JUDGED)
-        part = _from(record, begin)
+        part = record.between(*record.time[[begin, -1]])
         behind = max(split - begin, 0)
         y = np.atleast_2d(part.output)[:, behind:]
         model = _by_arx(found.arx, part) if found.arx else _by_convolution(found.markov, part)
@@ -95,10 +92,6 @@ def _error(
         missed += float(((error / scale) ** 2).sum())
         total += float(y.size)
     return float(np.sqrt(missed / total))
-
-
-def _from(record: Record, begin: int) -> Record:
-    return Record(record.time[begin:], record.input[..., begin:], record.output[..., begin:])
 
 
 def _by_convolution(markov: FloatArray, record: Record) -> FloatArray:

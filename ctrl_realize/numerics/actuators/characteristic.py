@@ -29,15 +29,3 @@ def quick_opening(travel: FloatArray, exponent: float = 0.5) -> FloatArray:
 def piecewise_linear(travel: FloatArray, at: FloatArray, flow: FloatArray) -> FloatArray:
     """Interpolate a measured characteristic, flows (K,) at travels (K,), level outside."""
     return np.asarray(np.interp(travel, at, flow))
-
-
-def curved(travel: FloatArray, curvature: float, middle: float) -> FloatArray:
-    """Exponential characteristic ``(exp(c (h - m)) - 1) / c``, of slope 1 at the middle m.
-
-    Equal percentages of rangeability ``exp(c)`` over a unit of travel for c > 0, linear for 0, and
-    a curve that opens quickly for c < 0.
-    """
-    away = travel - middle
-    if curvature == 0.0:
-        return np.asarray(away)
-    return np.asarray(np.expm1(curvature * away) / curvature)

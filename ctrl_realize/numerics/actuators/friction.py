@@ -27,8 +27,8 @@ References
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import NamedTuple
+from collections.abc import Callable, Mapping
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -221,23 +221,8 @@ def choudhury_at_rest(command: float, stick: float, jump: float, start: float = 
 
 def choudhury(position: FloatArray, stick: float, jump: float, start: float = 0.0) -> FloatArray:
     """Stem positions (N,) for commands `position` by Choudhury's model; `start` as `kano`."""
-    last, stem, _, rest, moving, paused, slope = choudhury_at_rest(
-        float(position[0]), stick, jump, start
-    )
-    half, offset = (stick - jump) / 2, 0.0
-    out = []
-    # `choudhury_step`, written out as in `kano`
-    for command in position.tolist():
-        change = command - last
-        if moving and change * slope <= 0:
-            moving, paused, rest = False, change == 0, last
-        if not moving and abs(command - rest) > (jump if paused else stick):
-            moving, offset = True, half if command > rest else -half
-        if moving:
-            stem = command - offset
-        last, slope = command, change
-        out.append(stem)
-    return np.array(out)
+    state = choudhury_at_rest(float(position[0]), stick, jump, start)
+    return _followed(choudhury_step, state, position, stick, jump)
 
 
 def he_step(
@@ -259,8 +244,14 @@ def he(position: FloatArray, static: float, kinetic: float, start: float = 0.0) 
     """
     command = float(position[0])
     state = (command, command - start * kinetic, start * kinetic)
+    return _followed(he_step, state, position, static, kinetic)
+
+
+def _followed(
+    step: Callable[..., tuple[Any, float]], state: Any, position: FloatArray, *parameters: float
+) -> FloatArray:
     out = []
-    for value in position.tolist():
-        state, stem = he_step(state, value, static, kinetic)
+    for command in position.tolist():
+        state, stem = step(state, command, *parameters)
         out.append(stem)
     return np.array(out)

@@ -1,4 +1,4 @@
-"""Slew-rate limit, saturation, dead zone, resolution, and a lag with two time constants.
+"""Slew-rate limit, saturation, dead zone and resolution.
 
 Definitions as in [1]_, which has saturation, dead zone and rate limits as standard nonlinearities.
 
@@ -58,22 +58,4 @@ def resolved(position: FloatArray, step: float, start: float | None = None) -> F
         if abs(away) >= near:
             current += step * float(int(away / near))
         out.append(current)
-    return np.array(out)
-
-
-def two_sided_lag(
-    position: FloatArray, rising: float, falling: float, dt: float, start: float | None = None
-) -> FloatArray:
-    """Pass through a first-order lag with one time constant upwards and another downwards.
-
-    An actuator that fills faster than it empties. Exact for an input that is held from sample to
-    sample: value k is that at sample k, before input k has acted.
-    """
-    grow, shrink = float(-np.expm1(-dt / rising)), float(-np.expm1(-dt / falling))
-    out = []
-    current = float(position[0]) if start is None else start
-    for wanted in position.tolist():
-        out.append(current)
-        away = wanted - current
-        current += away * (grow if away > 0 else shrink)
     return np.array(out)

@@ -18,7 +18,7 @@ References
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.integrate import solve_ivp
@@ -29,7 +29,8 @@ from ..arrays import FloatArray
 _RELATIVE, _ABSOLUTE = 1e-6, 1e-9
 
 
-class LuGre(NamedTuple):
+@dataclass(frozen=True)
+class LuGre:
     """Parameters of a stem with LuGre friction, in consistent units.
 
     `mass` and `spring` are those of the stem, `coulomb` and `static` Fc and Fs, `stribeck` vs;

@@ -57,10 +57,7 @@ class _Past:
 
     def left(self, targets: FloatArray) -> tuple[FloatArray, int]:
         """Residual of targets (rows, k) after regression on the past, and its rank."""
-        size = np.linalg.norm(self.columns, axis=0)
-        scaled = self.columns / np.where(size > 0, size, 1.0)
-        solution, _, rank, _ = np.linalg.lstsq(scaled, targets, rcond=_RANK)
-        return targets - scaled @ solution, int(rank)
+        return _left(self.columns, targets, _RANK)
 
 
 def feedback_chance(output: FloatArray, drive: FloatArray, past: int) -> float:
@@ -182,8 +179,13 @@ def _squares(columns: FloatArray, target: FloatArray) -> tuple[float, int]:
     """Residual sum of squares of columns, and their rank."""
     if not columns.shape[1]:
         return float(target @ target), 0
+    error, rank = _left(columns, target, 1e-8)
+    return float(error @ error), rank
+
+
+def _left(columns: FloatArray, targets: FloatArray, least: float) -> tuple[FloatArray, int]:
+    """What least squares leave of targets, and the rank of the columns, scaled to one size."""
     size = np.linalg.norm(columns, axis=0)
     scaled = columns / np.where(size > 0, size, 1.0)
-    solution, _, rank, _ = np.linalg.lstsq(scaled, target, rcond=1e-8)
-    error = target - scaled @ solution
-    return float(error @ error), int(rank)
+    solution, _, rank, _ = np.linalg.lstsq(scaled, targets, rcond=least)
+    return targets - scaled @ solution, int(rank)

@@ -25,6 +25,8 @@ from scipy.linalg import expm
 
 from ..arrays import ComplexArray, FloatArray
 from ..constants import LEAST_FREEDOM
+from ..state_space.responses import simulate
+from ..state_space.sampling import sample_with_dead_time
 from .parameter_change import whitened
 
 
@@ -134,20 +136,15 @@ def _states(
     Computer-Controlled Systems, 3rd ed., section 2.3.
     """
     n = a.size
-    whole = int(np.floor(dead_time / dt))
-    part = dead_time - whole * dt
-    system = np.zeros((n + 1, n + 1))
-    system[: n - 1, 1:n] = np.eye(n - 1)
-    system[n - 1, :n], system[n - 1, n] = -a, 1.0
-    full, later, early = (expm(system * time) for time in (dt, dt - part, part))
-    transition = full[:n, :n]
-    now = later[:n, n]
-    before = later[:n, :n] @ early[:n, n]
-    late = np.concatenate([np.full(whole + 1, first), drive])[: drive.size + 1]
-    x = np.zeros((drive.size, n))
-    x[0, 0] = first / a[0]
-    for k in range(1, drive.size):
-        x[k] = transition @ x[k - 1] + now * late[k] + before * late[k - 1]
+    A = np.eye(n, k=1)
+    A[-1] = -a
+    Ad, Bd, Cd, Dd, delay = sample_with_dead_time(
+        A, np.eye(n)[:, -1:], np.eye(n), np.zeros((n, 1)), dt, dead_time
+    )
+    # deviations from the steady state, which is that of the input and no slope
+    late = np.concatenate([np.full(delay, first), drive])[: drive.size]
+    x = simulate(Ad, Bd, Cd, Dd, late[None] - first).T
+    x[:, 0] += first / a[0]
     return x
 
 
@@ -156,11 +153,8 @@ def _free(a: FloatArray, dt: float, count: int) -> FloatArray:
     n = a.size
     system = np.eye(n, k=1)
     system[-1] = -a
-    transition = expm(system * dt)
-    out = np.zeros((count, n))
-    row = np.eye(n)[0]
-    for k in range(count):
-        out[k] = row
-        row = row @ transition
+    nothing = np.zeros((n, 1))
+    turned = expm(system * dt).T
+    out = simulate(turned, nothing, np.eye(n), nothing, np.zeros((1, count)), np.eye(n)[0]).T
     size = np.abs(out).max(axis=0)
     return np.asarray(out / np.where(size > 0, size, 1.0))

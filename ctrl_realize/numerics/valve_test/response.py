@@ -25,8 +25,6 @@ from ..signals.onset import first_motion
 _REACH = 0.1
 """Half height of the window about a crossing, of the whole change."""
 _T86 = 1 - float(np.exp(-2))
-_CLEAR = 3.0
-"""Standard errors by which something must stand out of the noise."""
 
 
 @dataclass(frozen=True)

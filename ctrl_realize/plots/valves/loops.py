@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any, Literal
 
 import control as ct
@@ -10,16 +9,15 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
-from ..._checks import one_of
 from ...numerics.oscillation.half_cycles import POINTS, HalfCycles
 from ...valves.loops.result import LoopDiagnosis
 from .. import style
 from ..shared_docs import documented
+from .panels import Panel, draw_panels
 
 _CYCLES = 10
 """Of the trends that are shown: more cannot be distinguished."""
 _MOST_SHAPES = 40
-_SIZE = (8.0, 4.6)
 
 
 def _shown(diagnosis: LoopDiagnosis) -> slice:
@@ -109,13 +107,12 @@ def _draw_shapes(axes: Axes, diagnosis: LoopDiagnosis, looks: dict[str, Any]) ->
     return list(lines)
 
 
-_PANELS: dict[str, tuple[Callable[..., list[Line2D]], str, tuple[float, float]]] = {
-    "trend": (_draw_trend, "", (11.0, 4.2)),
-    "phase": (_draw_phase, "PV over OP", _SIZE),
-    "correlation": (_draw_correlation, "cross-correlation of OP and PV", _SIZE),
-    "shapes": (_draw_shapes, "half cycles", _SIZE),
+_PANELS = {
+    "trend": Panel(_draw_trend, "", "upper right", (11.0, 4.2)),
+    "phase": Panel(_draw_phase, "PV over OP", "upper right"),
+    "correlation": Panel(_draw_correlation, "cross-correlation of OP and PV"),
+    "shapes": Panel(_draw_shapes, "half cycles", "upper right"),
 }
-"""Panel -> what draws it, its title (without one the verdict), its size."""
 
 
 @documented("Axes, sequence of Axes")
@@ -164,16 +161,6 @@ def loop_diagnosis_plot(
     controller output OP
     lag [s]
     """
-    if panel is not None:
-        draw, name, size = _PANELS[one_of(panel, "panel", tuple(_PANELS))]
-        with style.canvas(
-            ax, title=title, default_title=name or diagnosis.verdict, size=size
-        ) as axes:
-            return style.finished(axes, [draw(axes[0], diagnosis, kwargs)])
-    with style.canvas(
-        ax, 2, columns=2, sharex=False, size=(11.0, 8.0), title=title,
-        default_title=diagnosis.verdict,
-    ) as axes:  # fmt: skip
-        drawn = zip(axes, _PANELS.values(), strict=True)
-        lines = [draw(axis, diagnosis, kwargs) for axis, (draw, *_) in drawn]
-        return style.finished(axes, lines, columns=2, legends=(0, 1, 3), loc="best")
+    return draw_panels(
+        _PANELS, diagnosis, panel, kwargs, ax=ax, title=title, name=diagnosis.verdict
+    )

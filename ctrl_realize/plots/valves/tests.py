@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from functools import partial
-from typing import Any, Literal, TypeAlias
+from typing import Any, Literal
 
 import control as ct
 import numpy as np
@@ -19,12 +19,12 @@ from ...valves.result import ValveReport
 from ...valves.steps import STEP_METRICS
 from .. import style
 from ..shared_docs import documented
+from .panels import Panel, draw_panels
 
 _SPIKE = 9
 """Samples of a median, which leaves steps as they are."""
 _MOST_STEPS = 60
 _MOST_POINTS = 4000
-_SIZE = (8.0, 4.8)
 _WAYS = {"opening": (style.MEASURED, "o", "-"), "closing": (style.MODEL, "s", "--")}
 
 
@@ -144,14 +144,12 @@ def _colours(count: int) -> Sequence[Any]:
     return [base[k % len(base)] for k in range(max(count, 1))]
 
 
-_Panel: TypeAlias = tuple[Callable[..., list[Line2D]], str, str]
-_PANELS: dict[str, _Panel] = {
-    "steps": (_draw_steps, "responses to steps", "lower right"),
-    "sizes": (_draw_sizes, "step size", "best"),
-    "loop": (_draw_loop, "position over command", "best"),
-    "signature": (_draw_signature, "signature", "best"),
+_PANELS = {
+    "steps": Panel(_draw_steps, "responses to steps", "lower right"),
+    "sizes": Panel(_draw_sizes, "step size"),
+    "loop": Panel(_draw_loop, "position over command"),
+    "signature": Panel(_draw_signature, "signature"),
 }
-"""Panel -> what draws it, its title, the place of its legend."""
 
 
 @documented("Axes, sequence of Axes")
@@ -204,17 +202,8 @@ def valve_plot(
     'position - command [%]'
     """
     sized = partial(_draw_sizes, metric=one_of(metric, "metric", STEP_METRICS))
-    panels: dict[str, _Panel] = {**_PANELS, "sizes": (sized, *_PANELS["sizes"][1:])}
-    if panel is not None:
-        draw, name, place = panels[one_of(panel, "panel", tuple(panels))]
-        with style.canvas(ax, title=title, default_title=name, size=_SIZE) as axes:
-            return style.finished(axes, [draw(axes[0], report, kwargs)], loc=place)
-    with style.canvas(
-        ax, 2, columns=2, sharex=False, size=(11.0, 8.0), title=title, default_title="valve test"
-    ) as axes:
-        drawn = zip(axes, panels.values(), strict=True)
-        lines = [draw(axis, report, kwargs) for axis, (draw, *_) in drawn]
-        return style.finished(axes, lines, columns=2, legends=(0, 1, 2, 3), loc="best")
+    panels = _PANELS | {"sizes": _PANELS["sizes"]._replace(draw=sized)}
+    return draw_panels(panels, report, panel, kwargs, ax=ax, title=title, name="valve test")
 
 
 @documented()

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal, TypeAlias
 
 import numpy as np
 
+from ..._facts import facts
 from ...numerics.constants import Z_95
 from ...numerics.oscillation.cross_correlation import (
     EVEN_HEIGHT,
@@ -32,26 +34,7 @@ _FIT_STICTION, _FIT_NONE = 0.4, 0.25
 a limit cycle swings by S or a little more; our own."""
 _ACF_REGULAR, _ACF_DECAY, _IAE_ALIKE, _IAE_NOT_ALIKE = 1.0, 0.5, 0.8, 0.4
 
-_SOURCES = {
-    "acf_zeros": "Thornhill, Huang and Zhang 2003",
-    "acf_decay": "Miao and Seborg 1999",
-    "iae": "Hägglund 1995; Forsman and Stattin 1999",
-    "cross_correlation": "Horch 1999",
-    "curve_fit": "He et al. 2007",
-    "relay_fit": "Rossi and Scali 2005",
-    "movements": "Yamashita 2006",
-    "stiction_fit": "Srinivasan et al. 2005; Jelali 2008",
-}
-_NAMES = {
-    "acf_zeros": "zeros of the autocorrelation",
-    "acf_decay": "decay of the autocorrelation",
-    "iae": "areas between zeros (IAE)",
-    "cross_correlation": "cross-correlation",
-    "curve_fit": "curve fit: sine or triangle",
-    "relay_fit": "relay fit",
-    "movements": "movements of OP and flow",
-    "stiction_fit": "fit of stiction (Hammerstein)",
-}
+_METHODS = facts("valves/loops/methods.toml")
 VOTERS = ("cross_correlation", "curve_fit", "relay_fit", "movements", "stiction_fit")
 """Methods that are counted in the verdict."""
 
@@ -100,28 +83,26 @@ class LoopMethod:
 
 def oscillation_methods(cycles: Cycles | None, signal: str) -> list[LoopMethod]:
     """Judge whether there is an oscillation at all, in PV or OP."""
-    limits = (
-        f"above {_ACF_REGULAR:g}",
-        f"above {_ACF_DECAY:g}",
-        f"from {_IAE_ALIKE:g}; none up to {_IAE_NOT_ALIKE:g}",
+    note = "" if cycles else "no zeros, or too few samples"
+    regularity, decay, alike = (
+        (cycles.regularity, cycles.decay_ratio, cycles.alike) if cycles else (np.nan,) * 3
     )
-    keys = ("acf_zeros", "acf_decay", "iae")
-    if cycles is None:
-        note = "no zeros, or too few samples"
-        return [
-            _method(key, signal, np.nan, limit, "not applicable", note=note)
-            for key, limit in zip(keys, limits, strict=True)
-        ]
-    values = (cycles.regularity, cycles.decay_ratio, cycles.alike)
-    least = ((_ACF_REGULAR, _ACF_REGULAR), (_ACF_DECAY, _ACF_DECAY), (_IAE_NOT_ALIKE, _IAE_ALIKE))
-    found = []
-    for key, limit, value, (low, high) in zip(keys, limits, values, least, strict=True):
-        said: MethodVerdict = (
-            "oscillation" if value > high or value == high < 1
-            else "no oscillation" if value <= low else "cannot tell"
-        )  # fmt: skip
-        found.append(_method(key, signal, value, limit, said))
-    return found
+    most = f"from {_IAE_ALIKE:g}; none up to {_IAE_NOT_ALIKE:g}"
+    words: tuple[MethodVerdict, MethodVerdict] = ("oscillation", "no oscillation")
+    return [
+        _method(
+            "acf_zeros", signal, f"above {_ACF_REGULAR:g}", (regularity,), note,
+            _verdict(regularity > _ACF_REGULAR, regularity <= _ACF_REGULAR, words),
+        ),
+        _method(
+            "acf_decay", signal, f"above {_ACF_DECAY:g}", (decay,), note,
+            _verdict(decay > _ACF_DECAY, decay <= _ACF_DECAY, words),
+        ),
+        _method(
+            "iae", signal, most, (alike,), note,
+            _verdict(alike >= _IAE_ALIKE, alike <= _IAE_NOT_ALIKE, words),
+        ),
+    ]  # fmt: skip
 
 
 def horch(found: CrossCorrelation | None, process: LoopProcess, note: str) -> LoopMethod:
@@ -131,16 +112,13 @@ def horch(found: CrossCorrelation | None, process: LoopProcess, note: str) -> Lo
         f"{EVEN_HEIGHT:.3f}"
     )
     if process == "integrating":
-        note = "for self-regulating processes only"
-    if found is None or process == "integrating" or np.isnan(found.shift):
-        note = note or "the function has no zeros"
-        return _method("cross_correlation", "OP, PV", np.nan, limit, "not applicable", note=note)
-    said: MethodVerdict = "cannot tell"
-    if found.shift > ODD_SHIFT and found.height > ODD_HEIGHT:
-        said = "stiction"
-    elif found.shift < EVEN_SHIFT and found.height < EVEN_HEIGHT:
-        said = "no stiction"
-    return _method("cross_correlation", "OP, PV", found.shift, limit, said, found.height)
+        found, note = None, "for self-regulating processes only"
+    shift, height = (found.shift, found.height) if found else (np.nan, np.nan)
+    return _method(
+        "cross_correlation", "OP, PV", limit, (shift, height), note or "the function has no zeros",
+        _verdict(shift > ODD_SHIFT and height > ODD_HEIGHT,
+                 shift < EVEN_SHIFT and height < EVEN_HEIGHT),
+    )  # fmt: skip
 
 
 def curve_fit(
@@ -149,76 +127,65 @@ def curve_fit(
     """Compare a triangle with a sine: in OP, or in PV of an integrating process."""
     limit = f"stiction from {_HE_STICTION:g}, none up to {_HE_NONE:g}"
     signal, halves = ("PV", pv) if process == "integrating" else ("OP", op)
-    if halves is None:
-        return _without_shape("curve_fit", signal, limit, note)
-    sine, triangle = halves.errors["sine"], halves.errors["triangle"]
-    index = sine / (sine + triangle) if sine + triangle > 0 else 0.5
-    said: MethodVerdict = (
-        "stiction" if index >= _HE_STICTION
-        else "no stiction" if index <= _HE_NONE else "cannot tell"
+    index = np.nan
+    if halves is not None:
+        sine, triangle = halves.errors["sine"], halves.errors["triangle"]
+        index = sine / (sine + triangle) if sine + triangle > 0 else 0.5
+    return _method(
+        "curve_fit", signal, limit, (index,), note or _NO_SHAPE,
+        _verdict(index >= _HE_STICTION, index <= _HE_NONE),
     )  # fmt: skip
-    return _method("curve_fit", signal, index, limit, said)
 
 
 def relay_fit(halves: HalfCycles | None, note: str) -> LoopMethod:
     """Compare the response of a lag to a relay, or a triangle, with a sine: in PV."""
     limit = f"stiction above {_RELAY:g}, none below {-_RELAY:g}"
-    if halves is None:
-        return _without_shape("relay_fit", "PV", limit, note)
-    sine = halves.errors["leaning sine"]
-    other = min(halves.errors["relay"], halves.errors["triangle"])
-    index = (sine - other) / (sine + other) if sine + other > 0 else 0.0
-    said: MethodVerdict = (
-        "stiction" if index > _RELAY else "no stiction" if index < -_RELAY else "cannot tell"
-    )
-    return _method("relay_fit", "PV", index, limit, said)
+    index = np.nan
+    if halves is not None:
+        sine = halves.errors["leaning sine"]
+        other = min(halves.errors["relay"], halves.errors["triangle"])
+        index = (sine - other) / (sine + other) if sine + other > 0 else 0.0
+    said = _verdict(index > _RELAY, index < -_RELAY)
+    return _method("relay_fit", "PV", limit, (index,), note or _NO_SHAPE, said)
 
 
 def movements(found: tuple[float, float] | None, process: LoopProcess, note: str) -> LoopMethod:
     """Judge by the time in which OP moves and the flow does not."""
     limit = f"stiction from {LIMIT:g} in both"
     if process != "flow":
-        note = "for flows, or a measured position, only: process='flow'"
-    if found is None or process != "flow":
-        note = note or "nothing moves"
-        return _method("movements", "OP, PV", np.nan, limit, "not applicable", note=note)
-    said: MethodVerdict = "stiction" if min(found) >= LIMIT else "cannot tell"
-    return _method("movements", "OP, PV", found[0], limit, said, found[1])
+        found, note = None, "for flows, or a measured position, only: process='flow'"
+    indices = found or (np.nan, np.nan)
+    said = _verdict(min(indices) >= LIMIT, False)
+    return _method("movements", "OP, PV", limit, indices, note or "nothing moves", said)
 
 
 def stiction_fit(found: StictionFit | None, note: str) -> LoopMethod:
     """Judge by the stiction of a Hammerstein model, and by what it explains beyond a linear one."""
     limit = f"stiction from {_FIT_STICTION:g} and {Z_95:.2f}, none up to {_FIT_NONE:g}"
-    if found is None:
-        note = (
-            note
-            or f"no clear oscillation, fewer than {FEWEST_BLOCKS + 2} cycles, or no process fits"
-        )
-        return _method("stiction_fit", "OP, PV", np.nan, limit, "not applicable", note=note)
-    index = found.S / found.swing
-    said: MethodVerdict = "cannot tell"
-    if index >= _FIT_STICTION and found.significance > Z_95:
-        said = "stiction"
-    elif index <= _FIT_NONE:
-        said = "no stiction"
-    return _method("stiction_fit", "OP, PV", index, limit, said, found.significance)
+    none = f"no clear oscillation, fewer than {FEWEST_BLOCKS + 2} cycles, or no process fits"
+    index, excess = (found.S / found.swing, found.significance) if found else (np.nan, np.nan)
+    said = _verdict(index >= _FIT_STICTION and excess > Z_95, index <= _FIT_NONE)
+    return _method("stiction_fit", "OP, PV", limit, (index, excess), note or none, said)
 
 
-def _without_shape(key: str, signal: str, limit: str, note: str) -> LoopMethod:
-    note = note or "too few half cycles, or samples in them"
-    return _method(key, signal, np.nan, limit, "not applicable", note=note)
+_NO_SHAPE = "too few half cycles, or samples in them"
+
+
+def _verdict(
+    yes: bool, no: bool, words: tuple[MethodVerdict, MethodVerdict] = ("stiction", "no stiction")
+) -> MethodVerdict:
+    return words[0] if yes else words[1] if no else "cannot tell"
 
 
 def _method(
-    key: str,
-    signal: str,
-    index: float,
-    limit: str,
-    verdict: MethodVerdict,
-    second_index: float = np.nan,
-    note: str = "",
+    key: str, signal: str, limit: str, indices: Sequence[float], note: str, verdict: MethodVerdict
 ) -> LoopMethod:
+    """What a method says; if it has no index, the note says why."""
+    known = not np.isnan(indices[0])
+    first, second = (float(index) for index in (*indices, np.nan)[:2])
+    said: MethodVerdict = verdict if known else "not applicable"
+    why = "" if known else note
     return LoopMethod(
-        key, _NAMES[key], signal, float(index), float(second_index), limit, verdict, note,
-        _SOURCES[key],
+        key, signal=signal, index=first, second_index=second, limit=limit, verdict=said, note=why,
+        **_METHODS[key],
     )  # fmt: skip

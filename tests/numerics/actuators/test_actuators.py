@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from ctrl_realize.numerics.actuators.characteristic import curved, equal_percentage
+from ctrl_realize.numerics.actuators.characteristic import equal_percentage
 from ctrl_realize.numerics.actuators.friction import (
     backlash,
     choudhury,
@@ -16,7 +16,6 @@ from ctrl_realize.numerics.actuators.friction import (
 from ctrl_realize.numerics.actuators.limits import (
     resolved,
     slew_limited,
-    two_sided_lag,
     without_dead_zone,
 )
 from ctrl_realize.numerics.actuators.lugre import LuGre, lugre_stem
@@ -93,20 +92,12 @@ def test_a_resolution_is_the_smallest_change_that_moves_the_output():
     assert_allclose(without_dead_zone(np.array([-3.0, 0.5, 3.0]), -1.0, 2.0), [-2.0, 0.0, 1.0])
 
 
-def test_a_two_sided_lag_has_its_time_constants():
-    u = np.concatenate([[0.0], np.ones(200), np.zeros(200)])
-    y = two_sided_lag(u, 0.5, 1.5, 0.05)
-    assert_allclose(y[1:201], -np.expm1(-0.05 * np.arange(200) / 0.5), atol=1e-12)
-    assert_allclose(y[201:], y[201] * np.exp(-0.05 * np.arange(200) / 1.5), atol=1e-12)
-
-
 def test_equal_percentages_are_the_exponential_characteristic():
     travel, middle = np.linspace(0, 1, 11), 0.5
     flow = equal_percentage(travel, 50.0)
-    curve = curved(travel, np.log(50.0), middle)
-    # The same up to gain and level: f = f(m) (1 + c curve).
-    assert_allclose(flow, equal_percentage(np.array(middle), 50.0) * (1 + np.log(50) * curve))
-    assert_allclose(curved(travel, 1e-9, middle), curved(travel, 0.0, middle), atol=1e-9)
+    curve = np.expm1(np.log(50.0) * (travel - middle))
+    # The same up to gain and level: f = f(m) (1 + curve).
+    assert_allclose(flow, equal_percentage(np.array(middle), 50.0) * (1 + curve))
 
 
 def test_a_stem_with_lugre_friction_breaks_away_at_the_static_force_and_slides_at_the_kinetic():
