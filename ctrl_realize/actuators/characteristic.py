@@ -9,11 +9,6 @@ import numpy as np
 
 from .._checks import finite, one_of, positive
 from ..errors import OptionError
-from ..numerics.actuators.characteristic import (
-    equal_percentage,
-    piecewise_linear,
-    quick_opening,
-)
 from ..numerics.arrays import FloatArray
 from .limits import StaticMap, ordered
 
@@ -103,10 +98,10 @@ class Characteristic(StaticMap):
     def _simulated(self, command: FloatArray, dt: float) -> FloatArray:
         travel = np.clip((command - self.low) / (self.high - self.low), 0.0, 1.0)
         if self.kind == "equal-percentage":
-            return self.full_flow * equal_percentage(travel, self.rangeability)
+            return self.full_flow * self.rangeability ** (travel - 1.0)
         if self.kind == "quick-opening":
-            return self.full_flow * quick_opening(travel, self.exponent)
+            return self.full_flow * travel**self.exponent
         if self.kind == "points":
             at, flow = np.array(self.points).T
-            return self.full_flow * piecewise_linear(travel, at, flow)
+            return np.asarray(self.full_flow * np.interp(travel, at, flow))
         return np.asarray(self.full_flow * travel)

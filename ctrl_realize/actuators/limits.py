@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -16,9 +17,20 @@ from .base import Actuator, State
 
 
 class _OfTwoSamples(Actuator):
-    """A model whose only state is its position: one step is the array kernel on two samples."""
+    """A model whose only state is its position: one step is the array kernel on one sample."""
 
     _states: ClassVar[tuple[str, ...]] = ("position",)
+
+    @abstractmethod
+    def _followed(self, command: FloatArray, dt: float, last: float | None) -> FloatArray:
+        """Positions for commands (N,), behind a last position or at rest."""
+
+    def _advance(self, state: State, command: float, dt: float) -> tuple[State, float]:
+        moved = float(self._followed(np.array([command]), dt, state[0])[0])
+        return (moved,), moved
+
+    def _simulated(self, command: FloatArray, dt: float) -> FloatArray:
+        return self._followed(command, dt, None)
 
     def _rest(self, command: float) -> State:
         return (float(self._simulated(np.array([command]), 1.0)[0]),)
@@ -72,16 +84,9 @@ class SlewRateLimit(_OfTwoSamples):
             return f"slew rate at most {self.opening:g} per s"
         return f"slew rate at most {self.opening:g} per s up, {self.closing:g} per s down"
 
-    def _advance(self, state: State, command: float, dt: float) -> tuple[State, float]:
-        (moved,) = slew_limited(np.array([command]), *self._rates, dt, state[0])
-        return (float(moved),), float(moved)
-
-    @property
-    def _rates(self) -> tuple[float, float]:
-        return self.opening, self.opening if self.closing is None else self.closing
-
-    def _simulated(self, command: FloatArray, dt: float) -> FloatArray:
-        return slew_limited(command, *self._rates, dt)
+    def _followed(self, command: FloatArray, dt: float, last: float | None) -> FloatArray:
+        closing = self.opening if self.closing is None else self.closing
+        return slew_limited(command, self.opening, closing, dt, last)
 
 
 @dataclass(frozen=True)
@@ -126,12 +131,10 @@ class Backlash(_OfTwoSamples):
     def __str__(self) -> str:
         return f"backlash of width {self.width:g}"
 
-    def _advance(self, state: State, command: float, dt: float) -> tuple[State, float]:
-        moved = backlash(np.array([state[0], command]), self.width)[1]
-        return (float(moved),), float(moved)
-
-    def _simulated(self, command: FloatArray, dt: float) -> FloatArray:
-        return backlash(command, self.width, self.start)
+    def _followed(self, command: FloatArray, dt: float, last: float | None) -> FloatArray:
+        if last is None:
+            return backlash(command, self.width, self.start)
+        return backlash(np.append(last, command), self.width)[1:]
 
 
 @dataclass(frozen=True)
@@ -169,12 +172,8 @@ class Resolution(_OfTwoSamples):
     def __str__(self) -> str:
         return f"resolution of {self.step:g}"
 
-    def _advance(self, state: State, command: float, dt: float) -> tuple[State, float]:
-        (moved,) = resolved(np.array([command]), self.step, state[0])
-        return (float(moved),), float(moved)
-
-    def _simulated(self, command: FloatArray, dt: float) -> FloatArray:
-        return resolved(command, self.step)
+    def _followed(self, command: FloatArray, dt: float, last: float | None) -> FloatArray:
+        return resolved(command, self.step, last)
 
 
 class StaticMap(Actuator):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -12,9 +12,6 @@ from ..data import Record
 from ..errors import DataError
 from ..numerics.arrays import FloatArray
 from .imperfections import band_limited_noise, converted, drive_spikes
-
-if TYPE_CHECKING:
-    from .control_valve import Valve
 
 STROKE_MM = 2.0
 AD_RANGE_V = 10.0
@@ -40,7 +37,7 @@ def held_input(values: ArrayLike, name: str, limits: tuple[float, float], unit: 
 
 
 def recorded(
-    valve: Valve,
+    valve: Any,
     time: FloatArray,
     current: FloatArray,
     displacement: FloatArray,
@@ -49,7 +46,7 @@ def recorded(
     *,
     spikes: bool = True,
 ) -> Record:
-    """Pass signals through sensor, converter and all disturbances."""
+    """Pass signals through sensor, converter and all disturbances of a `Valve`."""
     n = time.size
     limited = valve.anti_aliasing is not None
     shown = displacement + band_limited_noise(n, valve.noise * STROKE_MM, rng, limited=limited)

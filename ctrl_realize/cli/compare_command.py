@@ -20,27 +20,27 @@ from .terminal import printable, say
 def run_compare(
     model: Path,
     frf: Path,
-    output: Path | None,
+    folder: Path | None,
     *,
-    choices: Mapping[str, Any],
-    reading: Mapping[str, Any],
-    report: bool,
+    compared: Mapping[str, Any],
+    response_file: Mapping[str, Any],
+    no_report: bool,
     overwrite: bool,
 ) -> int:
     """Compare, write the results if a folder is given, and return the exit code."""
     system = load_model(model)
-    measured = read_frf(frf, **reading)
-    comparison = compare_frf(system, measured, **choices)
+    measured = read_frf(frf, **response_file)
+    comparison = compare_frf(system, measured, **compared)
     say(printable(f"{model}: {system!r}"))
     say(comparison.report())
-    if output is None:
+    if folder is None:
         return 0
-    words = [str(model), str(frf), *words_of({**choices, **reading})]
+    words = [str(model), str(frf), *words_of({**compared, **response_file})]
     run = Run(typed_call("compare", words), (model, frf), overwrite)
-    words += ["--output", str(output)]
+    words += ["--output", str(folder)]
     write = partial(
         write_comparison, system=system, frf=measured, comparison=comparison, files=[model, frf],
         calls=[("In a terminal", typed_call("compare", words))],
     )  # fmt: skip
     tables = {"frf_comparison.csv": (comparison.table(), False)}
-    return write_results(output, run, tables, write if report else None, "the comparison")
+    return write_results(folder, run, tables, None if no_report else write, "the comparison")

@@ -6,10 +6,12 @@ import inspect
 from collections.abc import Callable, Sequence
 from enum import Enum
 from functools import wraps
+from importlib import import_module
 from pathlib import Path
 from typing import Any, get_args, get_type_hints
 
 from ..errors import MissingFileError, OptionError
+from .loading import loading
 from .options import GROUPS, Given
 
 _COLUMNS = ("time", "input", "output", "quality", "by", "frequency", "magnitude", "phase", "real",
@@ -30,33 +32,49 @@ def check_files(paths: Sequence[Path]) -> None:
             raise OptionError(f"{path} is a folder; give the files in it")
 
 
-def with_options(command: Callable[..., int]) -> Callable[..., int]:
-    """Give a command the options of each group that it has as an argument.
+def command(module: str, function: str) -> Callable[[Callable[..., None]], Callable[..., int]]:
+    """Make a command of a signature: a function of a module runs it with the same arguments.
 
-    The command receives a group as the arguments of Python that were given.
+    Groups among the arguments become options; the function receives them as the arguments of
+    Python that were given. Files must exist.
     """
-    signature, hints = inspect.signature(command), get_type_hints(command, include_extras=True)
-    groups = [name for name in signature.parameters if name in GROUPS]
 
-    @wraps(command)
-    def run(**values: Any) -> int:
-        found = {
-            group: given(**{name: values.pop(name) for name in GROUPS[group]}) for group in groups
-        }
-        return command(**values, **found)
+    def complete(declared: Callable[..., None]) -> Callable[..., int]:
+        @wraps(declared)
+        def run(**values: Any) -> int:
+            for group in groups:
+                options = {name: values.pop(name) for name in GROUPS[group]}
+                values[group] = given(**options)
+            named = [value for name, value in values.items() if name != "folder"]
+            several = [value if isinstance(value, list) else [value] for value in named]
+            check_files([path for each in several for path in each if isinstance(path, Path)])
+            with loading():
+                call = getattr(import_module(module, __package__), function)
+            code: int = call(**values)
+            return code
 
+        signature = inspect.signature(declared)
+        groups = [name for name in signature.parameters if name in GROUPS]
+        parameters = _options(signature, get_type_hints(declared, include_extras=True))
+        run.__signature__ = signature.replace(parameters=parameters)  # type: ignore[attr-defined]
+        run.__annotations__ = {one.name: one.annotation for one in parameters}
+        return run
+
+    return complete
+
+
+def _options(signature: inspect.Signature, hints: dict[str, Any]) -> list[inspect.Parameter]:
+    """Parameters of a signature, and those of its groups."""
     parameters = []
     for name, one in signature.parameters.items():
-        if name not in groups:
+        if name not in GROUPS:
             parameters.append(one.replace(annotation=hints[name], kind=one.KEYWORD_ONLY))
-        for option, kind in GROUPS[name].items() if name in groups else ():
+        for option, kind in GROUPS.get(name, {}).items():
             default = False if get_args(kind)[0] is bool else None
             parameters.append(
                 inspect.Parameter(option, one.KEYWORD_ONLY, default=default, annotation=kind)
             )
-    run.__signature__ = signature.replace(parameters=parameters)  # type: ignore[attr-defined]
-    run.__annotations__ = {one.name: one.annotation for one in parameters}
-    return run
+    return parameters
 
 
 def given(**options: Any) -> Given:

@@ -35,40 +35,41 @@ _MANY = 12
 
 def run_identify(
     files: list[Path],
-    output: Path,
+    folder: Path,
     *,
-    choices: Mapping[str, Any],
+    chosen: Mapping[str, Any],
     frf: Path | None,
     joint: bool,
     separate: bool,
     tests: Mapping[str, Any],
-    reading: Mapping[str, Any],
+    record: Mapping[str, Any],
     response: Mapping[str, Any],
     jobs: int | None,
-    report: bool,
+    no_report: bool,
     overwrite: bool,
 ) -> int:
     """Identify, write the results, and return the exit code."""
+    joint = joint or "gains" in chosen
     if joint and separate:
         raise OptionError("expected --joint or --separate, got both")
     if len(tests) > 1:
         raise OptionError("expected --by or --split, got both")
-    settings = Settings(choices, joint)
-    how = Reading(reading, tests)
+    settings = Settings(chosen, joint)
+    how = Reading(record, tests)
     measured = None if frf is None else read_frf(frf, **response)
     words = words_again(files, settings, how, frf, response, separate)
     run = Run(typed_call("identify", words), (*files, *([frf] if frf else [])), overwrite)
-    words += ["--output", str(output)]
+    words += ["--output", str(folder)]
     calls = calls_again(files, settings, how, words, None if frf is None else (frf, response))
-    sources, task = how.sources(files), _Task(settings, measured, run, report)
+    sources, task = how.sources(files), _Task(settings, measured, run, not no_report)
     if separate and len(sources) > 1:
-        return _each_alone(task, sources, output, how, words)
-    refuse_other_results(output, run)
+        return _each_alone(task, sources, folder, how, words)
+    refuse_other_results(folder, run)
     if len(sources) > 1 and not joint:
-        return _many(task, sources, output, calls, jobs)
-    with appearing(output, run) as folder:
-        written = _one(task, sources, folder, calls)
-    _say_what_is_written(output, ["model.json"], report and written)
+        return _many(task, sources, folder, calls, jobs)
+    with appearing(folder, run) as staged:
+        written = _one(task, sources, staged, calls)
+    _say_what_is_written(folder, ["model.json"], task.report and written)
     return 0 if written else 1
 
 

@@ -1,7 +1,7 @@
 """The commands with their options; what they do is loaded when one of them runs.
 
 Loading python-control and its dependencies takes seconds, which ``--help``, ``--version`` and a
-misspelt option need not wait for.
+misspelt option need not wait for. Each has the arguments of the function that is named beside it.
 """
 
 from __future__ import annotations
@@ -12,11 +12,10 @@ from typing import Annotated
 import typer
 
 from . import options as o
-from .files import check_files, with_options
-from .loading import loading
+from .files import command
 
 
-@with_options
+@command(".identify_command", "run_identify")
 def identify(
     files: o.Files,
     folder: o.Folder,
@@ -31,7 +30,7 @@ def identify(
     jobs: o.Jobs = None,
     no_report: o.NoReport = False,
     overwrite: o.Overwrite = False,
-) -> int:
+) -> None:
     """Identify a model with dead time from one record, or from many of one plant.
 
     One record gives model.json, report.html and figures/. Several records of one plant are a
@@ -49,18 +48,9 @@ def identify(
       ctrl-realize identify tests.csv -o out --by test --joint --gains own
       ctrl-realize identify step.csv -o out --frf frf.csv --joint
     """  # noqa: D301  # \b keeps the lines of the examples apart
-    check_files([*files, *([frf] if frf else [])])
-    with loading():
-        from .identify_command import run_identify
-
-    return run_identify(
-        files, folder, choices=chosen, frf=frf,
-        joint=joint or "gains" in chosen, separate=separate, tests=tests, reading=record,
-        response=response, jobs=jobs, report=not no_report, overwrite=overwrite,
-    )  # fmt: skip
 
 
-@with_options
+@command(".compare_command", "run_compare")
 def compare(
     model: Annotated[Path, typer.Argument(help="Model file written by identify: model.json.")],
     frf: Annotated[Path, typer.Argument(help="Measured frequency response: CSV, TSV, .mat, .npz.")],
@@ -70,7 +60,7 @@ def compare(
     response_file: o.Given,
     no_report: o.NoReport = False,
     overwrite: o.Overwrite = False,
-) -> int:
+) -> None:
     """Compare a model with a measured frequency response.
 
     Gain and phase errors are those in the trusted band: by coherence, by standard deviation, or as
@@ -81,17 +71,9 @@ def compare(
       ctrl-realize compare results/model.json frf.csv
       ctrl-realize compare results/model.json frf.csv -o frf --band 0.1 13
     """  # noqa: D301  # \b keeps the lines of the examples apart
-    check_files([model, frf])
-    with loading():
-        from .compare_command import run_compare
-
-    return run_compare(
-        model, frf, folder, choices=compared, reading=response_file,
-        report=not no_report, overwrite=overwrite,
-    )  # fmt: skip
 
 
-@with_options
+@command(".valve.command", "run_valve")
 def valve(
     files: o.Files,
     folder: o.Folder,
@@ -102,7 +84,7 @@ def valve(
     valve_test: o.Given,
     no_report: o.NoReport = False,
     overwrite: o.Overwrite = False,
-) -> int:
+) -> None:
     """Measure the metrics of a step test of a control valve.
 
     The input is the command, the output the position of the stem, or a process variable. Steps,
@@ -118,17 +100,9 @@ def valve(
       ctrl-realize valve step_*.csv -o valve --command-range 4 20 --limit dead_band=1
       ctrl-realize valve test.csv -o valve --input command --output-column stem --limit t86@2=0.4
     """  # noqa: D301  # \b keeps the lines of the examples apart
-    check_files(files)
-    with loading():
-        from .valve.command import run_valve
-
-    return run_valve(
-        files, folder, choices=measured, limits=limit or (), tests=tests, reading=valve_test,
-        report=not no_report, overwrite=overwrite,
-    )  # fmt: skip
 
 
-@with_options
+@command(".valve.loop", "run_loop")
 def loop(
     files: o.Files,
     folder: o.Folder,
@@ -138,7 +112,7 @@ def loop(
     trend: o.Given,
     no_report: o.NoReport = False,
     overwrite: o.Overwrite = False,
-) -> int:
+) -> None:
     """Tell from operating data whether the valve makes a control loop oscillate.
 
     The input is the controller output, the output the process value. Methods of the literature
@@ -150,11 +124,3 @@ def loop(
       ctrl-realize loop trend.csv -o loop
       ctrl-realize loop trend.csv -o loop --input op --output-column pv --process flow
     """  # noqa: D301  # \b keeps the lines of the examples apart
-    check_files(files)
-    with loading():
-        from .valve.loop import run_loop
-
-    return run_loop(
-        files, folder, choices=diagnosed, set_point=set_point, reading=trend,
-        report=not no_report, overwrite=overwrite,
-    )  # fmt: skip

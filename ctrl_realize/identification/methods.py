@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from inspect import signature
-from typing import TYPE_CHECKING, Any, Literal, TypedDict
+from typing import TYPE_CHECKING, Any, Literal
 
 import control as ct
 import numpy as np
@@ -27,23 +27,6 @@ if TYPE_CHECKING:
 Method = Literal["output_error", "scan", "paper"]
 
 METHODS: tuple[str, ...] = ("output_error", "scan", "paper")
-
-
-class IdentifyOptions(TypedDict, total=False):
-    """Arguments of `identify` except record and method, as taken by `identify_campaign`."""
-
-    order: int | None
-    max_delay: int | None
-    known: ct.LTI | None
-    loss: Literal["huber", "least_squares"]
-    noise: Literal["auto", "white"]
-    structures: Structures | None
-    include_known: bool
-    gains: Literal["common", "own"]
-    actuator: Asked | None
-    cutoff_hz: float | Literal["auto"] | None
-    samples: int | None
-    feedthrough: bool | None
 
 
 @single_threaded

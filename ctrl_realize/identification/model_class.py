@@ -26,7 +26,6 @@ from .long_records import lively_parts
 from .output_error.checks import Shown, against_one_model, nonlinear_flags
 from .output_error.own_gains import at_model_gain
 from .output_error.result import OutputErrorFit
-from .state_space_fit.result import Timing
 from .state_space_fit.starts import Outcome, from_starts
 from .validation.residuals import analyse_residuals
 
@@ -168,7 +167,10 @@ def _chosen(
     )
     fit = replace(
         modes,
-        timing=Timing(dead_time, (low, high), _total_delay(system), lags),
+        dead_time=dead_time,
+        interval=(low, high),
+        total_delay=_total_delay(system),
+        lags=lags,
         choices=(*reasons, *modes.choices, *notes),
         flags=tuple(flags),
     )

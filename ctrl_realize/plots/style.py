@@ -157,16 +157,13 @@ def canvas(
     *,
     title: str | None = None,
     default_title: str = "",
-    size: tuple[float, float] = (8.0, 4.6),
-    heights: Sequence[float] | None = None,
-    columns: int = 1,
-    sharex: bool = True,
+    **layout: Any,
 ) -> Iterator[list[Axes]]:
     """Provide the axes to draw in, in the toolbox's style; a new figure gets its title at the end.
 
     Parameters
     ----------
-    ax, rows, size, heights, columns, sharex
+    ax, rows, **layout
         As for `axes_for`.
     title : str, optional
         Title given by the caller; an empty one for none.
@@ -174,7 +171,7 @@ def canvas(
         Default title.
     """
     with context():
-        axes = axes_for(ax, rows, size=size, heights=heights, columns=columns, sharex=sharex)
+        axes = axes_for(ax, rows, **layout)
         yield axes
         put_title(axes[0], ax, title, default_title)
 

@@ -19,29 +19,30 @@ from ..terminal import printable, say
 
 def run_valve(
     files: list[Path],
-    output: Path,
+    folder: Path,
     *,
-    choices: Mapping[str, Any],
-    limits: Sequence[str],
+    measured: Mapping[str, Any],
+    limit: Sequence[str] | None,
     tests: Mapping[str, Any],
-    reading: Mapping[str, Any],
-    report: bool,
+    valve_test: Mapping[str, Any],
+    no_report: bool,
     overwrite: bool,
 ) -> int:
     """Measure, write the results, and return the exit code."""
-    how = Reading(reading, tests)
-    bounds = _limits(limits)
-    options = {**choices, **({"limits": bounds} if bounds else {})}
-    words = [*map(str, files), *words_of({**choices, "limit": list(limits), **tests, **reading})]
+    how = Reading(valve_test, tests)
+    bounds = _limits(limit or ())
+    options = {**measured, **({"limits": bounds} if bounds else {})}
+    given = {**measured, "limit": list(limit or ()), **tests, **valve_test}
+    words = [*map(str, files), *words_of(given)]
     run = Run(typed_call("valve", words), tuple(files), overwrite)
-    refuse_other_results(output, run)
+    refuse_other_results(folder, run)
     sources = how.sources(files)
     records = [source.record() for source in sources]
     for source, record in zip(sources, records, strict=True):
         say(printable(f"{source.file}: {record!r}"))
     result = valve_report(records, **options)
     say(result.report())
-    words += ["--output", str(output)]
+    words += ["--output", str(folder)]
     lines, name = reading_in_python(files, how)
     lines.append(f"report = cr.valves.valve_report({name}{python_keywords(options)})")
     calls = [("In a terminal", typed_call("valve", words)), ("In Python", "\n".join(lines))]
@@ -54,7 +55,7 @@ def run_valve(
         write_valve_report, result=result, files=list(dict.fromkeys(files)), settings=options,
         calls=calls,
     )  # fmt: skip
-    return write_results(output, run, tables, write if report else None, "the table of metrics")
+    return write_results(folder, run, tables, None if no_report else write, "the table of metrics")
 
 
 def _limits(given: Sequence[str]) -> dict[str, Any]:

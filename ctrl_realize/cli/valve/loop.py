@@ -21,40 +21,46 @@ from ..terminal import printable, say
 
 def run_loop(
     files: list[Path],
-    output: Path,
+    folder: Path,
     *,
-    choices: Mapping[str, Any],
+    diagnosed: Mapping[str, Any],
     set_point: str | None,
-    reading: Mapping[str, Any],
-    report: bool,
+    trend: Mapping[str, Any],
+    no_report: bool,
     overwrite: bool,
 ) -> int:
     """Diagnose, write the results, and return the exit code."""
     if len(files) != 1:
         raise OptionError(f"{len(files)} files; expected one record of operation")
-    words = [str(files[0]), *words_of({**choices, **reading})]
-    reading = {**reading, "missing": "keep"}  # the longest complete part is judged
+    words = [str(files[0]), *words_of({**diagnosed, **trend})]
+    reading = {**trend, "missing": "keep"}  # the longest complete part is judged
     words += [] if set_point is None else ["--set-point", set_point]
     run = Run(typed_call("loop", words), tuple(files), overwrite)
-    refuse_other_results(output, run)
+    refuse_other_results(folder, run)
     if set_point is None:
         record = read_record(files[0], **reading)
-        result = diagnose_loop(record, **choices)
+        result = diagnose_loop(record, **diagnosed)
     else:
         record = _with_set_point(files[0], set_point, reading)
         value, wanted = record.output
-        result = diagnose_loop(record.input, value, wanted, record.dt, **choices)
+        result = diagnose_loop(record.input, value, wanted, record.dt, **diagnosed)
     say(printable(f"{files[0]}: {record!r}"))
     say(result.report())
-    words += ["--output", str(output)]
+    words += ["--output", str(folder)]
     calls = [("In a terminal", typed_call("loop", words))]
     if set_point is None:
         lines, name = reading_in_python(files, Reading(reading, {}))
-        lines.append(f"print(cr.valves.diagnose_loop({name}{python_keywords(choices)}).report())")
+        lines.append(f"print(cr.valves.diagnose_loop({name}{python_keywords(diagnosed)}).report())")
         calls.append(("In Python", "\n".join(lines)))
-    write = partial(write_loop_report, diagnosis=result, files=files, settings=choices, calls=calls)
+    shown: dict[str, Any] = {
+        "diagnosis": result,
+        "files": files,
+        "settings": diagnosed,
+        "calls": calls,
+    }
+    write = None if no_report else partial(write_loop_report, **shown)
     tables = {"methods.csv": (result.table(), True)}
-    return write_results(output, run, tables, write if report else None, "the table of methods")
+    return write_results(folder, run, tables, write, "the table of methods")
 
 
 def _with_set_point(file: Path, set_point: str, reading: Mapping[str, Any]) -> Record:

@@ -166,16 +166,8 @@ class PIDController(ShownSystem, Delivered, BesideDelays):
 
     def _settings(self) -> dict[str, Any]:
         """All arguments of the constructor beside the four parameters."""
-        return {
-            "dt": self.dt,
-            "method": self.method,
-            "rule": self.rule,
-            "model": self.model,
-            "name": self.name,
-            "check": self.check,
-            "gain_unit": self.gain_unit,
-            "time_unit": self.time_unit,
-        }
+        names = ("dt", "method", "rule", "model", "name", "check", "gain_unit", "time_unit")
+        return {name: getattr(self, name) for name in names}
 
     def __reduce__(self) -> tuple[Any, ...]:
         return _rebuild, ((self.kp, self.ti, self.td, self.tf), self._settings())

@@ -7,9 +7,10 @@ together, since the mean of estimates keeps their common bias.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -20,7 +21,7 @@ from ...errors import DataError
 from ...numerics.arrays import FloatArray
 from ...numerics.statistics import TrimmedStatistics, trimmed_statistics
 from ...results import Flag, Result
-from ..methods import IdentifyOptions, Method, fit_records, identify
+from ..methods import Method, fit_records, identify
 from ..realization.delay_scan_result import DelayScan
 from ..realization.realize import realize
 from .flags import campaign_flags
@@ -61,7 +62,7 @@ class Campaign(Result):
     rows: tuple[CampaignRow, ...]
     sources: tuple[RecordSource, ...] = field(repr=False)
     method: Method
-    options: IdentifyOptions
+    options: Mapping[str, Any]
 
     @cached_property
     def good(self) -> tuple[CampaignRow, ...]:
@@ -206,28 +207,18 @@ class Campaign(Result):
         """
         import pandas as pd
 
-        groups: dict[float, list[CampaignRow]] = {}
-        for row in self.good:
-            groups.setdefault(float(f"{row.amplitude:.2g}"), []).append(row)
-        rows = []
-        for amplitude in sorted(groups, key=lambda a: (np.isnan(a), a)):
-            members = groups[amplitude]
-            delays = np.array([row.delay for row in members])
-            gains = np.array([row.gain for row in members])
-            many = len(members) > 1
-            rows.append(
-                {
-                    "amplitude": amplitude,
-                    "records": len(members),
-                    "delay": delays.mean(),
-                    "std": delays.std(ddof=1) if many else np.nan,
-                    "gain": gains.mean(),
-                    # the gain of integrating plants is infinite, and inf - inf would warn
-                    "gain_std": gains.std(ddof=1) if many and np.isfinite(gains).all() else np.nan,
-                }
-            )
-        columns = ["amplitude", "records", "delay", "std", "gain", "gain_std"]
-        return pd.DataFrame(rows, columns=columns).set_index("amplitude")
+        frame = pd.DataFrame(
+            {
+                "amplitude": [float(f"{row.amplitude:.2g}") for row in self.good],
+                "delay": self.delays,
+                "gain": [row.gain for row in self.good],
+            }
+        )
+        groups = frame.groupby("amplitude", dropna=False)
+        return groups.agg(
+            records=("delay", "size"), delay=("delay", "mean"), std=("delay", "std"),
+            gain=("gain", "mean"), gain_std=("gain", "std"),
+        )  # fmt: skip
 
     @property
     def flags(self) -> tuple[Flag, ...]:

@@ -16,11 +16,11 @@ from __future__ import annotations
 
 import functools
 import pickle
-from collections.abc import Generator, Sequence
+from collections.abc import Generator, Mapping, Sequence
 from queue import Empty, SimpleQueue
 from typing import Any
 
-from ..methods import IdentifyOptions, Method
+from ..methods import Method
 from .rows import CampaignRow, RecordSource, RowStore, failed_row, identify_row, killed_row
 
 _AHEAD = 100
@@ -36,7 +36,7 @@ def identified_on_cluster(
     client: Any,
     sources: Sequence[RecordSource],
     method: Method,
-    options: IdentifyOptions,
+    options: Mapping[str, Any],
     store: RowStore | None,
 ) -> Generator[tuple[int, CampaignRow], None, None]:
     """Identify records on a cluster; yield position and row of each as it is finished."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import functools
 import hashlib
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, field, replace
 from importlib import metadata
@@ -20,7 +20,7 @@ from ...data import Record
 from ...delayed import DelayedStateSpace, fit_of
 from ...errors import CtrlRealizeError, DataError
 from ...results import Flag, ModelFit
-from ..methods import IdentifyOptions, Method, identify
+from ..methods import Method, identify
 from ..realization.delay_scan_result import DelayScan
 from ..step.steps import detect_step
 
@@ -136,7 +136,7 @@ def identify_row(
     source: RecordSource,
     position: int,
     method: Method,
-    options: IdentifyOptions,
+    options: Mapping[str, Any],
     store: RowStore | None,
 ) -> CampaignRow:
     """Identify one record; an error becomes the row's error."""
@@ -198,7 +198,7 @@ def read_source(source: RecordSource) -> Record:
     return record
 
 
-def fingerprint(record: Record, method: str, options: IdentifyOptions) -> str:
+def fingerprint(record: Record, method: str, options: Mapping[str, Any]) -> str:
     """SHA-256 of a record's samples, the settings and the versions."""
     digest = hashlib.sha256(repr(sorted(versions().items())).encode())
     for values in (record.time, record.input, record.output):

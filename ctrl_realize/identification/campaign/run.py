@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import closing
 from inspect import signature
-from typing import Any, Unpack
+from typing import Any
 
 from ..._checks import one_of
 from ...data import Record
 from ...errors import DataError, OptionError
-from ..methods import METHODS, IdentifyOptions, Method, identify
+from ..methods import METHODS, Method, identify
 from .campaign import Campaign
 from .cluster import identified_on_cluster
 from .rows import CampaignRow, RecordSource, RowStore
@@ -26,7 +26,7 @@ def identify_campaign(
     progress: bool | None = None,
     store: RowStore | None = None,
     client: Any = None,
-    **options: Unpack[IdentifyOptions],
+    **options: Any,
 ) -> Campaign:
     """Identify every record of a campaign; a bad record does not stop the others.
 
@@ -115,7 +115,7 @@ def _joblib_client() -> Any:
     return getattr(backend, "client", None)
 
 
-def _check_options(options: IdentifyOptions) -> None:
+def _check_options(options: Mapping[str, Any]) -> None:
     known = set(signature(identify).parameters) - {"record", "method"}
     strange = sorted(set(options) - known)
     if strange:

@@ -8,14 +8,14 @@ process is killed again gives a row with that error, and the others continue.
 from __future__ import annotations
 
 import re
-from collections.abc import Generator, Iterator, Sequence
+from collections.abc import Generator, Iterator, Mapping, Sequence
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import suppress
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-from ..methods import IdentifyOptions, Method
+from ..methods import Method
 from .rows import CampaignRow, RecordSource, RowStore, identify_row, killed_row
 
 
@@ -23,7 +23,7 @@ def identified(
     sources: Sequence[RecordSource],
     n_jobs: int,
     method: Method,
-    options: IdentifyOptions,
+    options: Mapping[str, Any],
     store: RowStore | None,
 ) -> Generator[tuple[int, CampaignRow], None, None]:
     """Identify records with joblib; yield position and row of each as it is finished."""
@@ -62,7 +62,7 @@ def _marked(
     source: RecordSource,
     position: int,
     method: Method,
-    options: IdentifyOptions,
+    options: Mapping[str, Any],
     store: RowStore | None,
 ) -> tuple[int, CampaignRow]:
     """Identify a record; a mark shows that it is running."""

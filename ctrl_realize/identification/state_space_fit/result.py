@@ -30,29 +30,6 @@ LAGS = 25
 
 
 @dataclass(frozen=True, eq=False)
-class Timing:
-    """Dead time of a state-space model that replaces a fit of lags.
-
-    Attributes
-    ----------
-    dead_time : float
-        In s.
-    interval : tuple of float
-        In s: dead times that the data do not rule out, for this model and for `lags` unless its
-        residual is twice as large.
-    total_delay : float or None
-        Delay at zero frequency in s; None for a plant with zero gain.
-    lags : OutputErrorFit
-        The fit of lags with dead time, whose residual is too large.
-    """
-
-    dead_time: float
-    interval: tuple[float, float]
-    total_delay: float | None
-    lags: OutputErrorFit
-
-
-@dataclass(frozen=True, eq=False)
 class StateSpaceFit(ModelFit):
     """Result of a state-space fit to records of one or several channels.
 
@@ -75,9 +52,15 @@ class StateSpaceFit(ModelFit):
         ``100 (1 - noise_std / std y)`` of every output, over all records.
     checks : tuple of ResidualAnalysis
         Of every record without gaps.
-    timing : Timing or None
-        Dead time, interval and total delay of one input and output in `identify`, and the fit of
-        lags that this one replaces; None otherwise.
+    dead_time : float or None
+        In s; this and the next three are for one input and output in `identify`, otherwise None.
+    interval : tuple of float, or None
+        In s: dead times that the data do not rule out, for this model and for `lags` unless its
+        residual is twice as large.
+    total_delay : float or None
+        Delay at zero frequency in s; None also for a plant with zero gain.
+    lags : OutputErrorFit or None
+        The fit of lags with dead time that this one replaces.
     records : tuple of Record
         Records that were fitted.
     choices : tuple of str
@@ -113,27 +96,10 @@ class StateSpaceFit(ModelFit):
     records: tuple[Record, ...]
     choices: tuple[str, ...] = ()
     flags: tuple[Flag, ...] = ()
-    timing: Timing | None = None
-
-    @property
-    def dead_time(self) -> float | None:
-        """Dead time in s; None unless `identify` has estimated it."""
-        return None if self.timing is None else self.timing.dead_time
-
-    @property
-    def interval(self) -> tuple[float, float] | None:
-        """Dead times in s that are not ruled out; None unless `identify` has estimated them."""
-        return None if self.timing is None else self.timing.interval
-
-    @property
-    def total_delay(self) -> float | None:
-        """Delay at zero frequency in s; None unless `identify` has estimated it."""
-        return None if self.timing is None else self.timing.total_delay
-
-    @property
-    def lags(self) -> OutputErrorFit | None:
-        """Fit of lags with dead time that this one replaces."""
-        return None if self.timing is None else self.timing.lags
+    dead_time: float | None = None
+    interval: tuple[float, float] | None = None
+    total_delay: float | None = None
+    lags: OutputErrorFit | None = None
 
     @property
     def delay(self) -> int | None:

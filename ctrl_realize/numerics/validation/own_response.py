@@ -174,18 +174,10 @@ def own_step_response(
     n = output.size
     line = np.arange(n) / n  # drifts may cancel in the mean of the records
     beside = np.column_stack([line, own[:n]])
-    reach = 0.2 * start + 20
-    shift, error, gain, gain_error = 0.0, np.inf, 1.0, np.inf
-    for _ in range(_TURNS):
-        columns = np.column_stack([*_moved(model, n, start, shift, 1.0)[:2], beside])
-        solution, errors = _regression(columns, output)
-        gain, gain_error = float(solution[0]) or 1.0, float(errors[0])
-        move = float(solution[1]) / gain
-        shift += float(np.clip(move, -reach, reach))
-        error = float(errors[1]) / abs(gain)
-        if abs(move) < _SETTLED:
-            break
-    lag, lag_error = _own_lags(output, model, start, beside, shift)
+    (gain, shift, _), (gain_error, error, _), _ = _matched(output, model, start, beside, 0.0)
+    (*_, lag), (*_, lag_error), settled = _matched(
+        output, model, start, beside, shift, with_lags=True
+    )
     alone, errors = _regression(np.column_stack([model[:n], own[:n]]), output)
     level = np.linalg.lstsq(beside, output - model[:n], rcond=None)[0]
     followed = float(fit_percent(output[None], (model[:n] + beside @ level)[None])[0])
@@ -195,30 +187,40 @@ def own_step_response(
         gain,
         max(gain_error, 1e-12),
         lag,
-        lag_error,
+        max(lag_error, 1e-12) if settled else np.inf,  # delay, gain and lags may look alike
         followed,
         float(alone[0]),
         max(float(errors[0]), 1e-12),
     )
 
 
-def _own_lags(
-    output: FloatArray, model: FloatArray, start: float, beside: FloatArray, shift: float
-) -> tuple[float, float]:
-    """Ratio of the time constants and its relative error, with free delay and gain."""
-    stretch, error = 1.0, np.inf
+def _matched(
+    output: FloatArray,
+    model: FloatArray,
+    start: float,
+    beside: FloatArray,
+    shift: float,
+    *,
+    with_lags: bool = False,
+) -> tuple[tuple[float, ...], tuple[float, ...], bool]:
+    """Gain, shift and stretch of a response that fit best, their errors, and whether they settled.
+
+    Without lags the stretch is 1. The errors of shift and stretch are those of the last turn.
+    """
+    stretch, free = 1.0, 3 if with_lags else 2
     reach = 0.2 * start + 20
     for _ in range(_TURNS):
-        columns = np.column_stack([*_moved(model, output.size, start, shift, stretch), beside])
-        solution, errors = _regression(columns, output)
+        moved = _moved(model, output.size, start, shift, stretch)[:free]
+        solution, errors = _regression(np.column_stack([*moved, beside]), output)
         gain = float(solution[0]) or 1.0
-        moves = solution[1:3] / gain
+        moves = np.append(solution[1:free] / gain, 0.0)
         shift += float(np.clip(moves[0], -reach, reach))
         stretch *= float(np.exp(np.clip(moves[1], -_LARGEST_STRETCH, _LARGEST_STRETCH)))
-        error = float(errors[2]) / abs(gain)
-        if abs(moves[0]) < _SETTLED and abs(moves[1]) < _SETTLED:
-            return stretch, max(error, 1e-12)
-    return stretch, np.inf  # delay, gain and lags are not distinguishable
+        settled = bool(np.abs(moves).max() < _SETTLED)
+        if settled:
+            break
+    relative = (errors[1:3] / abs(gain)).tolist()
+    return (gain, shift, stretch), (float(errors[0]), *relative), settled
 
 
 def _moved(

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from ctrl_realize.numerics.actuators.characteristic import equal_percentage
+from ctrl_realize.actuators import Characteristic
 from ctrl_realize.numerics.actuators.friction import (
     backlash,
     choudhury,
@@ -94,10 +94,11 @@ def test_a_resolution_is_the_smallest_change_that_moves_the_output():
 
 def test_equal_percentages_are_the_exponential_characteristic():
     travel, middle = np.linspace(0, 1, 11), 0.5
-    flow = equal_percentage(travel, 50.0)
+    valve = Characteristic("equal-percentage", high=1.0, full_flow=1.0, rangeability=50.0)
+    flow = valve.simulate(travel)
     curve = np.expm1(np.log(50.0) * (travel - middle))
     # The same up to gain and level: f = f(m) (1 + curve).
-    assert_allclose(flow, equal_percentage(np.array(middle), 50.0) * (1 + curve))
+    assert_allclose(flow, valve.simulate([middle]) * (1 + curve))
 
 
 def test_a_stem_with_lugre_friction_breaks_away_at_the_static_force_and_slides_at_the_kinetic():
