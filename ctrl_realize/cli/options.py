@@ -9,6 +9,7 @@ from typing import Annotated, Any, TypeAlias
 
 import typer
 
+from .._facts import facts
 from .arguments import option_of, options_of
 
 _OPTION = typer.Option
@@ -94,22 +95,7 @@ ARGUMENTS = frozenset(
 
 _COLUMNS = ("time", "input", "output", "quality", "by")
 
-_CALLS = {
-    "Record needs a uniform time axis: Record.from_samples(...) takes gaps and irregular samples "
-    "as they are, Record.resampled(...) or read_record(..., resample=True) interpolates small "
-    "jitter": "--resample interpolates small jitter",
-    "record.with_baseline(u0, y0) or read_record(..., rest=(u0, y0))": "--rest U0 Y0",
-    "read_records(path, by=)": "--by COLUMN or --split",
-    "record.between(t0, t1)": "--from and --to",
-    "time=name or number": "--time NAME-OR-NUMBER",
-    "input=name or number": "--input NAME-OR-NUMBER",
-    "output=name or number": "--output-column NAME-OR-NUMBER",
-    "quality=None": "--quality none",
-    "header=False and column numbers": "--no-header and column numbers",
-    "fit_output_error needs": "the fit needs",
-    "Record.from_samples(record.time, record.input, record.output) or read_record(..., "
-    "missing='hold')": "--missing hold",
-}
+_CALLS = {row["python"]: row["option"] for row in facts("cli/advice.toml")["advice"]}
 """Advice for Python, and for the command line."""
 
 _ARGUMENT = re.compile(

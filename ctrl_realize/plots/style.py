@@ -22,6 +22,7 @@ from matplotlib.ticker import FuncFormatter, LogLocator, MultipleLocator, NullFo
 from numpy.typing import ArrayLike
 
 from .. import _wording
+from .._facts import facts
 from ..delayed import DelayedStateSpace
 from ..errors import OptionError
 from ..numerics.arrays import FloatArray
@@ -42,33 +43,9 @@ PAPER = "#fefefe"
 DASHES = ((0, (5, 1.6)), (0, (2, 1.2)), (0, (7, 1.5, 1.5, 1.5)), (0, (1, 1)), (0, (9, 2)))
 """Line styles of models, the first for the first model."""
 
-_SETTINGS: Any = {
-    "font.size": 12,
-    "axes.labelsize": 12,
-    "axes.titlesize": 13,
-    "xtick.labelsize": 11,
-    "ytick.labelsize": 11,
-    "legend.fontsize": 11,
-    "legend.frameon": True,
-    "legend.facecolor": PAPER,
-    "legend.edgecolor": "none",
-    "legend.framealpha": 0.75,
-    "legend.borderaxespad": 0.3,
-    "lines.linewidth": 2.0,
-    "lines.markersize": 5.0,
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "axes.grid": True,
-    "axes.axisbelow": True,
-    "grid.color": GRID,
-    "grid.linewidth": 0.8,
-    "text.color": INK,
-    "axes.labelcolor": INK,
-    "axes.edgecolor": INK,
-    "xtick.color": INK,
-    "ytick.color": INK,
-    "axes.formatter.useoffset": False,
-}
+_LOOKS = facts("plots/style.toml")
+_COLOURS = {"ink": INK, "grid": GRID, "paper": PAPER}
+_SETTINGS: Any = _LOOKS["plain"] | {key: _COLOURS[name] for key, name in _LOOKS["colours"].items()}
 
 Kind = TypeVar("Kind")
 

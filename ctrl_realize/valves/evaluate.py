@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 
+from .._flags import Flag, flagged
 from ..data import Record
 from ..data.given import as_record
 from ..errors import DataError
 from ..numerics.valve_test.play import slope_of
-from ..results import Flag
 from .flags import flags_of
 from .groups import Interval, grouped, linear_fit
 from .metrics import check_limits, collected, judged
@@ -236,8 +236,4 @@ def _fit_of_operation(records: tuple[Record, ...]) -> tuple[Interval, Flag] | No
         return None
     fit, interval = first
     more = "".join(f"; {flag}" for flag in fit.flags[:2])
-    return interval, Flag(
-        "operation_fit",
-        f"a linear model of the record has a dead time of {interval.value:.3g} s and a gain of "
-        f"{fit.gain:.3g} in the units of the record{more}",
-    )
+    return interval, flagged("operation_fit", dead_time=interval.value, gain=fit.gain, more=more)

@@ -12,12 +12,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .._checks import numbers
+from .._flags import flagged
 from .._wording import in_time
 from ..data import Record
 from ..errors import DataError
 from ..io.atomic import replaced_when_complete
 from ..numerics.arrays import FloatArray, read_only
-from ..results import Flag, Result
+from ..results import Result
 from .evaluate import valve_report
 from .result import ValveReport
 
@@ -177,10 +178,7 @@ def _with_plan(report: ValveReport, plan: ValveTestPlan) -> ValveReport:
             lacking.append(name)
     if not lacking:
         return report
-    flag = Flag(
-        "plan_incomplete",
-        f"the records do not contain these sections of the plan: {', '.join(lacking)}",
-    )
+    flag = flagged("plan_incomplete", sections=", ".join(lacking))
     return replace(report, flags=(*report.flags, flag))
 
 

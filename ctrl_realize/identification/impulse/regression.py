@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import reduce
+from functools import partial, reduce
 from operator import add
 
 import numpy as np
@@ -139,7 +139,8 @@ def through_arx(
         orders = (integer(arx_order, "arx_order", 1),)
     while True:
         top = orders[-1]
-        equations = _okid_equations(group, top, start)
+        of_signals = partial(arx_equations, na=top, nb=top + 1)
+        equations = _equations(group, top, start, (top + 1) * (m + p) + 1, of_signals)
         excited = excited_directions(equations.gram[top * p :, top * p :])
         if excited == m * (top + 1):
             break
@@ -192,33 +193,27 @@ def through_arx(
     )
 
 
-def _okid_equations(group: tuple[Record, ...], order: int, start: str) -> NormalEquations:
-    m, p = group[0].ninputs, group[0].noutputs
-    parts = []
-    for record in group:
-        u, y = _signals(record, order, start)
-        if u.shape[1] > order:
-            parts.append(arx_equations(u, y, order, order + 1))
-    _check_rows(parts, (order + 1) * (m + p) + 1, order + 1)
-    return _with_moving_outputs(reduce(add, parts))
+def _equations(
+    group: tuple[Record, ...],
+    past: int,
+    start: str,
+    needed: int,
+    of_signals: Callable[[FloatArray, FloatArray], NormalEquations],
+) -> NormalEquations:
+    """Sum the equations of all records that are longer than the past that they need."""
+    signals = [_signals(record, past, start) for record in group]
+    parts = [of_signals(u, y) for u, y in signals if u.shape[1] > past]
+    _check_rows(parts, needed, past + 1)
+    equations = reduce(add, parts)
+    if not np.all(np.diag(equations.power) > 0):
+        raise DataError("an output is constant: there is no response to estimate")
+    return equations
 
 
 def _fir_equations(
     group: tuple[Record, ...], count: int, start: str, needed: int
 ) -> NormalEquations:
-    parts = []
-    for record in group:
-        u, y = _signals(record, count - 1, start)
-        if u.shape[1] >= count:
-            parts.append(normal_equations(u, y, count))
-    _check_rows(parts, needed, count)
-    return _with_moving_outputs(reduce(add, parts))
-
-
-def _with_moving_outputs(equations: NormalEquations) -> NormalEquations:
-    if not np.all(np.diag(equations.power) > 0):
-        raise DataError("an output is constant: there is no response to estimate")
-    return equations
+    return _equations(group, count - 1, start, needed, partial(normal_equations, lags=count))
 
 
 def _unexcited(excited: int, wanted: int) -> str:

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from ..._checks import integer
+from ..._flags import Flag, flagged
 from ...data import MeasuredFRF, Record
 from ...data.given import check_complete
 from ...delayed import fit_of
@@ -14,7 +15,6 @@ from ...errors import CtrlRealizeError, DataError
 from ...numerics.blas_threads import single_threaded
 from ...numerics.rational.phase import dead_time_from_phase, unwrap_with_dead_time
 from ...numerics.signals.onset import correlation_onset, phase_slope
-from ...results import Flag
 from ..impulse.from_io import impulse_from_io
 from ..output_error.fit import fit_output_error
 from ..output_error.result import OutputErrorFit
@@ -133,7 +133,7 @@ def _from_record(
     try:
         fit = fit_of(fit_output_error(record), OutputErrorFit)
     except CtrlRealizeError as problem:
-        yield Flag("no_output_error", f"output error: {problem}")
+        yield flagged("no_output_error", problem=problem)
     else:
         yield DelayEstimate("output error", "record", "dead time", fit.dead_time, *fit.interval)
         stepped = bool(np.isfinite(fit.onset))
@@ -146,7 +146,7 @@ def _from_record(
     try:
         yield _scan(record, stepped, most, order or model_order, total)
     except CtrlRealizeError as problem:
-        yield Flag("no_scan", f"scan: {problem}")
+        yield flagged("no_scan", problem=problem)
     if not stepped:
         yield _from_correlation(record, most)
 
@@ -155,7 +155,7 @@ def _from_correlation(record: Record, most: int) -> DelayEstimate | Flag:
     lags = int(min(MOST_LAGS, max(most, 20), record.n_samples // 4))
     seen = correlation_onset(record.input.ravel(), record.output.ravel(), lags, 1 - UNSEEN)
     if seen.onset < 0:
-        return Flag("no_correlation", f"cross-correlation: no significant peak up to lag {lags}")
+        return flagged("no_correlation", lags=lags)
     # With a hold, the first visible response at lag k started within the sample before.
     value = seen.onset * record.dt
     return DelayEstimate("cross-correlation", "record", "upper bound", value, 0.0, value)
@@ -197,14 +197,14 @@ def _from_frf(frf: MeasuredFRF) -> Iterator[DelayEstimate | Flag]:
     try:
         fit = fit_of(fit_frf(frf), FRFFit)
     except CtrlRealizeError as problem:
-        yield Flag("no_frf_fit", f"FRF fit: {problem}")
+        yield flagged("no_frf_fit", problem=problem)
     else:
         doubt = _doubt(fit.flags)
         yield DelayEstimate("FRF fit", "FRF", "dead time", fit.dead_time, *fit.interval, doubt)
     omega = 2 * np.pi * np.asarray(frf.frequency_hz)
     values = np.asarray(frf.complex, dtype=np.complex128).ravel()
     if omega.size < 4:
-        yield Flag("no_phase_slope", f"phase slope: {omega.size} lines are too few")
+        yield flagged("no_phase_slope", count=omega.size)
         return
     phase = unwrap_with_dead_time(omega, values, dead_time_from_phase(omega, values))
     slope, std = phase_slope(omega, phase, TOP_BAND)

@@ -7,9 +7,9 @@ from typing import Literal, TypeAlias
 
 import numpy as np
 
+from ..._flags import Flag, flagged
 from ...numerics.arrays import FloatArray
 from ...numerics.oscillation.cycles import FEWEST_CYCLES, SHORTEST_PERIOD, Cycles, resolution
-from ...results import Flag
 from .data import LONGEST_GAP, LoopData
 from .methods import VOTERS, LoopMethod
 
@@ -44,55 +44,27 @@ def oscillates(cycles: Cycles | None) -> bool | None:
 def flags_of(data: LoopData, cycles: Cycles | None) -> Iterator[Flag]:
     """List what the record lacks."""
     if data.left_out:
-        yield Flag(
-            "missing_samples",
-            f"only the longest part without gaps is used: {data.op.size} samples of "
-            f"{data.op.size + data.left_out}",
-        )
+        count = data.op.size
+        yield flagged("missing_samples", count=count, all=count + data.left_out)
     if data.filled:
-        yield Flag(
-            "filled_samples",
-            f"{data.filled} of {data.op.size} samples were missing, in gaps of at most "
-            f"{LONGEST_GAP}: they are interpolated",
-        )
+        count = data.op.size
+        yield flagged("filled_samples", filled=data.filled, count=count, longest=LONGEST_GAP)
     for name, signal in (("controller output", data.op), ("process value", data.pv)):
         if np.ptp(signal) == 0:
-            yield Flag(
-                "constant_signal",
-                f"the {name} is constant: the controller is in manual, or the signal is not "
-                "that of the loop",
-            )
+            yield flagged("constant_signal", name=name)
         elif np.ptp(signal) < _COARSE * resolution(signal):
-            yield Flag(
-                "coarse_quantisation",
-                f"the {name} has {np.ptp(signal) / resolution(signal) + 1:.0f} levels: half "
-                "cycles have no shape; record it with more digits, and without compression",
-            )
+            levels = np.ptp(signal) / resolution(signal) + 1
+            yield flagged("coarse_quantisation.loop", name=name, levels=levels)
     limited = _at_limits(data.op)
     if limited > _SATURATED:
-        yield Flag(
-            "saturated_output",
-            f"the controller output is at its smallest or largest value in {limited:.0%} of "
-            "the samples: this shapes the oscillation, whatever its cause",
-        )
+        yield flagged("saturated_output", limited=limited)
     if data.sp is not None and np.std(data.sp) > 0.2 * np.std(data.pv - data.sp):
-        yield Flag(
-            "set_point_moves",
-            "the set point moves: the oscillation may come with it, from an outer loop; judge "
-            "that loop, or a record with a constant set point",
-        )
+        yield flagged("set_point_moves")
     if cycles is not None and oscillates(cycles) is not False:
         if cycles.period < 2 * SHORTEST_PERIOD:
-            yield Flag(
-                "few_samples_per_cycle",
-                f"{cycles.period:.1f} samples in a cycle: half cycles have no shape; sample faster",
-            )
+            yield flagged("few_samples_per_cycle", period=cycles.period)
         if cycles.count < 2 * FEWEST_CYCLES:
-            yield Flag(
-                "few_cycles",
-                f"{cycles.count:.1f} cycles of the oscillation; record at least "
-                f"{2 * FEWEST_CYCLES:.0f}",
-            )
+            yield flagged("few_cycles", count=cycles.count, fewest=2 * FEWEST_CYCLES)
 
 
 SPOILS = {"constant_signal", "saturated_output", "set_point_moves", "coarse_quantisation"}
