@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, TypeAlias
 
 from .._checks import band, real
@@ -88,17 +88,7 @@ class ProcessStructure:
         start = {key: _value(key, value) for key, value in _named(self.start, "start", plain)}
         if both := sorted(fixed.keys() & bounds.keys()):
             raise OptionError(f"{', '.join(both)} is fixed and bounded; expected one of the two")
-        return ProcessForm(
-            plain.name,
-            plain.lags,
-            plain.pair,
-            plain.lead,
-            plain.integrator,
-            plain.dead_time,
-            fixed,
-            bounds,
-            start,
-        )
+        return replace(plain, fixed=fixed, bounds=bounds, start=start)
 
 
 StructureLike: TypeAlias = "tuple[int, int] | str | ProcessStructure"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import overload
 
@@ -41,9 +41,6 @@ class Candidates(Sequence[DelayedStateSpace]):
             return tuple(self[d] for d in range(*delay.indices(len(self))))
         d = range(len(self))[delay]
         return DelayedStateSpace(ct.ss(*(M[d] for M in self._matrices), self._dt), d)
-
-    def __iter__(self) -> Iterator[DelayedStateSpace]:
-        return (self[d] for d in range(len(self)))
 
     def __repr__(self) -> str:
         return f"<Candidates: d = 0...{len(self) - 1}>"

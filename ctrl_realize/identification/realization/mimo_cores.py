@@ -30,13 +30,7 @@ class RealizationOptions:
 
     def realize(self, impulse: ImpulseResponse, order: int) -> DelayedStateSpace:
         """Realize with these options."""
-        return realize(
-            impulse,
-            order,
-            samples=self.samples,
-            feedthrough=self.feedthrough,
-            hankel=self.hankel,
-        )
+        return realize(impulse, order, **vars(self))
 
 
 @dataclass(frozen=True, eq=False)
