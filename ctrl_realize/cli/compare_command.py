@@ -10,9 +10,7 @@ from typing import Any
 from ..frequency import compare_frf
 from ..io import load_model, read_frf
 from ..report import write_comparison
-from .inputs import typed_call
 from .manifest import Run
-from .options import words_of
 from .results import write_results
 from .terminal import printable, say
 
@@ -25,7 +23,8 @@ def run_compare(
     compared: Mapping[str, Any],
     response_file: Mapping[str, Any],
     no_report: bool,
-    overwrite: bool,
+    run: Run,
+    typed: str,
 ) -> int:
     """Compare, write the results if a folder is given, and return the exit code."""
     system = load_model(model)
@@ -35,12 +34,9 @@ def run_compare(
     say(comparison.report())
     if folder is None:
         return 0
-    words = [str(model), str(frf), *words_of({**compared, **response_file})]
-    run = Run(typed_call("compare", words), (model, frf), overwrite)
-    words += ["--output", str(folder)]
     write = partial(
         write_comparison, system=system, frf=measured, comparison=comparison, files=[model, frf],
-        calls=[("In a terminal", typed_call("compare", words))],
+        calls=[("In a terminal", typed)],
     )  # fmt: skip
     tables = {"frf_comparison.csv": (comparison.table(), False)}
     return write_results(folder, run, tables, None if no_report else write, "the comparison")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+import shlex
 from collections.abc import Callable, Sequence
 from enum import Enum
 from functools import wraps
@@ -10,12 +11,22 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any, get_args, get_type_hints
 
+from typer.models import ArgumentInfo
+
 from ..errors import MissingFileError, OptionError
 from .loading import loading
-from .options import GROUPS, Given
+from .options import GROUPS, Given, words_of
 
 _COLUMNS = ("time", "input", "output", "quality", "by", "frequency", "magnitude", "phase", "real",
             "imag")  # fmt: skip
+
+
+_NO_RESULT = ("folder", "jobs", "no_report")
+
+
+def typed_call(command: str, words: Sequence[str]) -> str:
+    """Return a command line that can be typed again."""
+    return shlex.join(["ctrl-realize", command, *words])
 
 
 def check_files(paths: Sequence[Path]) -> None:
@@ -36,7 +47,8 @@ def command(module: str, function: str) -> Callable[[Callable[..., None]], Calla
     """Make a command of a signature: a function of a module runs it with the same arguments.
 
     Groups among the arguments become options; the function receives them as the arguments of
-    Python that were given. Files must exist.
+    Python that were given. Files must exist. In place of `overwrite` it receives the `run`, and as
+    `typed` the command line that can be typed again.
     """
 
     def complete(declared: Callable[..., None]) -> Callable[..., int]:
@@ -45,22 +57,44 @@ def command(module: str, function: str) -> Callable[[Callable[..., None]], Calla
             for group in groups:
                 options = {name: values.pop(name) for name in GROUPS[group]}
                 values[group] = given(**options)
+            folder, overwrite = values["folder"], values.pop("overwrite")
             named = [value for name, value in values.items() if name != "folder"]
             several = [value if isinstance(value, list) else [value] for value in named]
-            check_files([path for each in several for path in each if isinstance(path, Path)])
+            paths = [path for each in several for path in each if isinstance(path, Path)]
+            check_files(paths)
+            words = _words(values, hints)
             with loading():
+                from .manifest import Run
+
                 call = getattr(import_module(module, __package__), function)
-            code: int = call(**values)
+            again = Run(typed_call(declared.__name__, words), tuple(paths), overwrite)
+            whole = [*words, *([] if folder is None else ["--output", str(folder)])]
+            code: int = call(**values, run=again, typed=typed_call(declared.__name__, whole))
             return code
 
+        hints = get_type_hints(declared, include_extras=True)
         signature = inspect.signature(declared)
         groups = [name for name in signature.parameters if name in GROUPS]
-        parameters = _options(signature, get_type_hints(declared, include_extras=True))
+        parameters = _options(signature, hints)
         run.__signature__ = signature.replace(parameters=parameters)  # type: ignore[attr-defined]
         run.__annotations__ = {one.name: one.annotation for one in parameters}
         return run
 
     return complete
+
+
+def _words(values: dict[str, Any], hints: dict[str, Any]) -> list[str]:
+    """Words that were typed, without the folder and options that change no result."""
+    words: list[str] = []
+    options: dict[str, Any] = {}
+    for name, value in values.items():
+        if name in GROUPS:
+            options |= value
+        elif isinstance(get_args(hints[name])[1], ArgumentInfo):
+            words += map(str, value if isinstance(value, list) else [value])
+        elif name not in _NO_RESULT and value not in (None, False):
+            options[name] = value
+    return words + words_of(options)
 
 
 def _options(signature: inspect.Signature, hints: dict[str, Any]) -> list[inspect.Parameter]:

@@ -21,8 +21,6 @@ from .inputs import (
     Settings,
     Source,
     calls_again,
-    typed_call,
-    words_again,
 )
 from .manifest import Run, refuse_other_results
 from .results import campaign_table, write_campaign_files, write_record_files
@@ -46,7 +44,8 @@ def run_identify(
     response: Mapping[str, Any],
     jobs: int | None,
     no_report: bool,
-    overwrite: bool,
+    run: Run,
+    typed: str,
 ) -> int:
     """Identify, write the results, and return the exit code."""
     joint = joint or "gains" in chosen
@@ -57,13 +56,10 @@ def run_identify(
     settings = Settings(chosen, joint)
     how = Reading(record, tests)
     measured = None if frf is None else read_frf(frf, **response)
-    words = words_again(files, settings, how, frf, response, separate)
-    run = Run(typed_call("identify", words), (*files, *([frf] if frf else [])), overwrite)
-    words += ["--output", str(folder)]
-    calls = calls_again(files, settings, how, words, None if frf is None else (frf, response))
+    calls = calls_again(files, settings, how, typed, None if frf is None else (frf, response))
     sources, task = how.sources(files), _Task(settings, measured, run, not no_report)
     if separate and len(sources) > 1:
-        return _each_alone(task, sources, folder, how, words)
+        return _each_alone(task, sources, folder, how, typed)
     refuse_other_results(folder, run)
     if len(sources) > 1 and not joint:
         return _many(task, sources, folder, calls, jobs)
@@ -154,9 +150,7 @@ def _refuse_useless(campaign: Campaign) -> None:
         raise DataError(f"{error}; --separate identifies each record on its own") from error
 
 
-def _each_alone(
-    task: _Task, sources: list[Source], output: Path, how: Reading, words: list[str]
-) -> int:
+def _each_alone(task: _Task, sources: list[Source], output: Path, how: Reading, typed: str) -> int:
     """Identify each record into its own folder; failures do not stop the rest."""
     refuse_a_file(output)
     failed = 0
@@ -173,7 +167,7 @@ def _each_alone(
             # each folder appears as soon as it is finished, so that an interruption loses no other
             with appearing(output / name, task.run) as folder:
                 test = position(source)
-                calls = calls_again([source.file], task.settings, how, words, None, test)
+                calls = calls_again([source.file], task.settings, how, typed, None, test)
                 failed += not _one(task, [source], folder, calls)
         except (CtrlRealizeError, OSError) as error:
             failed += 1

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shlex
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -12,7 +11,6 @@ from typing import Any
 from ..data import Record
 from ..identification.methods import METHODS
 from ..io import read_record, read_records
-from .options import words_of
 
 
 @dataclass(frozen=True)
@@ -70,11 +68,6 @@ def folder_name(file: Path) -> str:
     return file.stem if file.stem.strip(".") else "record"
 
 
-def typed_call(command: str, words: Sequence[str]) -> str:
-    """Return a command line that can be typed again."""
-    return shlex.join(["ctrl-realize", command, *words])
-
-
 def python_keywords(keywords: Mapping[str, object]) -> str:
     """Return keyword arguments as Python text."""
     return "".join(f", {name}={value!r}" for name, value in keywords.items())
@@ -95,30 +88,11 @@ def reading_in_python(files: Sequence[Path], how: Reading) -> tuple[list[str], s
     return [*lines, f"records = [{reader}]"], "records"
 
 
-def words_again(
-    files: list[Path],
-    settings: Settings,
-    how: Reading,
-    frf: Path | None,
-    response: Mapping[str, Any],
-    separate: bool,
-) -> list[str]:
-    """Return the arguments that reproduce a run, without the output folder."""
-    words = [*map(str, files), *words_of(settings.given)]
-    if settings.joint:
-        words.append("--joint")
-    if frf is not None:
-        words += ["--frf", str(frf)]
-    if separate:
-        words.append("--separate")
-    return [*words, *words_of({**how.tests, **how.keywords, **response})]
-
-
 def calls_again(
     files: list[Path],
     settings: Settings,
     how: Reading,
-    words: list[str],
+    typed: str,
     frf: tuple[Path, Mapping[str, Any]] | None,
     test: int | None = None,
 ) -> list[tuple[str, str]]:
@@ -138,4 +112,4 @@ def calls_again(
         lines += [f"campaign = cr.identify_campaign(records{chosen})", "sys = campaign.system"]
     else:
         lines.append(f"sys = cr.identify({name}{chosen})")
-    return [("In a terminal", typed_call("identify", words)), ("In Python", "\n".join(lines))]
+    return [("In a terminal", typed), ("In Python", "\n".join(lines))]

@@ -10,9 +10,8 @@ from typing import Any
 from ...errors import OptionError
 from ...report.valves import write_valve_report
 from ...valves import valve_report
-from ..inputs import Reading, python_keywords, reading_in_python, typed_call
+from ..inputs import Reading, python_keywords, reading_in_python
 from ..manifest import Run, refuse_other_results
-from ..options import words_of
 from ..results import write_results
 from ..terminal import printable, say
 
@@ -26,15 +25,13 @@ def run_valve(
     tests: Mapping[str, Any],
     valve_test: Mapping[str, Any],
     no_report: bool,
-    overwrite: bool,
+    run: Run,
+    typed: str,
 ) -> int:
     """Measure, write the results, and return the exit code."""
     how = Reading(valve_test, tests)
     bounds = _limits(limit or ())
     options = {**measured, **({"limits": bounds} if bounds else {})}
-    given = {**measured, "limit": list(limit or ()), **tests, **valve_test}
-    words = [*map(str, files), *words_of(given)]
-    run = Run(typed_call("valve", words), tuple(files), overwrite)
     refuse_other_results(folder, run)
     sources = how.sources(files)
     records = [source.record() for source in sources]
@@ -42,10 +39,9 @@ def run_valve(
         say(printable(f"{source.file}: {record!r}"))
     result = valve_report(records, **options)
     say(result.report())
-    words += ["--output", str(folder)]
     lines, name = reading_in_python(files, how)
     lines.append(f"report = cr.valves.valve_report({name}{python_keywords(options)})")
-    calls = [("In a terminal", typed_call("valve", words)), ("In Python", "\n".join(lines))]
+    calls = [("In a terminal", typed), ("In Python", "\n".join(lines))]
     tables = {
         "metrics.csv": (result.metric_table(), True),
         "sizes.csv": (result.table(), False),

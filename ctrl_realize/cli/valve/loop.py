@@ -12,9 +12,8 @@ from ...errors import OptionError
 from ...io import read_record
 from ...report.loops import write_loop_report
 from ...valves.loops.diagnose import diagnose_loop
-from ..inputs import Reading, python_keywords, reading_in_python, typed_call
+from ..inputs import Reading, python_keywords, reading_in_python
 from ..manifest import Run, refuse_other_results
-from ..options import words_of
 from ..results import write_results
 from ..terminal import printable, say
 
@@ -27,15 +26,13 @@ def run_loop(
     set_point: str | None,
     trend: Mapping[str, Any],
     no_report: bool,
-    overwrite: bool,
+    run: Run,
+    typed: str,
 ) -> int:
     """Diagnose, write the results, and return the exit code."""
     if len(files) != 1:
         raise OptionError(f"{len(files)} files; expected one record of operation")
-    words = [str(files[0]), *words_of({**diagnosed, **trend})]
     reading = {**trend, "missing": "keep"}  # the longest complete part is judged
-    words += [] if set_point is None else ["--set-point", set_point]
-    run = Run(typed_call("loop", words), tuple(files), overwrite)
     refuse_other_results(folder, run)
     if set_point is None:
         record = read_record(files[0], **reading)
@@ -46,8 +43,7 @@ def run_loop(
         result = diagnose_loop(record.input, value, wanted, record.dt, **diagnosed)
     say(printable(f"{files[0]}: {record!r}"))
     say(result.report())
-    words += ["--output", str(folder)]
-    calls = [("In a terminal", typed_call("loop", words))]
+    calls = [("In a terminal", typed)]
     if set_point is None:
         lines, name = reading_in_python(files, Reading(reading, {}))
         lines.append(f"print(cr.valves.diagnose_loop({name}{python_keywords(diagnosed)}).report())")
