@@ -1,4 +1,4 @@
-"""The table of all flags, read from the places in the source that raise them."""
+"""The table of all flags: their words, and the functions in the source that raise them."""
 
 from __future__ import annotations
 
@@ -36,13 +36,6 @@ RAISED_BY = {
 """File or folder of the source -> public function whose results carry the flag."""
 
 
-def _message(node: ast.expr) -> str:
-    if isinstance(node, ast.JoinedStr):
-        parts = (v.value if isinstance(v, ast.Constant) else "…" for v in node.values)
-        return "".join(map(str, parts)).replace("……", "…")
-    return str(node.value) if isinstance(node, ast.Constant) else "…"
-
-
 def keys(call: ast.Call) -> list[str]:
     """Keys of the table with which a flag may be made."""
     constants = [one for one in ast.walk(call.args[0]) if isinstance(one, ast.Constant)]
@@ -55,15 +48,12 @@ def flags(package: Path) -> list[tuple[str, str, str]]:
     found = set()
     for path in package.rglob("*.py"):
         place = path.relative_to(package).with_suffix("").as_posix()
-        by = RAISED_BY.get(place) or RAISED_BY.get(place.rpartition("/")[0], "")
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-            called = getattr(node.func, "id", "") if isinstance(node, ast.Call) else ""
-            if called == "flagged":
+            if isinstance(node, ast.Call) and getattr(node.func, "id", "") == "flagged":
+                by = RAISED_BY.get(place) or RAISED_BY[place.rpartition("/")[0]]
                 for code, _, case in (key.partition(".") for key in keys(node)):
                     said = re.sub(r"\{[^}]*\}", "…", words[code][case or "words"])
                     found.add((code, by, said))
-            elif called == "Flag" and isinstance(node.args[0], ast.Constant):
-                found.add((str(node.args[0].value), by, _message(node.args[1])))
     return sorted(found)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -10,13 +11,13 @@ import numpy as np
 from scipy.interpolate import PchipInterpolator
 
 from ..._checks import integer
+from ..._flags import Flag, flagged
 from ...delayed.parts import check_entries
 from ...errors import DataError
 from ...frequency.points import MeasuredPoints, measured_points
 from ...numerics.arrays import ComplexArray, FloatArray
 from ...numerics.loops.crossings import half_turns
 from ...numerics.rational.phase import dead_time_from_phase, unwrap_with_dead_time
-from ...results import Flag
 from .loop import open_loop
 
 
@@ -66,28 +67,14 @@ class DataLoop:
         count = self.unstable_poles - turns
         return max(0, round(count)), abs(count - round(count)) > 0.25
 
-    def flags(self) -> tuple[Flag, ...]:
+    def flags(self) -> Iterator[Flag]:
         """Flag assumptions about the response outside of the band."""
-        found = []
-        if abs(self.values[-1]) > 0.9:
-            found.append(
-                Flag(
-                    "band_ends_early",
-                    f"|L| is still {abs(self.values[-1]):.3g} at the last point "
-                    f"({self.omega[-1]:.4g} rad/s): crossovers at higher frequencies are "
-                    "missed, and stability cannot be decided",
-                )
-            )
-        if self.integrators == 0 and abs(np.sin(np.angle(self.values[0]))) > 0.5:
-            found.append(
-                Flag(
-                    "band_starts_late",
-                    f"the phase at the first point ({self.omega[0]:.4g} rad/s) is "
-                    f"{np.degrees(np.angle(self.values[0])):.3g} deg, far from the real axis: "
-                    "the encirclement count assumes that it goes there directly",
-                )
-            )
-        return tuple(found)
+        first, last = self.values[0], self.values[-1]
+        if abs(last) > 0.9:
+            yield flagged("band_ends_early", size=abs(last), omega=self.omega[-1])
+        if self.integrators == 0 and abs(np.sin(np.angle(first))) > 0.5:
+            phase = np.degrees(np.angle(first))
+            yield flagged("band_starts_late", omega=self.omega[0], phase=phase)
 
 
 def data_loop(

@@ -11,11 +11,12 @@ from typing import Any
 
 import numpy as np
 
+from ..._flags import Flag, flagged
 from ..._wording import in_time, interval_in_time
 from ...delayed import DelayedStateSpace
 from ...errors import ModelWarning, UnsuitableSystemError, warn_caller
 from ...numerics.arrays import ComplexArray
-from ...results import Flag, Result
+from ...results import Result
 from ..siso import interval_of_dead_time
 from .delay_robustness import over_interval
 from .delay_robustness_result import DelayRobustness
@@ -159,12 +160,7 @@ def loop_check(plant: Any, controller: Any, dead_time: float = 0.0) -> LoopCheck
 def _sensitive(found: Margins) -> tuple[Flag, ...]:
     if not found.stable or found.ms <= MOST_SENSITIVE * (1 + ROUNDED):
         return ()
-    return (
-        Flag(
-            "sensitive",
-            f"Ms is {found.ms:.3g}, more than {MOST_SENSITIVE:g}, on the model itself",
-        ),
-    )
+    return (flagged("sensitive", ms=found.ms, most=MOST_SENSITIVE),)
 
 
 def _corners(
@@ -213,33 +209,21 @@ def _moved(loop: Loop, delay: int, factor: float) -> Loop:
 def _over_intervals(made: LoopCheck) -> tuple[Flag, ...]:
     """What the intervals from the identification do to the loop."""
     if made.robustness is not None and not made.robustness.stable:
-        return (_unstable_inside(made.robustness),)
+        low, high = made.robustness.dead_time_interval
+        inside = flagged(
+            "unstable_within_interval",
+            low=low,
+            high=high,
+            stable_from=made.robustness.stable_from,
+            stable_to=made.robustness.stable_to,
+        )
+        return (inside,)
     worst = made.worst
     if worst is None or worst.ms <= MOST_SENSITIVE * (1 + ROUNDED):
         return ()
     if worst.ms == float("inf"):
-        unstable = Flag(
-            "unstable_within_interval",
-            f"the loop is unstable at {worst}, ends of the intervals from the identification",
-        )
-        return (unstable,)
-    return (
-        Flag(
-            "sensitive_within_interval",
-            f"Ms is {worst.ms:.3g}, more than {MOST_SENSITIVE:g}, at {worst}, ends of the "
-            "intervals from the identification",
-        ),
-    )
-
-
-def _unstable_inside(found: DelayRobustness) -> Flag:
-    low, high = found.dead_time_interval
-    return Flag(
-        "unstable_within_interval",
-        f"the loop is unstable for some dead time in {low:.4g}...{high:.4g} s, the interval "
-        f"from the identification (stable from {found.stable_from:.4g} to "
-        f"{found.stable_to:.4g} s)",
-    )
+        return (flagged("unstable_within_interval.corner", corner=worst),)
+    return (flagged("sensitive_within_interval", ms=worst.ms, most=MOST_SENSITIVE, corner=worst),)
 
 
 def warn_of(check: LoopCheck, advice: str) -> None:

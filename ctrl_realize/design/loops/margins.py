@@ -10,6 +10,7 @@ import control as ct
 import numpy as np
 
 from ..._checks import real
+from ..._flags import Flag, flagged
 from ...errors import OptionError
 from ...numerics.arrays import ComplexArray, FloatArray, locked, read_only
 from ...numerics.loops.crossings import (
@@ -19,7 +20,6 @@ from ...numerics.loops.crossings import (
     smallest_distance,
     unit_crossings,
 )
-from ...results import Flag
 from ..resolved import warn_unresolved
 from .data_loops import DataLoop, data_loop
 from .loop import Loop, open_loop
@@ -214,21 +214,8 @@ def closed_loop_count(
 
 def _stability_flags(count: int, marginal: bool) -> tuple[Flag, ...]:
     if marginal:
-        return (
-            Flag(
-                "marginal",
-                "a closed-loop pole is on the stability boundary, within double precision",
-            ),
-        )
-    if count:
-        return (
-            Flag(
-                "unstable",
-                f"the closed loop has {count} unstable poles; the margins show how far it is "
-                "from stability",
-            ),
-        )
-    return ()
+        return (flagged("marginal"),)
+    return (flagged("unstable.loop", count=count),) if count else ()
 
 
 def _collect(loop: Curve, at: _Crossings, count: int, marginal: bool, dt: float) -> Margins:
@@ -265,10 +252,5 @@ def _from_data(loop: DataLoop) -> Margins:
     intervals = margin_intervals(loop, plain)
     flags = plain.flags
     if plain.stable and intervals["modulus_margin"][0] == 0:
-        unsure = Flag(
-            "within_noise",
-            "the point -1 is within the noise of the response: another measurement may find "
-            "the closed loop unstable",
-        )
-        flags = (*flags, unsure)
+        flags = (*flags, flagged("within_noise"))
     return replace(plain, intervals=intervals, flags=flags)
