@@ -18,7 +18,7 @@ import pytest
 import ctrl_realize as cr
 from ctrl_realize.cli import identify_command, main
 from ctrl_realize.cli.manifest import Run
-from ctrl_realize.cli.results import write_record_files
+from ctrl_realize.cli.results import Provenance, write_record_files
 from ctrl_realize.cli.staging import appearing
 from ctrl_realize.errors import OptionError
 from ctrl_realize.identification.campaign import rows
@@ -226,7 +226,8 @@ def test_a_report_that_cannot_be_written_is_told_and_costs_no_model(files, tmp_p
     system = cr.identify(record(1), **OPTIONS)
     (tmp_path / "report.html").mkdir()  # in the way
     nothing = {"frf": None, "comparison": None, "settings": {}, "calls": []}
-    assert not write_record_files(tmp_path, system, record(1), [Path(files[0])], **nothing)
+    provenance = Provenance([Path(files[0])], **nothing)
+    assert not write_record_files(tmp_path, system, record(1), provenance)
     assert "the report could not be written (IsADirectoryError" in capsys.readouterr().err
     assert cr.load_model(tmp_path / "model.json").delay == system.delay
     assert not (tmp_path / "figures").exists()  # nothing by halves

@@ -23,7 +23,7 @@ from .inputs import (
     calls_again,
 )
 from .manifest import Run, refuse_other_results
-from .results import campaign_table, write_campaign_files, write_record_files
+from .results import Provenance, campaign_table, write_campaign_files, write_record_files
 from .staging import appearing, kept_rows, refuse_a_file
 from .terminal import complain, one_line, printable, progress, say, working
 
@@ -90,11 +90,9 @@ def _one(task: _Task, sources: list[Source], folder: Path, calls: list[tuple[str
     for source, record in zip(sources, records, strict=True):
         say(printable(f"{source.file}: {record!r}"))
     _say_model(system, comparison)
-    return write_record_files(
-        folder, system, records[0], [source.file for source in sources],
-        frf=frf, comparison=comparison, settings=settings.given, calls=calls,
-        with_report=task.report,
-    )  # fmt: skip
+    files = [source.file for source in sources]
+    provenance = Provenance(files, frf, comparison, settings.given, calls, task.report)
+    return write_record_files(folder, system, records[0], provenance)
 
 
 def _say_what_is_written(output: Path, names: list[str], reported: bool) -> None:
@@ -128,11 +126,9 @@ def _many(
         say(f"{campaign_table(campaign)}\n\n{campaign.report()}\n\nFinal model")
         _say_model(campaign.system, comparison)
         with appearing(output, task.run) as folder:
-            written = write_campaign_files(
-                folder, campaign, [source.file for source in sources],
-                frf=frf, comparison=comparison, settings=settings.given, calls=calls,
-                with_report=task.report,
-            )  # fmt: skip
+            files = [source.file for source in sources]
+            provenance = Provenance(files, frf, comparison, settings.given, calls, task.report)
+            written = write_campaign_files(folder, campaign, provenance)
     names = ["model.json", "records.csv", "models/"]
     _say_what_is_written(output, names, task.report and written)
     return 1 if campaign.failed or not written else 0

@@ -7,94 +7,69 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import control as ct
-import numpy as np
 import pandas as pd
 
 from .. import report
-from .._wording import in_digits, time_unit
 from ..data import Record
 from ..delayed import DelayedStateSpace
 from ..frequency.comparison import FRFComparison
 from ..identification.campaign.campaign import Campaign
 from ..io import save_model
 from ..io.text.csv_files import write_csv
-from ..report.tables import dead_time_cells
+from ..report import tables as report_tables
 from .manifest import Run
 from .staging import appearing
 from .terminal import complain, one_line, printable, say, table, working
 
 
+class Provenance(NamedTuple):
+    """What a model was made from and compared with, and whether a report says so."""
+
+    files: Sequence[Path]
+    frf: ct.FrequencyResponseData | None
+    comparison: FRFComparison | None
+    settings: Mapping[str, Any]
+    calls: Sequence[tuple[str, str]]
+    with_report: bool = True
+
+
 def write_record_files(
-    folder: Path,
-    system: DelayedStateSpace,
-    record: Record,
-    files: Sequence[Path],
-    *,
-    frf: ct.FrequencyResponseData | None,
-    comparison: FRFComparison | None,
-    settings: Mapping[str, Any],
-    calls: Sequence[tuple[str, str]],
-    with_report: bool = True,
+    folder: Path, system: DelayedStateSpace, record: Record, provenance: Provenance
 ) -> bool:
     """Write model, report and figures of one model; return whether they were written as asked."""
-    names = ", ".join(file.name for file in dict.fromkeys(files))
-    save_model(folder / "model.json", system, settings=settings, note=f"from {names}")
-    return _write_files(
-        folder,
-        partial(report.write_identification, system=system, record=record),
-        files=files, frf=frf, comparison=comparison, settings=settings, calls=calls,
-        with_report=with_report,
-    )  # fmt: skip
+    names = ", ".join(file.name for file in dict.fromkeys(provenance.files))
+    save_model(folder / "model.json", system, settings=provenance.settings, note=f"from {names}")
+    write = partial(report.write_identification, system=system, record=record)
+    return _write_files(folder, write, provenance)
 
 
-def write_campaign_files(
-    folder: Path,
-    campaign: Campaign,
-    files: Sequence[Path],
-    *,
-    frf: ct.FrequencyResponseData | None,
-    comparison: FRFComparison | None,
-    settings: Mapping[str, Any],
-    calls: Sequence[tuple[str, str]],
-    with_report: bool = True,
-) -> bool:
+def write_campaign_files(folder: Path, campaign: Campaign, provenance: Provenance) -> bool:
     """Write table, models, report and figures of many records; return if all were written."""
     note = f"from {len(campaign.good)} of {len(campaign.rows)} records"
-    save_model(folder / "model.json", campaign.system, settings=settings, note=note)
+    save_model(folder / "model.json", campaign.system, settings=provenance.settings, note=note)
     write_csv(folder / "records.csv", campaign.table(), index=True)
-    save_models(folder, campaign, settings)
+    save_models(folder, campaign, provenance.settings)
+    title = f"Campaign of {len(campaign.rows)} records"
     return _write_files(
-        folder,
-        partial(report.write_campaign, campaign=campaign,
-                title=f"Campaign of {len(campaign.rows)} records"),
-        files=files, frf=frf, comparison=comparison, settings=settings, calls=calls,
-        with_report=with_report,
-    )  # fmt: skip
+        folder, partial(report.write_campaign, campaign=campaign, title=title), provenance
+    )
 
 
-def _write_files(
-    folder: Path,
-    write: Callable[..., Path],
-    *,
-    files: Sequence[Path],
-    comparison: FRFComparison | None,
-    settings: Mapping[str, Any],
-    with_report: bool,
-    **shown: Any,
-) -> bool:
-    if comparison is not None:
-        write_csv(folder / "frf_comparison.csv", comparison.table(), index=False)
-    if not with_report:
+_SHOWN = ("frf", "comparison", "settings", "calls")
+
+
+def _write_files(folder: Path, write: Callable[..., Path], provenance: Provenance) -> bool:
+    if provenance.comparison is not None:
+        write_csv(folder / "frf_comparison.csv", provenance.comparison.table(), index=False)
+    if not provenance.with_report:
         return True
-    files = list(dict.fromkeys(files))  # several tests may be in one
+    files = list(dict.fromkeys(provenance.files))  # several tests may be in one
     with told_if_it_fails(folder, "the model") as written:
-        write(
-            folder / "report.html", files=files, comparison=comparison, settings=settings,
-            figures=folder / "figures", **shown,
-        )  # fmt: skip
+        shown = {name: getattr(provenance, name) for name in _SHOWN}
+        write(folder / "report.html", files=files, figures=folder / "figures", **shown)
         written.append("report.html")
     return bool(written)
 
@@ -155,27 +130,10 @@ def file_name(name: str) -> str:
 
 
 def campaign_table(campaign: Campaign) -> str:
-    """Format a campaign for the terminal: one line for each record."""
-    scale, unit = time_unit(float(np.median([row.dead_time for row in campaign.good])))
-    rows = []
-    for row in campaign.rows:
-        if row.system is None:
-            rows.append([printable(row.name), in_digits(row.amplitude), "", "", "", "",
-                         printable(row.error or "failed")])  # fmt: skip
-            continue
-        low, dead_time, high = dead_time_cells(row, scale)
-        remarks = ", ".join(flag.code for flag in row.flags)
-        rows.append(
-            [
-                printable(row.name),
-                in_digits(row.amplitude),
-                f"{row.delay:.4g}",
-                dead_time,
-                f"{low} ... {high}",
-                str(row.order),
-                remarks,
-            ]
-        )
-    columns = ["record", "step", "delay", f"dead time [{unit}]", f"interval [{unit}]"]
-    columns += ["order", "remarks"]
-    return table(columns, rows, numbers=(1, 2, 3, 4, 5))
+    """Format a campaign for the terminal, as in its report: one line for each record."""
+    shown = report_tables.campaign_table(campaign)
+    return table(
+        [column.name for column in shown.columns],
+        [[printable(cell) for cell in row.cells] for row in shown.rows],
+        numbers=[k for k, column in enumerate(shown.columns) if column.kind == "number"],
+    )

@@ -8,23 +8,22 @@ import numpy as np
 from .._parameters import Parameter, formula
 from .._wording import (
     in_time,
-    interval_in_time,
-    numbers_alike,
-    plainly,
     poles_in_words,
-    time_within,
 )
 from ..delayed import DelayedStateSpace
 from ..design.models.conversions import to_continuous
 from ..errors import CtrlRealizeError
 from ..frequency.comparison import FRFComparison
-from ..identification.output_error.result import OutputErrorFit
-from ..identification.output_error.words import gain_in_words
-from ..numerics.arrays import FloatArray
-from ..numerics.constants import SMALLEST
 from ..numerics.engine.static_gain import INTEGRATOR
 from ..numerics.families.physical import process_parameters
-from ..results import INTERVAL_LABELS, ModelFit
+
+FACTS = frozenset(
+    {
+        "fit", "residual", "gains of the records", "visible onset", "total delay",
+        "total delay at DC",
+    }
+)  # fmt: skip
+"""Rows of a fit that stand at the top of a report."""
 
 INTEGRATING = "none: the model integrates"
 
@@ -37,35 +36,13 @@ _VANISHING = 1e-9  # part of the coefficients of a numerator that is rounding
 
 def facts_of(system: DelayedStateSpace) -> tuple[tuple[str, str], ...]:
     """List the main numbers of a model, those that are not in its transfer function."""
-    if system.fit is not None and system.fit.parameters:
-        return _facts_beside(system, system.fit)
-    facts = []
-    if system.fit is not None:
-        facts += _times_of(system.fit, integrating=gain_of(system) == INTEGRATING)
-    facts.append(("order (without the delay)", str(system.delay_free.nstates)))
-    if not formula_of(system):
-        facts.append(("gain", _gain_with_interval(system)))
-        facts.append(("poles", poles_of(system)))
-    facts.append(("sample time", in_time(system.dt, 6)))
-    return tuple(facts)
-
-
-def _facts_beside(system: DelayedStateSpace, fit: ModelFit) -> tuple[tuple[str, str], ...]:
-    """List what stands neither in the transfer function nor in the table of parameters."""
-    facts = []
-    followed = getattr(fit, "fit_percent", None)
-    if isinstance(followed, float) and np.isfinite(followed):
-        facts.append(("fit", f"{followed:.1f} %"))
-    if isinstance(fit, OutputErrorFit):
-        over = f"{plainly(fit.normalized_rms, 2)} x noise"
-        facts.append(("residual", f"{fit.residual:.3g} {fit.output_unit}".rstrip() + f", {over}"))
-        if fit.repeatability is not None:
-            facts += gain_scatter(fit.gain * fit.repeatability.gains)
-    facts += [
-        (label, value) for label, value in _times_of(fit, integrating=False) if "error" not in label
-    ]
-    facts.append(("sample time", in_time(system.dt, 6)))
-    return tuple(facts)
+    fit = system.fit
+    facts = [] if fit is None else [row for row in fit._rows() if row[0] in FACTS]
+    if fit is None or not fit.parameters:
+        facts.append(("order (without the delay)", str(system.delay_free.nstates)))
+        if not formula_of(system):
+            facts += [("gain", gain_of(system)), ("poles", poles_of(system))]
+    return (*facts, ("sample time", in_time(system.dt, 6)))
 
 
 def poles_of(system: DelayedStateSpace) -> str:
@@ -81,45 +58,10 @@ def poles_of(system: DelayedStateSpace) -> str:
     return ", ".join(words) or "none"
 
 
-def interval_name(system: DelayedStateSpace) -> str:
-    """Name the interval by its kind."""
-    return INTERVAL_LABELS[None] if system.fit is None else system.fit.interval_label
-
-
 def gain_of(system: DelayedStateSpace) -> str:
     """Write the gain at zero frequency, or that there is none."""
     gain = float(np.real(np.ravel(system.delay_free.dcgain())[0]))
     return f"{gain:.4g}" if np.isfinite(gain) else INTEGRATING
-
-
-def _gain_with_interval(system: DelayedStateSpace) -> str:
-    gain = gain_of(system)
-    interval = None if system.fit is None else system.fit.gain_interval
-    if interval is None or gain == INTEGRATING:
-        return gain
-    return gain_in_words(float(np.real(np.ravel(system.delay_free.dcgain())[0])), interval)
-
-
-def _times_of(fit: ModelFit, *, integrating: bool) -> list[tuple[str, str]]:
-    facts = []
-    for label, value in (
-        ("standard error for this structure", fit._std()),
-        ("visible onset", fit.onset),
-    ):
-        if value is not None and np.isfinite(value):
-            facts.append((label, in_time(value, 4)))
-    total = fit.total_delay
-    if total is not None and np.isfinite(total) and not integrating:
-        facts.append(("total delay at DC", _total(total, fit.total_delay_interval)))
-    return facts
-
-
-def _total(value: float, interval: tuple[float, float] | None) -> str:
-    if interval is None or np.isnan(interval[1]):
-        return in_time(value, 4)
-    if interval[1] == np.inf:
-        return "not determined by this record"
-    return f"{time_within(value, *interval)} ({interval_in_time(*interval)})"
 
 
 def disagreement(comparison: FRFComparison | None) -> list[tuple[str, str]]:
@@ -129,17 +71,6 @@ def disagreement(comparison: FRFComparison | None) -> list[tuple[str, str]]:
     low, high = comparison.band_hz
     error = 100 * comparison.rms_relative_error
     return [("from the measured response", f"{error:.3g} % rms, {low:.3g} to {high:.3g} Hz")]
-
-
-def gain_scatter(gains: FloatArray) -> list[tuple[str, str]]:
-    """State the spread of the gains of several records."""
-    told = gains[np.isfinite(gains)]
-    if told.size < 2:
-        return []
-    low, high = float(told.min()), float(told.max())
-    share = 100 * float(np.std(told, ddof=1)) / max(abs(float(np.mean(told))), SMALLEST)
-    ends = " to ".join(numbers_alike((low, high), low, high))
-    return [("gains of the records", f"{ends} (std {share:.2g} %)")]
 
 
 def formula_of(system: DelayedStateSpace) -> str:

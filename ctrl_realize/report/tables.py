@@ -25,30 +25,27 @@ from ..frequency.comparison import FRFComparison
 from ..identification.campaign.campaign import Campaign
 from ..identification.campaign.rows import CampaignRow
 from ..results import ModelFit
+from .facts import FACTS
 from .page import Column, Row, Table, pairs
 from .provenance import file_sha256, record_sha256
 
 Paths = Sequence[str | os.PathLike[str]]
 
-_ABOVE = frozenset(
-    {
-        "transfer function", "dead time", "apparent dead time", "visible onset", "total delay",
-        "poles", "gain", "fit", "residual", "actuator",
-    }
-)  # fmt: skip
-"""Rows of a fit that a report shows above."""
+_IN_THE_HEADLINE = frozenset(
+    {"transfer function", "dead time", "apparent dead time", "poles", "gain", "actuator"}
+)
+"""Rows of a fit with parameters that are in the headline of a report, or in their table."""
 
 
 def fit_tables(fit: ModelFit | None, title: str = "Details of the fit") -> list[Table]:
     """List how a model was found, and what was chosen and why."""
     if fit is None:
         return []
-    choices = [("choice", choice) for choice in fit._choices()]
-    rows = fit._rows()
+    above = FACTS
     if fit.parameters:
-        # These stand in the verdict and among the parameters.
-        rows = [row for row in rows if row[0] not in {*_ABOVE, fit.interval_label}]
-    return [pairs(title, [*rows, *choices])]
+        above |= {*_IN_THE_HEADLINE, fit.interval_label}
+    choices = [("choice", choice) for choice in fit._choices()]
+    return [pairs(title, [*[row for row in fit._rows() if row[0] not in above], *choices])]
 
 
 def parameter_table(fit: ModelFit) -> Table:
@@ -175,28 +172,20 @@ def campaign_table(campaign: Campaign) -> Table:
     rows = []
     for row in campaign.rows:
         if row.system is None:
-            cells = (row.name, in_digits(row.amplitude), "", "", "", "", "", row.error or "")
-            rows.append(Row(cells, "failed"))
+            cells = [row.name, in_digits(row.amplitude), "", "", "", "", "", row.error or "failed"]
+            rows.append(Row(tuple(cells), "failed"))
             continue
-        low, wait, high = dead_time_cells(row, scale)
-        remarks = [flag.code.replace("_", " ") for flag in row.flags]
-        cells = (
-            row.name,
-            in_digits(row.amplitude),
-            f"{row.delay:.4g}",
-            wait,
-            f"{low} to {high}",
-            str(row.order),
-            f"{row.residual:.3g}",
-            ", ".join([*remarks, *row.warnings]),
-        )
-        rows.append(Row(cells, "best" if row.name == best else ""))
+        low, dead_time, high = _dead_time_cells(row, scale)
+        cells = [row.name, in_digits(row.amplitude), f"{row.delay:.4g}", dead_time]
+        cells += [f"{low} to {high}", str(row.order), f"{row.residual:.3g}"]
+        cells.append(", ".join([*(flag.code for flag in row.flags), *row.warnings]))
+        rows.append(Row(tuple(cells), "best" if row.name == best else ""))
     return Table(
         "Records", tuple(rows), columns, note="In bold: the record with the smallest misfit."
     )
 
 
-def dead_time_cells(row: CampaignRow, scale: float) -> list[str]:
+def _dead_time_cells(row: CampaignRow, scale: float) -> list[str]:
     """Lower end, estimate and upper end, rounded to the same digit."""
     low, high = row.interval
     seen = [scale * value for value in (low, row.dead_time, high)]

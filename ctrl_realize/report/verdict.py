@@ -4,45 +4,30 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 
+from .._flags import Flag, marked
 from .._wording import in_time, interval_in_time, number_within, time_within
 from ..delayed import DelayedStateSpace
 from ..frequency.comparison import FRFComparison
 from ..frequency.disagreement import CLOSE, FAR
 from ..identification.campaign.campaign import Campaign
-from ..identification.output_error.words import sign_is_told
+from ..identification.output_error.words import gain_scatter, sign_is_told
 from ..identification.realization.delay_scan_result import DelayScan
 from ..plots.delays import estimate_of, interval_of
-from ..results import Flag
 from .facts import (
     INTEGRATING,
     disagreement,
     facts_of,
     formula_of,
     gain_of,
-    gain_scatter,
-    interval_name,
 )
 
 _CONTRADICTED = "frf_disagrees"
-
 _GAIN_OPEN = "gain_not_resolved"
-
-WRONG_MODEL = frozenset({_CONTRADICTED, "no_common_gain", "unstable", _GAIN_OPEN})
-"""Flags with which the model should not be used, first in the list of reasons; for a gain that is
-not determined only if its sign is not."""
-
-WRONG_DELAY = frozenset(
-    {
-        "delay_at_bound",
-        "no_delay_resolved",
-        "order_in_noise",
-    }
-)
-"""Flags with which the dead time should not be used."""
+"""It forbids to use a model only if the sign of the gain is open."""
 
 SCANNED = (
     "the dead time is the delay with the smallest IAE, and the interval shows how flat the "
@@ -106,11 +91,23 @@ def verdict_of(
     caution - Use with care: see the remarks below.
     """
     flags = (*_flags_in(comparison), *more_flags, *_flags_of(system))
-    level, judgement = _judged(system, flags)
-    facts = (*disagreement(comparison), *facts_of(system))
-    return Verdict(
-        level, headline_of(system), facts, _reasons(flags), judgement, formula_of(system)
-    )
+    return _verdict(system, flags, [*disagreement(comparison), *facts_of(system)])
+
+
+def _verdict(
+    system: DelayedStateSpace, flags: Sequence[Flag | str], facts: Sequence[tuple[str, str]]
+) -> Verdict:
+    codes = {_code(flag) for flag in flags}
+    if _sign_is_told(system):
+        codes.discard(_GAIN_OPEN)
+    level: Level = "caution" if flags else "good"
+    judgement = _JUDGEMENTS[level]
+    if codes & marked("wrong_model"):
+        level, judgement = "poor", _CONTRADICTION if _CONTRADICTED in codes else _WRONG_MODEL
+    elif codes & marked("wrong_dead_time"):
+        level, judgement = "poor", _JUDGEMENTS["poor"]
+    headline = headline_of(system)
+    return Verdict(level, headline, tuple(facts), _reasons(flags), judgement, formula_of(system))
 
 
 def campaign_verdict(
@@ -121,32 +118,15 @@ def campaign_verdict(
 ) -> Verdict:
     """Judge a campaign by its final model, its flags and `more_flags`."""
     system = campaign.system
-    own = tuple(campaign.flags)
-    flags = (*_flags_in(comparison), *more_flags, *own, *_flags_of(system))
-    summary = campaign.statistics()
-    scatter = "unknown: a single record has no scatter"
-    if np.isfinite(summary.variance):
-        scatter = f"{np.sqrt(summary.variance):.2g} samples"
+    flags = (*_flags_in(comparison), *more_flags, *campaign.flags, *_flags_of(system))
     facts = [
-        ("records", f"{len(campaign.good)} of {len(campaign.rows)} identified"),
-        (
-            "trimmed mean of the delays",
-            f"{summary.mean:.2f} samples, {in_time(summary.mean * campaign.dt, 4)}",
-        ),
-        ("scatter (std)", scatter),
+        *campaign._rows(),
         *gain_scatter(np.array([row.gain for row in campaign.good], dtype=np.float64)),
         *disagreement(comparison),
-        *facts_of(system),
     ]
-    level, judgement = _judged(system, flags)
-    return Verdict(
-        level,
-        headline_of(system),
-        tuple(facts),
-        _reasons(flags),
-        judgement,
-        formula_of(system),
-    )
+    known = {label for label, _ in facts}
+    facts += [fact for fact in facts_of(system) if fact[0] not in known]
+    return _verdict(system, flags, facts)
 
 
 def comparison_verdict(system: DelayedStateSpace, comparison: FRFComparison) -> Verdict:
@@ -177,25 +157,22 @@ def _flags_in(comparison: FRFComparison | None) -> tuple[Flag, ...]:
 
 def headline_of(system: DelayedStateSpace) -> str:
     """Describe the model in one sentence."""
-    wait = estimate_of(system)
-    interval = interval_of(system)
-    said, samples = in_time(wait, 4), f"{wait / system.dt:.4g}"
-    if interval is not None:
+    wait, fit, interval = estimate_of(system), system.fit, interval_of(system)
+    said, samples, within = in_time(wait, 4), f"{wait / system.dt:.4g}", ""
+    if fit is not None and interval is not None:
         said = time_within(wait, *interval)
         samples = number_within(*(bound / system.dt for bound in (wait, *interval)))
+        within = f", {fit.interval_label} {interval_in_time(*interval)}"
     apparent = any(_code(flag) == "apparent_dead_time" for flag in _flags_of(system))
     kind = "Apparent dead time" if apparent else "Dead time"
-    sentence = f"{kind} {said} ({samples} samples of {in_time(system.dt, 6)})"
-    if interval is not None:
-        sentence += f", {interval_name(system)} {interval_in_time(*interval)}"
-    order = system.delay_free.nstates
-    gain = gain_of(system)
+    sentence = f"{kind} {said} ({samples} samples of {in_time(system.dt, 6)}){within}."
     if formula_of(system) and _sign_is_told(system):
-        return f"{sentence}."
-    if not _sign_is_told(system):
-        return f"{sentence}. Model without the delay: order {order}, gain not determined."
+        return sentence
+    gain = gain_of(system)
     behind = "integrating" if gain == INTEGRATING else f"gain {gain}"
-    return f"{sentence}. Model without the delay: order {order}, {behind}."
+    if not _sign_is_told(system):
+        behind = "gain not determined"
+    return f"{sentence} Model without the delay: order {system.delay_free.nstates}, {behind}."
 
 
 def _sign_is_told(system: DelayedStateSpace) -> bool:
@@ -208,19 +185,9 @@ def _flags_of(system: DelayedStateSpace) -> tuple[Flag | str, ...]:
     return (*flags, SCANNED) if isinstance(system.fit, DelayScan) else flags
 
 
-def _judged(system: DelayedStateSpace, flags: Sequence[Any]) -> tuple[Level, str]:
-    codes = {_code(flag) for flag in flags}
-    if _sign_is_told(system):
-        codes.discard(_GAIN_OPEN)
-    if codes & WRONG_MODEL:
-        return "poor", _CONTRADICTION if _CONTRADICTED in codes else _WRONG_MODEL
-    level: Level = "poor" if codes & WRONG_DELAY else "caution" if flags else "good"
-    return level, _JUDGEMENTS[level]
-
-
-def _reasons(flags: Sequence[Any]) -> tuple[str, ...]:
+def _reasons(flags: Sequence[Flag | str]) -> tuple[str, ...]:
     """List the flags, the worst first."""
-    worst = (_CONTRADICTED, *sorted(WRONG_MODEL), *sorted(WRONG_DELAY))
+    worst = [_CONTRADICTED, *sorted(marked("wrong_model")), *sorted(marked("wrong_dead_time"))]
     rank = {code: place for place, code in reversed(list(enumerate(worst)))}
     ordered = sorted(flags, key=lambda flag: rank.get(_code(flag), len(worst)))
     return tuple(dict.fromkeys(_sentence(str(flag)) for flag in ordered))

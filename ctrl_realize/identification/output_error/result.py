@@ -28,7 +28,7 @@ from .actuated.result import ActuatorFit
 from .record_gains import RecordGains
 from .repeat_flags import BY_CHANCE
 from .repeatability import Repeatability
-from .words import ESTIMATE_WORDS, gain_in_words, structure_words, total_in_words
+from .words import ESTIMATE_WORDS, gain_in_words, gain_scatter, structure_words, total_in_words
 
 FOLLOWED_LESS = 0.5
 """Per cent of a response by which two fits differ, from which on the difference is stated."""
@@ -370,9 +370,6 @@ class OutputErrorFit(FractionalDelayFit):
         parts += ["the drift"] * bool(self.data.drift) + ["the hum"] * bool(self.data.hum)
         return " and ".join(parts) or "its level"
 
-    def _std(self) -> float:
-        return self.std_given_structure
-
     def _method(self) -> str:
         return "output-error fit of the raw record"
 
@@ -424,6 +421,7 @@ class OutputErrorFit(FractionalDelayFit):
             for name, value in self.delay_estimates.items()
         ]
         if self.repeatability is not None:
+            rows += gain_scatter(self.gain * self.repeatability.gains)
             rows += self.repeatability.rows()
         if self.gains is not None:
             rows.append(("schedule", self.gains.in_words()))

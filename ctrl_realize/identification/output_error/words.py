@@ -8,6 +8,8 @@ import numpy as np
 
 from ..._flags import Flag, marked
 from ..._wording import in_time, interval_in_time, numbers_alike, time_within
+from ...numerics.arrays import FloatArray
+from ...numerics.constants import SMALLEST
 from ...numerics.engine.problem import Structure
 from ...numerics.families.equal_lags import LagChain
 from ...numerics.families.flow import DispersedFlow
@@ -89,3 +91,14 @@ def gain_in_words(gain: float, interval: tuple[float, float]) -> str:
         return f"{gain:.6g}"
     number, *ends = numbers_alike((gain, low, high), low, high)
     return f"{number} ({ends[0]} to {ends[1]})"
+
+
+def gain_scatter(gains: FloatArray) -> list[tuple[str, str]]:
+    """State the spread of the gains of several records."""
+    told = gains[np.isfinite(gains)]
+    if told.size < 2:
+        return []
+    low, high = float(told.min()), float(told.max())
+    share = 100 * float(np.std(told, ddof=1)) / max(abs(float(np.mean(told))), SMALLEST)
+    ends = " to ".join(numbers_alike((low, high), low, high))
+    return [("gains of the records", f"{ends} (std {share:.2g} %)")]
