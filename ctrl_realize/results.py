@@ -366,10 +366,6 @@ class ModelFit(Result):
         """Sampling of the impulse response that the model was realized from."""
         return None
 
-    def _std(self) -> float | None:
-        """Standard error of the dead time in s for the chosen structure."""
-        return None
-
     def _method(self) -> str:
         """Name of the method, in words."""
         return "model with dead time"

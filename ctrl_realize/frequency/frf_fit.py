@@ -167,9 +167,6 @@ class FRFFit(FractionalDelayFit):
 
         return pd.DataFrame([vars(structure) for structure in self.structures])
 
-    def _std(self) -> float:
-        return self.std_given_structure
-
     def _method(self) -> str:
         return "transfer function fitted to a frequency response"
 

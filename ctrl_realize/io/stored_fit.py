@@ -139,9 +139,6 @@ class FitSummary(ModelFit):
             return INTERVAL_LABELS["flatness"]
         return super().interval_label
 
-    def _std(self) -> float | None:
-        return _time(self._value("std_given_structure"))
-
     def _value(self, key: str) -> Plain:
         return dict(self.values).get(key)
 
@@ -198,9 +195,9 @@ def summary_of(fit: ModelFit | None) -> FitSummary | None:
     values = {
         key: _plain(getattr(fit, key)) for key in _KEPT if key not in ("parameters", "actuator")
     }
-    values["std_given_structure"] = _plain(fit._std())
+    for key in ("std_given_structure", "fit_percent"):  # of some fits
+        values[key] = _plain(getattr(fit, key, None))
     values["time_unit"] = fit._record_unit
-    values["fit_percent"] = _plain(getattr(fit, "fit_percent", None))
     if fit.parameters:
         values["formula"] = fit.formula
         values["parameters"] = _parameter_rows(fit.parameters)

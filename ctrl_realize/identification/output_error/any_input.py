@@ -29,7 +29,7 @@ from .repeat_flags import repeat_flags
 from .repeatability import Repeatability, distinct
 from .result import OutputErrorFit
 from .sensor_flags import missing_code
-from .summary import summarise
+from .summary import choices_of
 
 _ALL = 0.99  # of a record, from which on the rest is not reported
 _APART = 5.0  # in standard deviations: largest distance of a record's gain from the others
@@ -46,7 +46,7 @@ def fit_any_input(
     ratios: FloatArray | None = None,
     *,
     refuses: bool = True,
-) -> tuple[OutputErrorFit, OutputErrorEstimate]:
+) -> OutputErrorFit:
     """Fit one model to all records; level, drift and initial state are estimated for each record.
 
     A record whose delay or gain is an outlier is left out, as among step records, until there are
@@ -60,7 +60,7 @@ def fit_any_input(
     signals = [(y, scale * u) for (y, u), scale in zip(map(_signals, records), scales, strict=True)]
     if len(records) == 1:
         found = _fit(records, signals, dt, latest, settings, refuses)
-        return _summary(found, found.fit, records, used, limit, ()), found.fit
+        return _summary(found, found.fit, records, used, limit, ())
     while True:
         found = _fit(
             tuple(records[i] for i in used),
@@ -81,7 +81,7 @@ def fit_any_input(
         used = tuple(i for i in used if i not in apart)
     fit = widened(found.fit, repeats, used)
     flags = repeat_flags(repeats, fit.dead_time, dt)
-    return _summary(found, fit, records, used, limit, flags, repeats), fit
+    return _summary(found, fit, records, used, limit, flags, repeats)
 
 
 def _signals(record: Record) -> tuple[FloatArray, FloatArray]:
@@ -189,14 +189,8 @@ def _summary(
             f"{sums.drive.factor.shape[1]} lags (prewhitened with a noise model of "
             f"{sums.noise_lags} lags); time, measured and fitted show a part of them",
         )
-    return summarise(
-        fit,
-        joined,
-        time,
-        records,
-        flags,
-        repeatability=repeats,
-        choices=reasons,
+    return OutputErrorFit(
+        fit, joined, time, records, repeats, choices=reasons + choices_of(fit), flags=flags
     )
 
 

@@ -20,7 +20,6 @@ from ...numerics.arrays import FloatArray
 from ...numerics.blas_threads import single_threaded
 from ...numerics.engine.problem import KnownFactor, Structure
 from ...numerics.families.process_form import ProcessForm
-from ...numerics.output_error.result import OutputErrorEstimate
 from ...numerics.output_error.step_data import own_regressors, step_data
 from ...numerics.output_error.step_fit import fit_step_record
 from ...results import Flag
@@ -44,7 +43,7 @@ from .flags import fit_flags
 from .own_gains import fit_own_gains, unlike_records
 from .repeat_flags import repeat_flags, same_record_flags
 from .result import OutputErrorFit
-from .summary import fitted_core, fitted_model, summarise
+from .summary import choices_of, fitted_core, fitted_model
 
 Loss = Literal["huber", "least_squares"]
 Noise = Literal["auto", "white"]
@@ -273,7 +272,7 @@ def _linear(
     if len(several) == 1:
         return fit_within_limits(
             several[0],
-            lambda record: _fit_one(record, limit, settings, any_input)[0],
+            lambda record: _fit_one(record, limit, settings, any_input),
             may_clip=may_clip,
         )
     several, at_limits = _without_cut_noise(several)
@@ -282,9 +281,9 @@ def _linear(
     way = _fit_mean if stepped else any_input
     if own_gains:
         start = relative_gains(aligned_steps(several)) if stepped else None
-        result, _ = fit_own_gains(several, partial(way, several, limit, settings), start)
+        result = fit_own_gains(several, partial(way, several, limit, settings), start)
     else:
-        result, _ = way(several, limit, settings)
+        result = way(several, limit, settings)
     return replace(result, flags=result.flags + at_limits + same_record_flags(several))
 
 
@@ -303,15 +302,16 @@ def _fit_one(
     record: Record,
     limit: float | None,
     settings: _Settings,
-    any_input: Callable[..., tuple[OutputErrorFit, OutputErrorEstimate]],
-) -> tuple[OutputErrorFit, OutputErrorEstimate]:
+    any_input: Callable[..., OutputErrorFit],
+) -> OutputErrorFit:
     data = step_data_of(record)
     if data is None:
         return any_input((record,), limit, settings)
     latest = None if limit is None else limit * record.dt
     data, fit = fit_step_record(data, latest=latest, **settings)
     flags = fit_flags(data, fit, limit, float(record.time[0]))
-    return summarise(fit, data, record.time[data.rows], (record,), flags), fit
+    time = record.time[data.rows]
+    return OutputErrorFit(fit, data, time, (record,), choices=choices_of(fit), flags=flags)
 
 
 def _fit_mean(
@@ -319,7 +319,7 @@ def _fit_mean(
     limit: float | None,
     settings: _Settings,
     ratios: FloatArray | None = None,
-) -> tuple[OutputErrorFit, OutputErrorEstimate]:
+) -> OutputErrorFit:
     steps = aligned_steps(records)
     if ratios is not None:
         steps = scaled(steps, ratios)
@@ -347,4 +347,4 @@ def _fit_mean(
     time = mean.dt * np.arange(-mean.edge, mean.output.size - mean.edge, dtype=np.float64)
     flags = fit_flags(data, fit, limit, float(time[0]))
     flags += repeat_flags(repeats, fit.dead_time, mean.dt)
-    return summarise(fit, data, time, records, flags, repeatability=repeats), fit
+    return OutputErrorFit(fit, data, time, records, repeats, choices=choices_of(fit), flags=flags)

@@ -53,8 +53,10 @@ def sampled_flags(
     fit: OutputErrorEstimate, dt: float, length: float, max_delay: float | None
 ) -> tuple[Flag, ...]:
     """List the flags of a fit of a record whose input is not a step."""
-    coloured = flagged("coloured_residual", samples=fit.residual.correlation)
-    return (*model_flags(fit, dt, length, max_delay), *[coloured] * (not fit.adequate))
+    flags = tuple(model_flags(fit, dt, length, max_delay))
+    if fit.adequate:
+        return flags
+    return (*flags, flagged("coloured_residual", samples=fit.residual.correlation))
 
 
 def model_flags(

@@ -28,7 +28,6 @@ from ..._flags import Flag, flagged
 from ...data import Record
 from ...numerics.arrays import FloatArray
 from ...numerics.constants import Z_95
-from ...numerics.output_error.result import OutputErrorEstimate
 from ...numerics.validation.own_response import disagreeing, homogeneity
 from .averaging import middle_gain
 from .record_gains import (
@@ -56,8 +55,6 @@ than a percent, at which no two of them have the same."""
 _COMMON = ("gains_differ", "no_common_gain")
 """Flags of fits with a common gain."""
 
-Fit = tuple[OutputErrorFit, OutputErrorEstimate]
-
 
 def unlike_records(found: Repeatability, used: tuple[int, ...], dt: float) -> tuple[int, ...]:
     """Positions of records, among those used, whose response is not a multiple of the others'.
@@ -76,9 +73,9 @@ def unlike_records(found: Repeatability, used: tuple[int, ...], dt: float) -> tu
 
 def fit_own_gains(
     records: tuple[Record, ...],
-    fit: Callable[[FloatArray], Fit],
+    fit: Callable[[FloatArray], OutputErrorFit],
     start: FloatArray | None,
-) -> Fit:
+) -> OutputErrorFit:
     """Fit model and gain ratios in turn.
 
     Parameters
@@ -91,7 +88,7 @@ def fit_own_gains(
     """
     ratios = np.ones(len(records)) if start is None else start
     for _ in range(_TURNS):
-        result, estimate = fit(ratios)
+        result = fit(ratios)
         found = _compared(result)
         used = np.array([name not in found.outlying for name in found.names])
         errors = found.gain_alone_errors
@@ -115,14 +112,13 @@ def fit_own_gains(
     )
     kept = [flag for flag in result.flags if flag.code not in _COMMON]
     reason = f"gain of the model: the median of {int(used.sum())} records, each with its own"
-    result = replace(
+    return replace(
         result,
         gains=gains,
         repeatability=repeats,
         flags=(*kept, *_flags(gains)),
         choices=(*result.choices, reason),
     )
-    return result, estimate
 
 
 def _compared(result: OutputErrorFit) -> Repeatability:

@@ -6,37 +6,11 @@ import control as ct
 import numpy as np
 
 from ..._wording import interval_in_time
-from ...data import Record
 from ...delayed import DelayedStateSpace, delayed_ss
-from ...numerics.arrays import ComplexArray, FloatArray
+from ...numerics.arrays import ComplexArray
 from ...numerics.output_error.result import OutputErrorEstimate
-from ...numerics.output_error.step_data import StepData
-from ...results import Flag
-from .repeatability import Repeatability
 from .result import FOLLOWED_LESS, OutputErrorFit
 from .words import form_words, model_words
-
-
-def summarise(
-    fit: OutputErrorEstimate,
-    data: StepData,
-    time: FloatArray,
-    records: tuple[Record, ...],
-    flags: tuple[Flag, ...],
-    *,
-    repeatability: Repeatability | None = None,
-    choices: tuple[str, ...] = (),
-) -> OutputErrorFit:
-    """Make the result from an estimate; `choices` come before those of the estimate."""
-    return OutputErrorFit(
-        estimate=fit,
-        data=data,
-        time=time,
-        records=records,
-        repeatability=repeatability,
-        choices=choices + _choices(fit),
-        flags=flags,
-    )
 
 
 def fitted_model(core: ct.StateSpace, result: OutputErrorFit) -> DelayedStateSpace:
@@ -68,7 +42,8 @@ def fitted_core(fit: OutputErrorEstimate, poles: ComplexArray) -> ct.StateSpace:
     return ct.StateSpace(unit * matrix, unit * last, b[None], np.zeros((1, 1)))
 
 
-def _choices(fit: OutputErrorEstimate) -> tuple[str, ...]:
+def choices_of(fit: OutputErrorEstimate) -> tuple[str, ...]:
+    """Say what was chosen automatically, and why."""
     s = fit.structure
     simple = " with up to three poles" if fit.robust and s.order <= 3 else ""
     kind = (

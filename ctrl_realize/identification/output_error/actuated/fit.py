@@ -23,7 +23,6 @@ from ....numerics.engine.problem import Structure
 from ....numerics.engine.structures import PLAUSIBLE, Scales
 from ....numerics.output_error.any_input.stretch import WHITE
 from ....numerics.output_error.result import (
-    DistributedLags,
     Followed,
     OutputErrorEstimate,
     Residual,
@@ -222,8 +221,7 @@ def _estimate(
         structure, dead_time, static.total, 0.0, (low, high), member.poles, static.gain
     )  # fmt: skip
     profile = (np.array([low, dead_time, high]), np.array([CHI2_95, 0.0, CHI2_95]))
-    return replace(
-        result.estimate,
+    return OutputErrorEstimate(
         dead_time=dead_time,
         low=low,
         high=high,
@@ -238,14 +236,9 @@ def _estimate(
         fitted=fitted,
         followed=Followed(complete, complete, structure, complete),
         profile=profile,
-        open_start=False,
-        distributed=DistributedLags(),
-        static=static,
-        alike=(),
-        others=None,
-        close=(),
+        latest=result.estimate.latest,
         process=result.estimate.process._replace(parameters=parameters),
-        unweighted=None,
+        static=static,
         load=result.data.load,
     )
 
