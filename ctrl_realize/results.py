@@ -217,6 +217,14 @@ class ModelFit(Result):
             """Records that were fitted."""
             ...
 
+        @property
+        def _method(self) -> str:
+            """Name of the method, in words."""
+            ...
+
+    else:
+        _method = "model with dead time"
+
     @property
     def dead_time_interval(self) -> tuple[float, float] | None:
         """Interval of the dead time in s, the same as `interval`."""
@@ -365,10 +373,6 @@ class ModelFit(Result):
     def sampling(self) -> str | None:
         """Sampling of the impulse response that the model was realized from."""
         return None
-
-    def _method(self) -> str:
-        """Name of the method, in words."""
-        return "model with dead time"
 
 
 def _common(units: tuple[str, ...]) -> str:

@@ -167,8 +167,7 @@ class FRFFit(FractionalDelayFit):
 
         return pd.DataFrame([vars(structure) for structure in self.structures])
 
-    def _method(self) -> str:
-        return "transfer function fitted to a frequency response"
+    _method = "transfer function fitted to a frequency response"
 
     def _title(self) -> str:
         return f"Transfer function with dead time from the FRF {self.name!r}"

@@ -18,14 +18,6 @@ from ..identification.output_error.actuated.result import ActuatorFit
 from ..results import INTERVAL_LABELS, Flag, IntervalKind, ModelFit
 from .json_content import MAX_TEXT, field
 
-_METHODS = {
-    "OutputErrorFit": "output-error fit of the raw record",
-    "JointFit": "output-error fit of raw records and a frequency response",
-    "StateSpaceFit": "state-space fit of all channels",
-    "DelayScan": "delay scan by approximate realization",
-    "Realization": "approximate realization",
-}
-"""The methods behind stored fits, in words."""
 _MAX_ROWS = 200
 
 
@@ -142,8 +134,9 @@ class FitSummary(ModelFit):
     def _value(self, key: str) -> Plain:
         return dict(self.values).get(key)
 
+    @property
     def _method(self) -> str:
-        return _METHODS.get(self.kind, super()._method())
+        return _text(self._value("method")) or "model with dead time"
 
     def __repr__(self) -> str:
         return f"<FitSummary of a {self.kind}>"
@@ -197,7 +190,7 @@ def summary_of(fit: ModelFit | None) -> FitSummary | None:
     }
     for key in ("std_given_structure", "fit_percent"):  # of some fits
         values[key] = _plain(getattr(fit, key, None))
-    values["time_unit"] = fit._record_unit
+    values["time_unit"], values["method"] = fit._record_unit, fit._method
     if fit.parameters:
         values["formula"] = fit.formula
         values["parameters"] = _parameter_rows(fit.parameters)

@@ -316,4 +316,4 @@ def write_report(
 
 
 def _kind(system: DelayedStateSpace) -> str:
-    return "model with dead time" if system.fit is None else system.fit._method()
+    return "model with dead time" if system.fit is None else system.fit._method

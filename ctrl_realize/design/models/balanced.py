@@ -63,8 +63,7 @@ class BalancedReduction(ModelFit):
     delay_interval = None
     records = ()
 
-    def _method(self) -> str:
-        return "balanced truncation"
+    _method = "balanced truncation"
 
     def _title(self) -> str:
         return "Balanced truncation"

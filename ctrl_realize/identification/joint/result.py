@@ -69,18 +69,12 @@ class JointFit(OutputErrorFit):
         core = np.polyval(self.estimate.numerator[::-1], s) / np.polyval(np.poly(self.poles), s)
         return np.asarray(core * np.exp(-s * self.dead_time), dtype=np.complex128)
 
-    def __repr__(self) -> str:
-        return f"<Joint{super().__repr__()[len('<OutputError') :]}"
-
     def _fit_in_words(self) -> str:
         differs = "free response, and with the common gain, dead time and lags"
         return super()._fit_in_words().replace("free response", differs)
 
-    def _method(self) -> str:
-        return "output-error fit of raw records and a frequency response"
-
-    def _title(self) -> str:
-        return f"Joint fit: {self._kind()} {time_within(self.dead_time, *self.interval)}"
+    _name = "Joint fit"
+    _method = "output-error fit of raw records and a frequency response"
 
     def _rows(self) -> list[tuple[str, str]]:
         agreed, points = self.agreement, self.frf_fit.frequency_hz

@@ -340,7 +340,7 @@ class OutputErrorFit(FractionalDelayFit):
         low, high = self.interval
         level = "noise" if self.at_noise_level else f"{plainly(self.normalized_rms, 2)} x noise"
         return (
-            f"<OutputErrorFit {self.dead_time:.4g} s in {low:.4g}...{high:.4g} s, "
+            f"<{type(self).__name__} {self.dead_time:.4g} s in {low:.4g}...{high:.4g} s, "
             f"order {self.order}, "
             f"relative degree {self.relative_degree}, residual {level}>"
         )
@@ -370,14 +370,14 @@ class OutputErrorFit(FractionalDelayFit):
         parts += ["the drift"] * bool(self.data.drift) + ["the hum"] * bool(self.data.hum)
         return " and ".join(parts) or "its level"
 
-    def _method(self) -> str:
-        return "output-error fit of the raw record"
+    _name = "Output-error fit"
+    _method = "output-error fit of the raw record"
 
     def _kind(self) -> str:
         return "dead time" if self.better is None else "apparent dead time"
 
     def _title(self) -> str:
-        return f"Output-error fit: {self._kind()} {self._dead_time_in_words()[0]}"
+        return f"{self._name}: {self._kind()} {self._dead_time_in_words()[0]}"
 
     def _dead_time_in_words(self) -> tuple[str, str]:
         """Dead time and what follows it: in s and in samples, of a jump in samples."""

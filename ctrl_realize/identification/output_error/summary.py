@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import control as ct
 import numpy as np
 
@@ -10,7 +12,7 @@ from ...delayed import DelayedStateSpace, delayed_ss
 from ...numerics.arrays import ComplexArray
 from ...numerics.output_error.result import OutputErrorEstimate
 from .result import FOLLOWED_LESS, OutputErrorFit
-from .words import form_words, model_words
+from .words import form_words, model_words, order_words
 
 
 def fitted_model(core: ct.StateSpace, result: OutputErrorFit) -> DelayedStateSpace:
@@ -44,33 +46,34 @@ def fitted_core(fit: OutputErrorEstimate, poles: ComplexArray) -> ct.StateSpace:
 
 def choices_of(fit: OutputErrorEstimate) -> tuple[str, ...]:
     """Say what was chosen automatically, and why."""
-    s = fit.structure
-    simple = " with up to three poles" if fit.robust and s.order <= 3 else ""
-    kind = (
-        model_words(fit.distributed.chain)
-        if fit.distributed.chain
-        else f"order {s.order}, relative degree {s.relative_degree}"
-    )
-    if fit.distributed.follows_flow:
-        reasons = [
-            "dead time: that of an axial-dispersion model, which fits clearly better than "
-            f"all {len(fit.structures)} structures; {kind}: approximates it with the fewest "
-            "parameters"
-        ]
-    else:
-        reasons = [
-            f"{kind}: lowest information criterion of {len(fit.structures)} "
-            f"structures{simple}, with a penalty on zeros and on a fourth pole"
-            if len(fit.structures) > 1
-            else f"{kind}: the only structure that was tried"
-        ]
+    return tuple(_choices(fit))
+
+
+def _choices(fit: OutputErrorEstimate) -> Iterator[str]:
+    chain = fit.distributed.chain
+    kind = model_words(chain) if chain else order_words(fit.structure)
+    count = len(fit.structures)
     if fit.process.form is not None:
-        reasons = [f"{form_words(fit.process.form)}: as requested"]
-    reasons += _closest(fit)
-    if fit.residual.rounded is not None and not fit.delay_estimates:
-        reasons.append(
+        yield f"{form_words(fit.process.form)}: as requested"
+    elif fit.distributed.follows_flow:
+        yield (
+            "dead time: that of an axial-dispersion model, which fits clearly better than all "
+            f"{count} structures; {kind}: approximates it with the fewest parameters"
+        )
+    elif count == 1:
+        yield f"{kind}: the only structure that was tried"
+    else:
+        simple = " with up to three poles" if fit.robust and fit.structure.order <= 3 else ""
+        yield (
+            f"{kind}: lowest information criterion of {count} structures{simple}, with a penalty "
+            "on zeros and on a fourth pole"
+        )
+    yield from _closest(fit)
+    residual = fit.residual
+    if residual.rounded is not None and not fit.delay_estimates:
+        yield (
             "dead time and model: maximum likelihood of the rounded samples, with noise of "
-            f"{fit.residual.rounded:.3g} before rounding"
+            f"{residual.rounded:.3g} before rounding"
         )
     if fit.delay_estimates:
         why = (
@@ -79,50 +82,48 @@ def choices_of(fit: OutputErrorEstimate) -> tuple[str, ...]:
             else "the likelihood is flat down to the earliest dead time and has its maximum there, "
             "and most of the estimates agree on a later one"
         )
-        reasons.append(f"dead time: median of five delay estimates, since {why}")
+        yield f"dead time: median of five delay estimates, since {why}"
     if not fit.robust:
-        reasons.append(_interval_of(fit))
+        yield _interval_of(fit)
     if fit.load is not None and not fit.load.early:
-        reasons.append("a step of a load is part of the model: the output tells it beyond doubt")
+        yield "a step of a load is part of the model: the output tells it beyond doubt"
     if fit.open_start:
-        reasons.append(
-            "interval widened towards the visible onset: with a zero in the model, the onset "
-            "of the response is not identifiable"
+        yield (
+            "interval widened towards the visible onset: with a zero in the model, the onset of "
+            "the response is not identifiable"
         )
-    if fit.residual.whitened:
-        reasons.append(
+    if residual.whitened:
+        yield (
             "the noise before the step is coloured: generalised least squares with an "
-            f"autoregressive noise model, instead of counting {fit.residual.correlation:.3g} "
-            "samples as one"
+            f"autoregressive noise model, instead of counting {residual.correlation:.3g} samples "
+            "as one"
         )
-    elif fit.residual.noise_lags:
-        reasons.append(
+    elif residual.noise_lags:
+        yield (
             "the residual is coloured: generalised least squares with an autoregressive noise "
-            f"model of order {fit.residual.noise_lags}"
+            f"model of order {residual.noise_lags}"
         )
-    elif fit.residual.correlation > 1:
-        reasons.append(
-            f"the residual is correlated: {fit.residual.correlation:.3g} samples count as one "
+    elif residual.correlation > 1:
+        yield (
+            f"the residual is correlated: {residual.correlation:.3g} samples count as one "
             "independent sample"
         )
-    return tuple(reasons)
 
 
-def _closest(fit: OutputErrorEstimate) -> list[str]:
+def _closest(fit: OutputErrorEstimate) -> Iterator[str]:
     """Name a structure that follows the record more closely, and is not the model."""
     followed = fit.followed
     other = followed.closest
-    if other == fit.structure or followed.by_closest - followed.complete < FOLLOWED_LESS:
-        return []
-    return [
-        f"order {other.order}, relative degree {other.relative_degree} follows the record more "
-        f"closely (fit {followed.by_closest:.1f} % instead of {followed.complete:.1f} %), but "
-        + (
+    if other != fit.structure and followed.by_closest - followed.complete >= FOLLOWED_LESS:
+        why = (
             "not more than additional parameters follow noise (information criterion)"
             if fit.adequate
             else "no structure reaches the noise, and simpler ones are more reliable then"
         )
-    ]
+        yield (
+            f"{order_words(other)} follows the record more closely (fit "
+            f"{followed.by_closest:.1f} % instead of {followed.complete:.1f} %), but {why}"
+        )
 
 
 def _interval_of(fit: OutputErrorEstimate) -> str:

@@ -165,8 +165,7 @@ class DelayScan(ModelFit):
         last = float(self.singular_values[self.delay, -1])
         return last / self.noise_floor if self.noise_floor > 0 else np.inf
 
-    def _method(self) -> str:
-        return "delay scan by approximate realization"
+    _method = "delay scan by approximate realization"
 
     def _title(self) -> str:
         return f"Delay scan: {self.delay} samples ({in_time(self.delay * self.dt, 5)})"

@@ -97,8 +97,7 @@ class MimoRealization(ModelFit):
         """How the impulse response was sampled."""
         return self.impulse.sampling
 
-    def _method(self) -> str:
-        return "approximate realization of several channels"
+    _method = "approximate realization of several channels"
 
     def _title(self) -> str:
         p, m = self.delays.shape

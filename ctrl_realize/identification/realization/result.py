@@ -117,8 +117,7 @@ class Realization(ModelFit):
         model = realize_at(markov, self.delay, self.samples, count, padded=padded)
         return read_only(model.singular_values[:count])
 
-    def _method(self) -> str:
-        return "approximate realization"
+    _method = "approximate realization"
 
     def _title(self) -> str:
         return f"Realization of order {self.order} after a delay of {self.delay} samples"

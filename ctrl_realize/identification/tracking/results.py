@@ -90,8 +90,7 @@ class TrackPoint(ModelFit):
         """The same as `noise_std`."""
         return self.noise_std
 
-    def _method(self) -> str:
-        return "tracked model"
+    _method = "tracked model"
 
     @property
     def interval(self) -> tuple[float, float]:
