@@ -71,7 +71,8 @@ class Result(Drawable):
 
     Examples
     --------
-    >>>     >>> from ctrl_realize.results import Result
+    >>> from dataclasses import dataclass
+    >>> from ctrl_realize.results import Result
     >>> @dataclass(frozen=True)
     ... class Weight(Result):
     ...     kilograms: float
