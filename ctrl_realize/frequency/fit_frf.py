@@ -10,7 +10,7 @@ import control as ct
 import numpy as np
 
 from .._checks import integer, positive
-from ..delayed import DelayedStateSpace, fit_of
+from ..delayed import DelayedStateSpace
 from ..errors import DataError, OptionError, OrderError
 from ..numerics.arrays import FloatArray
 from ..numerics.blas_threads import single_threaded
@@ -19,7 +19,6 @@ from ..numerics.rational.frf_data import FRFData
 from ..numerics.rational.search import DEFAULT_ORDERS, dead_time_bound, fit_structures
 from ..numerics.rational.spectra import hold_response
 from ..numerics.rational.starts import longest_search
-from .frf_fit import FRFFit
 from .frf_selection import chosen_model
 from .points import frf_points, held_every, sampled_every
 
@@ -172,10 +171,8 @@ def fit_frf(
     else:
         fits = fit_structures(data, orders, degrees)
     used = replace(points, response=response, sigma=sigma)
-    model = chosen_model(frf, data, fits, used, unit, size, sample_time, held, name)
-    if order is None and relative_degree is None:
-        return model
-    return model.replace(fit=replace(fit_of(model, FRFFit), stated=True))
+    stated = order is not None or relative_degree is not None
+    return chosen_model(frf, data, fits, used, unit, size, sample_time, held, name, stated=stated)
 
 
 def _searchable(max_dead_time: float, omega: FloatArray) -> float:

@@ -57,6 +57,8 @@ def chosen_model(
     dt: float,
     held: float | None,
     name: str | None,
+    *,
+    stated: bool,
 ) -> DelayedStateSpace:
     """Choose the structure, state the uncertainty and build the model.
 
@@ -76,6 +78,8 @@ def chosen_model(
     held : float or None
         Sample time in s of the hold that was divided out.
     name : str or None
+    stated : bool
+        Whether order or relative degree were given.
     """
     frequency, noise_known = points.frequency_hz, points.noise_known
     compared = compared_fits(data, fits, unit, noise_known)
@@ -127,6 +131,7 @@ def chosen_model(
         dt=dt,
         hold_time=held,
         flags=tuple(flags),
+        stated=stated,
     )
     return delayed_ss(result.core, dead_time=used, dt=dt, fit=result, name=name)
 
