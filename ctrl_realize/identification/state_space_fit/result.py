@@ -122,8 +122,7 @@ class StateSpaceFit(ModelFit):
         """Standard deviation of the residual; None for several outputs."""
         return float(self.noise_std[0]) if self.noise_std.size == 1 else None
 
-    def _method(self) -> str:
-        return "state-space fit of all channels"
+    _method = "state-space fit of all channels"
 
     def _title(self) -> str:
         return (
