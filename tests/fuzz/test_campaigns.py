@@ -170,11 +170,11 @@ def spoil(rng, folder) -> None:
 def same(one: cr.Campaign, other: cr.Campaign) -> None:
     assert one.table().equals(other.table())
     for a, b in zip(one.rows, other.rows, strict=True):
-        assert (a.model is None) == (b.model is None)
+        assert (a.system is None) == (b.system is None)
         assert [str(flag) for flag in a.flags] == [str(flag) for flag in b.flags]
-        if a.model is not None:
-            assert_array_equal(a.model.block, b.model.block)
-            assert a.model.input_delays == b.model.input_delays
+        if a.system is not None:
+            for name in "ABCD":
+                assert_array_equal(getattr(a.system, name), getattr(b.system, name))
 
 
 def look_at(campaign: cr.Campaign) -> None:
@@ -183,7 +183,7 @@ def look_at(campaign: cr.Campaign) -> None:
     assert len(campaign.good) + len(campaign.failed) == len(campaign.rows)
     for row in campaign.rows:
         assert repr(row)
-        assert (row.error is None) == (row.model is not None)
+        assert (row.error is None) == (row.system is not None)
         for text in row.warnings:
             assert "overflow" not in text
             assert "divide" not in text
@@ -253,7 +253,7 @@ def test_what_a_campaign_says_follows_from_its_rows(rng, method):
         campaigns.append(cr.identify_campaign(sources, **{"method": method, **options}))
     (campaign,) = campaigns
     good = [source.kind in ("good", "other dt") for source in sources]
-    assert [row.model is not None for row in campaign.rows] == good
+    assert [row.system is not None for row in campaign.rows] == good
     with good_end() as statistics:
         statistics.append(campaign.statistics())
     assert bool(statistics) == (
