@@ -90,7 +90,8 @@ def arguments_of(value: object) -> list[str]:
 
 PUBLIC_BASES = {
     kind.__name__: {base.__name__ for base in kind.__mro__[1:]}
-    for kind in [*vars(cr.design).values(), *vars(cr.actuators).values()]
+    for place in (cr.design, cr.actuators)
+    for kind in (getattr(place, name) for name in place.__all__)
     if inspect.isclass(kind)
 }
 OWNERS = public_names()

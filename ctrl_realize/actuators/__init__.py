@@ -13,29 +13,7 @@ Examples
 7
 """
 
-from __future__ import annotations
+# Loaded on demand, as the names of the package itself; the stub beside this file lists them.
+import lazy_loader
 
-from .base import Actuator, Series
-from .characteristic import Characteristic
-from .limits import Backlash, DeadZone, Resolution, Saturation, SlewRateLimit
-from .lugre import LuGreFriction
-from .stiction import HeStiction, KanoStiction, Stiction
-
-__all__ = [
-    "Actuator",
-    "Backlash",
-    "Characteristic",
-    "DeadZone",
-    "HeStiction",
-    "KanoStiction",
-    "LuGreFriction",
-    "Resolution",
-    "Saturation",
-    "Series",
-    "SlewRateLimit",
-    "Stiction",
-]
-
-
-def __dir__() -> list[str]:
-    return __all__
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

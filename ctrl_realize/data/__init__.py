@@ -1,21 +1,6 @@
 """Measured data: records, step and impulse responses, frequency responses."""
 
-from .frf import MeasuredFRF
-from .impulse import FilterSpec, ImpulseResponse
-from .impulse_estimate import ImpulseEstimate
-from .record import Record
-from .step import StepEdge, StepResponse
+# Loaded on demand, as the names of the package itself; the stub beside this file lists them.
+import lazy_loader
 
-__all__ = [
-    "FilterSpec",
-    "ImpulseEstimate",
-    "ImpulseResponse",
-    "MeasuredFRF",
-    "Record",
-    "StepEdge",
-    "StepResponse",
-]
-
-
-def __dir__() -> list[str]:
-    return __all__
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

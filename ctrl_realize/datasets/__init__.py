@@ -1,10 +1,6 @@
 """Measured records and frequency responses that come with the package, with origin and licence."""
 
-from .info import DataFile, DatasetInfo
-from .loading import Dataset, load, names, path, table
+# Loaded on demand, as the names of the package itself; the stub beside this file lists them.
+import lazy_loader
 
-__all__ = ["DataFile", "Dataset", "DatasetInfo", "load", "names", "path", "table"]
-
-
-def __dir__() -> list[str]:
-    return __all__
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -1,11 +1,6 @@
 """Controllers and models for other programs: PLC, C, Python, MATLAB, FMI."""
 
-from .code import to_c, to_python, to_structured_text
-from .fmu import to_fmu
-from .matlab import to_matlab
+# Loaded on demand, as the names of the package itself; the stub beside this file lists them.
+import lazy_loader
 
-__all__ = ["to_c", "to_fmu", "to_matlab", "to_python", "to_structured_text"]
-
-
-def __dir__() -> list[str]:
-    return __all__
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

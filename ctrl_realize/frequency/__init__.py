@@ -1,25 +1,6 @@
 """Measured frequency responses: estimation, fit, comparison with models."""
 
-from __future__ import annotations
+# Loaded on demand, as the names of the package itself; the stub beside this file lists them.
+import lazy_loader
 
-from .compare import compare_frf
-from .comparison import FRFComparison
-from .fit_frf import fit_frf
-from .frf_fit import FRFFit
-from .from_frf import impulse_from_frf
-from .spectral import spectral_frf
-from .stepped_sine import stepped_sine_frf
-
-__all__ = [
-    "FRFComparison",
-    "FRFFit",
-    "compare_frf",
-    "fit_frf",
-    "impulse_from_frf",
-    "spectral_frf",
-    "stepped_sine_frf",
-]
-
-
-def __dir__() -> list[str]:
-    return __all__
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -14,7 +14,7 @@ from ...data import Record
 from ...data.given import as_records
 from ...data.shown_units import in_shown_units
 from ...delayed import DelayedStateSpace, fit_of
-from ...frequency.fit_frf import fit_frf
+from ...frequency.fit import fit_frf
 from ...frequency.frf_fit import FRFFit
 from ...numerics.arrays import ComplexArray, FloatArray
 from ...numerics.blas_threads import single_threaded

@@ -191,7 +191,7 @@ def _from_frf(frf: MeasuredFRF) -> Iterator[DelayEstimate | Flag]:
     """Estimates of the methods for frequency responses, and a flag for each that fails."""
     # Not imported at the top: most comparisons have no FRF, and its fit is a large part of the
     # package.
-    from ...frequency.fit_frf import fit_frf
+    from ...frequency.fit import fit_frf
     from ...frequency.frf_fit import FRFFit
 
     try:
