@@ -15,8 +15,9 @@ from unittest import mock
 
 import numpy as np
 
-from ctrl_realize.numerics.engine.structures import PLAUSIBLE, choose, needless_parameters
-from ctrl_realize.numerics.output_error.before_the_step import _STRONG, _dies_away
+from ctrl_realize.numerics.constants import STRONG, VERY_STRONG
+from ctrl_realize.numerics.engine.structures import choose, needless_parameters
+from ctrl_realize.numerics.output_error.before_the_step import _dies_away
 from ctrl_realize.numerics.output_error.selection import flows_of
 
 Change = Callable[[Any], Any]
@@ -150,12 +151,12 @@ def _by_criterion(_: Any) -> Any:
         level: float,
         slack: float = 0,
     ) -> Any:
-        limit = min(*criterion.values(), level) + PLAUSIBLE + slack
+        limit = min(*criterion.values(), level) + VERY_STRONG + slack
         return [
             s
             for s, value in criterion.items()
             if value <= limit
-            or value + needless_parameters(s) <= level + PLAUSIBLE + slack
+            or value + needless_parameters(s) <= level + VERY_STRONG + slack
             or candidates[s] is chosen
         ]
 
@@ -292,12 +293,12 @@ SWITCHES = (
     ),
     Switch(
         "strong evidence of a motion",
-        {f"{BEFORE}:_STRONG": value(0.0)},
+        {f"{BEFORE}:STRONG": value(0.0)},
         (f"{BEFORE}:_most_evident",),
     ),
     Switch(
         "very strong evidence of a drift",
-        {f"{BEFORE}:PLAUSIBLE": value(_STRONG)},
+        {f"{BEFORE}:VERY_STRONG": value(STRONG)},
         (f"{BEFORE}:_most_evident",),
     ),
     Switch("motion that takes the gain", {f"{BEFORE}:_takes_the_gain": _while_it_dies_away}),
@@ -330,6 +331,7 @@ SWITCHES = (
     Switch("drift", {f"{PUBLIC}.fit:step_data": _without_drift}),
     Switch("load during the test", {f"{STEP}:load_of": giving(None)}),
     Switch("hum", {f"{FITS}.step_data:hum_frequencies": giving([])}),
+    Switch("hum against slow noise", {f"{NUMERICS}.signals.noise:_is_line": giving(True)}),
     Switch("colour of the noise at rest", {f"{FITS}.step_data:colouring": giving(1.0)}),
     Switch(
         "coarse converter",

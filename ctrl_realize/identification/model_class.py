@@ -19,6 +19,7 @@ from ..data import Record
 from ..delayed import DelayedStateSpace, fit_of
 from ..errors import DataError, OrderError, UnsuitableSystemError
 from ..numerics.arrays import FloatArray
+from ..numerics.constants import VERY_STRONG
 from ..numerics.output_error.any_input.data import MOST_SAMPLES
 from ..numerics.signals.noise import correlation_time
 from ..numerics.signals.noise_model import coloured_criterion
@@ -31,8 +32,6 @@ from .validation.residuals import analyse_residuals
 
 LAGS = 25
 """Lags after the dead time at which the correlation of residual and input is tested."""
-CLEAR = 10.0
-"""Least decrease of the criterion for which the state-space model is chosen."""
 MOST_STARTS = 3
 """Largest number of impulse-response estimates from which the state-space fit starts."""
 HOPELESS = 2.0
@@ -76,7 +75,7 @@ def with_modes_judged(
             found = from_starts(records, most_starts=MOST_STARTS, enough=MOST_SAMPLES)
             gain = _gain(fit, records, left, found)
             late = max_delay is not None and _delay(found.system) > max_delay
-            if gain > CLEAR and not late:
+            if gain > VERY_STRONG and not late:
                 return _chosen(found, fit, sum(follows), gain, cut)
             why = (
                 f"a model of {found.fit.order} states starts after max_delay"

@@ -14,6 +14,11 @@ HUBER = 1.345
 """Standard deviations from which Huber's loss is linear: 95 % efficient in Gaussian noise (Holland
 and Welsch, Comm. Statist. A 6 (1977) 813-827, table 1)."""
 
+STRONG, VERY_STRONG = 6.0, 10.0
+"""Differences of twice the log of the likelihood, or of a criterion, that are strong and very
+strong evidence (R. E. Kass and A. E. Raftery, Bayes factors, J. Amer. Statist. Assoc. 90 (1995)
+773-795, section 3.2)."""
+
 LEAST_FREEDOM = 40
 """Degrees of freedom left by a regression that is tested: Student's point of 1e-4 is then within
 11 % of the normal one, so that a residual that is not quite normal does little."""

@@ -18,6 +18,7 @@ from ..errors import OptionError
 from ..identification.output_error.repeatability import distinct
 from ..identification.output_error.result import OutputErrorFit
 from ..identification.step.steps import unit_step
+from ..numerics.constants import VERY_STRONG
 from ..numerics.signals.correlation import fit_percent
 from . import style
 from .names import plain, with_unit, wrapped
@@ -25,8 +26,6 @@ from .records import draw_beside
 from .shared_docs import documented
 from .style import axis_time_unit
 
-_RULED_OUT = 10.0
-"""Structures with a larger difference of the criterion are not drawn."""
 _MOST_STRUCTURES = 8
 _MOST_RECORDS = 40  # drawn behind their mean
 _NO_FIT = "no output-error fit; use fit_output_error or identify(record)"
@@ -269,7 +268,7 @@ def _evidence_rows(
     """List dead times with intervals: structures not ruled out, then other estimates."""
     rows: list[tuple[str, float, tuple[float, float] | None, str]] = []
     for line in result.structures:
-        if line.interval is not None and line.delta_bic <= _RULED_OUT:
+        if line.interval is not None and line.delta_bic <= VERY_STRONG:
             name = f"order {line.order}, degree {line.relative_degree}"
             rows.append((name, line.dead_time, line.interval, style.MODEL))
     rows = rows[:_MOST_STRUCTURES]

@@ -10,6 +10,7 @@ import numpy as np
 from ...data import Record
 from ...errors import DataError, OrderError
 from ...numerics.arrays import FloatArray
+from ...numerics.constants import VERY_STRONG
 from ...numerics.hankel.delay_models import OneModel, realize_at
 from ...numerics.regression.arx import excited_directions
 from ...numerics.regression.normal_equations import normal_equations
@@ -36,8 +37,6 @@ NEARBY = 10
 FARTHEST = 200
 """Largest number of changes of the delays."""
 
-RULED_OUT = 10.0
-"""Increase of the criterion from which the data rule a delay out, as in `fit_output_error`."""
 FARTHEST_PLAUSIBLE = 12
 """Number of delays around the estimate that are tried."""
 
@@ -250,7 +249,7 @@ class Search:
     def plausible(self, best: Candidate, independent: float) -> tuple[float, float]:
         """Dead times in samples, of one input and output, that the data do not rule out.
 
-        Those whose model of the same order has a criterion at most `RULED_OUT` larger, if
+        Those whose model of the same order has a criterion at most `VERY_STRONG` larger, if
         `independent` samples of the residual count as one. With a hold and without feedthrough, the
         first sample of a response shows that the dead time ended within the sample before it.
         """
@@ -266,9 +265,9 @@ class Search:
                         best.order, ((delay,), last.outputs), feedthrough=feedthrough, start=last
                     )
                     missed += 1
-                    if 0 < last.bic - best.bic - RULED_OUT * independent <= REACH:
+                    if 0 < last.bic - best.bic - VERY_STRONG * independent <= REACH:
                         last = self._minimum(last)
-                    if (last.bic - best.bic) / independent <= RULED_OUT:
+                    if (last.bic - best.bic) / independent <= VERY_STRONG:
                         first, end = _within(last)
                         low, high, missed = min(low, first), max(high, end), 0
         return low, high

@@ -14,7 +14,7 @@ from ...data import Record
 from ...delayed import DelayedStateSpace, fit_of
 from ...errors import DataError, DataWarning
 from ...numerics.arrays import IntArray
-from ...numerics.engine.structures import PLAUSIBLE
+from ...numerics.constants import VERY_STRONG
 from ...numerics.output_error.margins import CLOSE
 from ...numerics.state_space.delay_split import split_delays
 from ..impulse.from_io import Method, Start, impulse_from_io
@@ -117,7 +117,7 @@ def _from_start(
     flags = _silence(moved)
     if len(orders) > 1 and best.order == max(asked or ORDERS):
         flags += (flagged("highest_order", order=best.order),)
-    flags += tuple(_marginal(search.as_good(moved, CLOSE * PLAUSIBLE)))
+    flags += tuple(_marginal(search.as_good(moved, CLOSE * VERY_STRONG)))
     choices = _choices(moved, bic, shares)
     system = fitted_system(search.finish(moved), group, bic, choices, flags)
     return Outcome(moved.bic, system, unseen == 0, search, moved)

@@ -20,10 +20,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..arrays import FloatArray
+from ..constants import VERY_STRONG
 from ..engine.problem import Structure
 from ..engine.structures import (
     LEAST_CHARGE,
-    PLAUSIBLE,
     Candidate,
     Scales,
     needless_parameters,
@@ -83,7 +83,7 @@ class ActuatedFit:
     @property
     def chosen(self) -> bool:
         """Whether the evidence against every linear model is very strong."""
-        return self.evidence > PLAUSIBLE
+        return self.evidence > VERY_STRONG
 
 
 def fit_actuated(
@@ -138,7 +138,7 @@ def fit_actuated(
 
     def judged(one: Member) -> float:
         # One that contains a simpler one only where the evidence is very strong.
-        return value(one) + PLAUSIBLE * (not tried.isdisjoint(one.family.properties.extends))
+        return value(one) + VERY_STRONG * (not tried.isdisjoint(one.family.properties.extends))
 
     chosen = min(found, key=judged)
     member, ends = profiled(chosen, variance)
@@ -147,7 +147,7 @@ def fit_actuated(
         one
         for one in sorted(found, key=value)
         if one is not chosen
-        and min(value(one) - value(chosen), (one.cost - chosen.cost) / variance) <= PLAUSIBLE
+        and min(value(one) - value(chosen), (one.cost - chosen.cost) / variance) <= VERY_STRONG
     ]
     every = [ends]
     for one in near[:_MOST]:

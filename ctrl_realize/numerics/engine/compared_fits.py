@@ -16,13 +16,13 @@ from dataclasses import replace
 import numpy as np
 
 from ..arrays import FloatArray
+from ..constants import VERY_STRONG
 from .descend import descend
 from .eliminate import eliminate
 from .newton import settle
 from .poles import parameters_from_poles
 from .problem import Bounds, Family, Problem, Structure
 from .structures import (
-    PLAUSIBLE,
     Candidate,
     Scales,
     apart,
@@ -37,7 +37,7 @@ from .structures import (
     plausible,
 )
 
-REACH = 3 * PLAUSIBLE
+REACH = 3 * VERY_STRONG
 """Excess of the criterion up to which structures are followed to their minima. Of measured records
 searches ended up to 21 above them; what is not ruled out is within 10, charges aside."""
 _SLOWEST, _FASTEST, _RATES = 0.01, 10.0, 8

@@ -1,8 +1,8 @@
 """Fit many structures to one record: initial values, selection, comparison.
 
-The criterion is BIC [1]_, [3]_. A difference of 10 (`PLAUSIBLE`) is very strong evidence according
-to [2]_. The penalty on zeros and poles beyond the third, and the initial poles of a search, are our
-own rules.
+The criterion is BIC [1]_, [3]_; a structure is not ruled out while the evidence against it is less
+than very strong [2]_ (ablation: structures not ruled out). The penalty on zeros and poles beyond
+the third, and the initial poles of a search, are our own rules.
 
 References
 ----------
@@ -22,7 +22,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..arrays import ComplexArray, FloatArray
-from ..constants import SMALLEST
+from ..constants import SMALLEST, VERY_STRONG
 from .batch_search import fit_batch
 from .poles import parameters_from_poles, poles_from_parameters
 from .problem import Bounds, Family, Problem, Structure
@@ -47,10 +47,6 @@ FASTEST, SLOWER_WITH_ZEROS = 40.0, 2.0
 """Largest pole, in 1/samples. A response that jumps from one sample to the next needs it: with a
 lag of half a sample at least, its dead time would be known better than to the sample. Ablation:
 slower poles beside zeros."""
-
-PLAUSIBLE = 10.0
-"""A structure is not ruled out while its criterion is within this of the best: the evidence against
-it is then less than very strong ([2]_, section 3.2). Ablation: structures not ruled out."""
 
 _ROUGHLY = 0.25  # variances by which an iteration lowers the cost where a search ends: time
 _ENDS, _SAME_END = 5, 0.02  # of a search that are followed, and parts by which two are one: time
@@ -249,7 +245,7 @@ def plausible(
     chosen, because noise hides lags but does not remove them. `slack` is the remaining convergence
     error, in variances.
     """
-    reach = PLAUSIBLE + slack
+    reach = VERY_STRONG + slack
     limit = min(*criterion.values(), level) + reach
     weighed = level + reach
     fits = chosen.cost + reach * variance

@@ -24,13 +24,12 @@ from functools import cached_property
 import numpy as np
 
 from ..arrays import FloatArray
-from ..constants import HUBER, SMALLEST
+from ..constants import HUBER, SMALLEST, VERY_STRONG
 from ..signals.noise import correlation_of_noise, correlation_time, is_coarse, mad_sigma
 from .compared_fits import converged, on_new_data, settled
 from .problem import Problem, Structure
 from .static_gain import StaticGain, static_gain
 from .structures import (
-    PLAUSIBLE,
     Candidate,
     Scales,
     choose,
@@ -111,7 +110,7 @@ class WindowFit:
         response.
         """
         first = choose(criterion)
-        limit = criterion[first] + PLAUSIBLE
+        limit = criterion[first] + VERY_STRONG
         left = {s: value for s, value in criterion.items() if value <= limit}
         while left:
             structure = choose(left)

@@ -19,11 +19,12 @@ from functools import partial
 import numpy as np
 
 from ..arrays import ComplexArray, FloatArray
+from ..constants import VERY_STRONG
 from ..engine.eliminate import eliminate
 from ..engine.modal import moved_amplitudes, partial_fractions
 from ..engine.problem import Bounds, KnownFactor, Problem
 from ..engine.responses import StepSequence
-from ..engine.structures import PLAUSIBLE, Candidate, Scales
+from ..engine.structures import Candidate, Scales
 from .equal_lags import time_moments
 from .residence import flow_modes
 from .shaped import ShapedFamily, UnitResponse, lowest
@@ -33,7 +34,7 @@ _CHARGE = 8.0
 flow."""
 _MINOR = 0.5  # of the lag behind it: a flow that spreads by less is no different from a second lag
 _FOLLOWED = 3  # starts that are improved: time
-_REACH = 3 * PLAUSIBLE  # excess up to which a flow is followed to its minimum
+_REACH = 3 * VERY_STRONG  # excess up to which a flow is followed to its minimum
 _SPREADS = (0.1, 1.2)
 """Standard deviations over means: narrower is no different from many lags, wider from few."""
 _DELAYS, _LAGS = (0.0, 0.4, 0.7, 0.95), (0.05, 0.3, 0.6, 0.9)
@@ -211,7 +212,7 @@ def fit_flows(
     time = np.log(0.1 * scales.dt), np.log(3 * scales.length)
     for lagging in (True, False):
         # Without the lag the sum of squares is no smaller: only a parameter can be saved.
-        if not lagging and flows[0].delta_bic - penalty > PLAUSIBLE:
+        if not lagging and flows[0].delta_bic - penalty > VERY_STRONG:
             break
         low, high = (
             np.array([dead_time, time[end], np.log(_SPREADS[end]), *[time[end]] * lagging])

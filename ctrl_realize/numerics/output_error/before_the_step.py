@@ -18,18 +18,15 @@ from dataclasses import replace
 
 import numpy as np
 
+from ..constants import STRONG, VERY_STRONG
 from ..engine.eliminate import evaluate
 from ..engine.modal import respond
 from ..engine.problem import Structure
-from ..engine.structures import PLAUSIBLE, SIMPLE_STRUCTURES, needless_parameters
+from ..engine.structures import SIMPLE_STRUCTURES, needless_parameters
 from ..engine.window_fit import WindowFit
 from .step_data import StepData
 
 _OUTLIER = 3.0  # standard deviations at which residuals are cut where explanations are compared
-
-_STRONG = 6.0
-"""Difference of criteria that is strong evidence ([2]_, section 3.2). Ablation: strong evidence of
-a motion."""
 
 _MOST_TO_COME = 10.0
 """How much more a free response may move after the step than before it. One that hardly moves
@@ -64,7 +61,8 @@ def _most_evident(ways: list[tuple[StepData, WindowFit]]) -> StepData:
     """Choose between models of the samples before the step by an information criterion.
 
     A motion that goes on after the step needs strong evidence: it changes the gain of the model. A
-    drift, which goes on to the end of the record, needs very strong evidence ([2]_).
+    drift, which goes on to the end of the record, needs very strong evidence ([2]_). Ablation:
+    strong evidence of a motion, very strong evidence of a drift.
     """
     closest = min((fits for _, fits in ways), key=lambda fits: fits.sigma)
     worst = _OUTLIER * closest.sigma
@@ -77,7 +75,7 @@ def _most_evident(ways: list[tuple[StepData, WindowFit]]) -> StepData:
         terms = best.order + best.zeros + 2 * len(data.hum)
         terms += best.order if data.relaxing else bool(data.drift)
         value = squares / closest.variance + closest.penalty * terms + needless_parameters(best)
-        return value + (PLAUSIBLE if data.drift else _STRONG if data.relaxing else 0.0)
+        return value + (VERY_STRONG if data.drift else STRONG if data.relaxing else 0.0)
 
     return min(ways, key=criterion)[0]
 

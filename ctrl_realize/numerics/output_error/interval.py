@@ -21,11 +21,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from ..constants import Z_95
+from ..constants import VERY_STRONG, Z_95
 from ..engine.problem import Structure
 from ..engine.profile import Points
 from ..engine.profile_ends import profile_limits
-from ..engine.structures import LEAST_CHARGE, PLAUSIBLE, Scales, charged, plausible
+from ..engine.structures import LEAST_CHARGE, Scales, charged, plausible
 from ..engine.window_fit import WindowFit
 from ..families.equal_lags import (
     FREE_IN_A_CHAIN,
@@ -198,7 +198,7 @@ def _not_ruled_out(
     profiles: dict[Structure, Profile],
 ) -> _Kept:
     more = max(LEAST_CHARGE - fits.penalty, 0.0)
-    limit = _charged_level(fits, choice) + PLAUSIBLE
+    limit = _charged_level(fits, choice) + VERY_STRONG
     return _Kept(
         profiles,
         [

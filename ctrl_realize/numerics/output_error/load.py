@@ -31,14 +31,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..arrays import FloatArray
-from ..constants import SMALLEST
+from ..constants import SMALLEST, VERY_STRONG
 from ..engine.descend import descend
 from ..engine.eliminate import eliminate, evaluate
 from ..engine.modal import partial_fractions
 from ..engine.problem import Problem, Structure
 from ..engine.static_gain import local_errors
 from ..engine.structures import (
-    PLAUSIBLE,
     SIMPLE_STRUCTURES,
     Candidate,
     needless_parameters,
@@ -54,7 +53,7 @@ _PARAMETERS = 3  # time, lag and size
 _LEAST_LOAD, _MOST_LAG = 0.03, 2.0
 """Part of a response from which on a load is one, and its longest lag, over what is left of the
 record: slower ones are drifts."""
-_IN_SLOW_NOISE, _MOST_LEFT = 2.5 * PLAUSIBLE, 0.75
+_IN_SLOW_NOISE, _MOST_LEFT = 2.5 * VERY_STRONG, 0.75
 """Decrease of the criterion for a load where the residual is correlated, and the part of that which
 may be left (0.92 beside friction, 0.1 to 0.72 beside a load): AR(1) noise with a pole at 0.9
 reached 20 in 1 of 60 simulated records, and friction 22 in 1 of 46 measured ones; white noise
@@ -132,7 +131,7 @@ def load_of(
     also = refit(loaded, data.output.size, tuple(fits.candidates))
     error = also.window.output - also.window.predict(also.problem, also.best)
     white = also.correlation == 1.0
-    least = PLAUSIBLE if white and not early else _IN_SLOW_NOISE
+    least = VERY_STRONG if white and not early else _IN_SLOW_NOISE
     left = (also.normalized_rms / fits.normalized_rms) ** 2
     better = left < (1.0 if white else _MOST_LEFT) and is_noise(loaded, also, also.best)
     if not better or _evidence(fits, error, also.best.structure) <= least:

@@ -10,13 +10,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal, TypeAlias
 
+from ..constants import VERY_STRONG
 from ..engine.problem import Structure
-from ..engine.structures import PLAUSIBLE, charged, needless_parameters, plausible
+from ..engine.structures import charged, needless_parameters, plausible
 from ..engine.window_fit import WindowFit
 
 CLOSE = 1e-3
 """Distance from a threshold, as a part of it, within which a decision is called close. Structures
-compare by the part of `PLAUSIBLE` by which their criteria differ: a hundredth of a variance."""
+compare by the part of `VERY_STRONG` by which their criteria differ: a hundredth of a variance."""
 
 DecisionKey: TypeAlias = Literal["structure", "ruled_out", "adequate", "likelihood"]
 
@@ -42,9 +43,9 @@ def close_choices(fits: WindowFit, level: float, chosen: Structure) -> tuple[Clo
     near = [
         s
         for s, value in fits.criterion.items()
-        if abs(value + needless_parameters(s) - level) <= CLOSE * PLAUSIBLE
+        if abs(value + needless_parameters(s) - level) <= CLOSE * VERY_STRONG
     ]
-    near += [s for s, excess in fits.rivals.items() if excess <= CLOSE * PLAUSIBLE]
+    near += [s for s, excess in fits.rivals.items() if excess <= CLOSE * VERY_STRONG]
     return tuple(CloseDecision("structure", s) for s in dict.fromkeys(near) if s != chosen)
 
 
@@ -60,6 +61,6 @@ def close_exclusions(fits: WindowFit, level: float, chosen: Structure) -> tuple[
             level,
             slack,
         )
-        for slack in (CLOSE * PLAUSIBLE, -CLOSE * PLAUSIBLE)
+        for slack in (CLOSE * VERY_STRONG, -CLOSE * VERY_STRONG)
     )
     return tuple(CloseDecision("ruled_out", s) for s in most if s not in least)

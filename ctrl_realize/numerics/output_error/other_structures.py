@@ -13,13 +13,13 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 
+from ..constants import VERY_STRONG
 from ..engine.compared_fits import SLACK, converged, on_new_data, settled
 from ..engine.problem import Structure
 from ..engine.profile_ends import profile_limits
 from ..engine.structures import (
     ALL_STRUCTURES,
     LEAST_CHARGE,
-    PLAUSIBLE,
     Candidate,
     charged,
     needless_parameters,
@@ -60,7 +60,7 @@ def other_structures(fits: WindowFit, refit: Callable[[], WindowFit]) -> OtherSt
     # Relative to the residual of the richer ones: that of the given one may be large and
     # correlated.
     variance = least / max(problem.data.size - 2 * n - 4, 1)
-    better = _better(refit(), given) if cost - least > PLAUSIBLE * variance else None
+    better = _better(refit(), given) if cost - least > VERY_STRONG * variance else None
     return OtherStructures(better, () if better is not None else _not_ruled_out(fits, richer))
 
 
@@ -72,7 +72,7 @@ def _better(free: WindowFit, given: Candidate) -> StructureFit | None:
     cost, values = here[given.structure].cost, free.criteria(here)
     excess = _charged(values, given.structure) - _charged(free.criterion, best.structure)
     # Too many poles are not excluded: their residual is as small.
-    if excess <= PLAUSIBLE or cost <= best.cost + PLAUSIBLE * free.variance:
+    if excess <= VERY_STRONG or cost <= best.cost + VERY_STRONG * free.variance:
         return None
     return line_of(free, best, -excess)
 

@@ -16,8 +16,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..constants import SMALLEST
-from ..engine.structures import PLAUSIBLE, Candidate
+from ..constants import SMALLEST, VERY_STRONG
+from ..engine.structures import Candidate
 from ..engine.window_fit import WindowFit
 from ..families.form_fit import fit_form
 from ..families.lag_profiles import with_profiled_lags
@@ -107,8 +107,8 @@ def _better(fits: WindowFit, chosen: Candidate, better: StructureFit | None) -> 
     if better is not None:
         # relative to the structure without prescriptions, which may be worse: it has no integrator
         both = excess - better.delta_bic
-        return replace(better, delta_bic=-both) if both > PLAUSIBLE else None
-    if excess <= PLAUSIBLE:
+        return replace(better, delta_bic=-both) if both > VERY_STRONG else None
+    if excess <= VERY_STRONG:
         return None
     found = likelihood_fit(fits, adequate=True)
     return line_of(fits, fits.candidates[found.structure], -excess, (found.low, found.high))

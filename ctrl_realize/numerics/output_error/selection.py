@@ -22,8 +22,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+from ..constants import VERY_STRONG
 from ..engine.problem import Structure
-from ..engine.structures import PLAUSIBLE, Candidate, choose, needless_parameters, search
+from ..engine.structures import Candidate, choose, needless_parameters, search
 from ..engine.window_fit import WindowFit
 from ..families.equal_lags import FREE_IN_A_CHAIN, LagChain, fit_chains, fit_diffusion
 from ..families.flow import DispersedFlow, fit_flows
@@ -114,7 +115,7 @@ def _beside_own_terms(fits: WindowFit, equal_lags: Sequence[LagChain]) -> Sequen
 def _behind(fits: WindowFit, flow: DispersedFlow) -> Candidate | None:
     """Lags and zeros with the dead time of dispersion that fit as well, if there are any."""
     pinned = replace(fits.scales, earliest=flow.dead_time, latest=flow.dead_time)
-    limit = flow.cost + PLAUSIBLE * fits.variance
+    limit = flow.cost + VERY_STRONG * fits.variance
     found = search(fits.problem, _BEHIND_A_FLOW, pinned)
     # Their number is not penalised, since they only represent the dispersion model.
     good = {structure: model for structure, model in found.items() if model.cost <= limit}

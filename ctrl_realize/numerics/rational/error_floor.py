@@ -3,7 +3,7 @@
 An error in proportion to the response would be none at an anti-resonance, whose few points then
 outweigh all others; a floor is an error that is the same everywhere, as of a noisy sensor. Both are
 variances of the complex error, estimated from residuals by maximum likelihood [1]_ (a regression of
-variances, [2]_).
+variances, [2]_). There is a floor where the evidence for it is very strong.
 
 References
 ----------
@@ -21,6 +21,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..arrays import FloatArray
+from ..constants import VERY_STRONG
 from ..engine.problem import Structure
 from ..engine.structures import Candidate
 from .frf_data import FRFData
@@ -32,9 +33,6 @@ from .search import (
     unexplained,
 )
 
-_EVIDENCE = 5.0
-"""Logarithm of the likelihood ratio from which on there is a floor: "very strong" (Kass and Raftery
-1995)."""
 _TRIED = 100  # floors over the range of the response: 10 % apart over four decades
 
 
@@ -109,4 +107,4 @@ def error_floor(size: FloatArray, residual: FloatArray) -> float:
     cost = np.log(np.maximum(np.mean(square / variance, axis=1), np.finfo(float).tiny))
     cost = size.size * cost + np.log(variance).sum(axis=1)
     best = int(np.argmin(cost))
-    return float(np.sqrt(tried[best])) if cost[0] - cost[best] > _EVIDENCE else 0.0
+    return float(np.sqrt(tried[best])) if 2 * (cost[0] - cost[best]) > VERY_STRONG else 0.0

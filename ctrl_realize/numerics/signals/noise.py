@@ -13,6 +13,10 @@ References
    estimates), doi:10.1002/9780470434697.
 .. [4] B. Widrow and I. Kollar, Quantization Noise, Cambridge University Press 2008,
    doi:10.1017/CBO9780511754661.
+.. [5] C. Torrence and G. P. Compo, A practical guide to wavelet analysis, Bull. Amer. Meteor. Soc.
+   79 (1998) 61-78, doi:10.1175/1520-0477(1998)079<0061:APGTWA>2.0.CO;2.
+.. [6] R. E. Kass and A. E. Raftery, Bayes factors, J. Amer. Statist. Assoc. 90 (1995) 773-795,
+   doi:10.1080/01621459.1995.10476572.
 """
 
 from __future__ import annotations
@@ -21,6 +25,7 @@ import numpy as np
 from scipy.optimize import minimize_scalar
 
 from ..arrays import FloatArray, IntArray
+from ..constants import VERY_STRONG
 from ..hankel.matrix import fft_length
 
 _DITHER = 0.6
@@ -268,7 +273,7 @@ def hum_frequencies(rest: FloatArray, most: int = 3) -> list[float]:
     """Frequencies, in cycles per sample, of sinusoids in the baseline.
 
     A sinusoid has at least a third of the variance and 20 times the power of its neighbours in the
-    spectrum, over three and a half periods or more.
+    spectrum, over three and a half periods or more, and is no swing of slow noise.
     """
     found: list[float] = []
     left = rest - rest.mean()
@@ -288,11 +293,33 @@ def hum_frequencies(rest: FloatArray, most: int = 3) -> list[float]:
             break  # slower than assumed: too few periods
         wave = sine_pair(np.arange(n), frequency)
         fitted = wave @ np.linalg.lstsq(wave, left, rcond=None)[0]
-        if float(fitted @ fitted) < float(left @ left) / 3:
+        if float(fitted @ fitted) < float(left @ left) / 3 or not _is_line(left, fitted):
             break
         found.append(frequency)
         left = left - fitted
     return found
+
+
+def _is_line(values: FloatArray, wave: FloatArray) -> bool:
+    """Whether a sinusoid explains more than first-order autoregressive noise has by itself.
+
+    Slow noise has peaks in its spectrum as well [5]_. The likelihood with the sinusoid is better by
+    the penalty of the BIC on its three parameters, and by very strong evidence [6]_ beyond it.
+    Ablation: hum against slow noise.
+    """
+    without, beside = (_innovation_variance(part) for part in (values, values - wave))
+    if not without > 0:
+        return False
+    gain = values.size * np.log(without / max(beside, 1e-30 * without))
+    return bool(gain > 3 * np.log(values.size) + VERY_STRONG)
+
+
+def _innovation_variance(values: FloatArray) -> float:
+    """Variance of what a first-order autoregression does not predict, at its least."""
+    past, present = values[:-1], values[1:]
+    energy = float(past @ past)
+    pole = float(past @ present) / energy if energy else 0.0
+    return float(np.mean((present - pole * past) ** 2))
 
 
 def sine_pair(index: FloatArray, frequency: float) -> FloatArray:

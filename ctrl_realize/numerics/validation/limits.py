@@ -20,6 +20,7 @@ import numpy as np
 from scipy.ndimage import uniform_filter1d
 
 from ..arrays import BoolArray, FloatArray, IntArray
+from ..constants import VERY_STRONG
 from ..signals.noise import (
     correlation_time,
     is_coarse,
@@ -51,9 +52,6 @@ _BEHIND = 4  # times a rise that are looked at behind it
 _EARLY = 2  # samples that are left out before and after a plateau
 _RATES = np.geomspace(0.25, 32, 15)  # of lags, over the length of what they explain
 _CLEARLY = 3.0  # by which a kink lowers a likelihood criterion to be looked at more closely
-_CLIPS = 10.0
-"""Least decrease of the criterion with which an output is said to clip: very strong evidence (R. E.
-Kass and A. E. Raftery, Bayes factors, J. Amer. Statist. Assoc. 90 (1995) 773-795)."""
 _BEYOND = 0.02  # part of the range by which a plant passes its limit, on average, to be told
 _OUTLIER = 4.0  # standard deviations at which residuals are cut
 
@@ -211,7 +209,7 @@ def clips(output: FloatArray, linear: FloatArray, beyond: FloatArray, held: Bool
     else:
         noise = rounding_error(output) ** 2
         better, other = (output.size * np.log(np.mean(e**2) + noise) for e in errors)
-    return bool(other - better > _CLIPS)
+    return bool(other - better > VERY_STRONG)
 
 
 def passed(output: FloatArray, model: FloatArray, held: BoolArray) -> BoolArray:

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+from ctrl_realize.numerics.constants import VERY_STRONG
 from ctrl_realize.numerics.engine.poles import parameters_from_poles, poles_from_parameters
 from ctrl_realize.numerics.engine.problem import Structure
 from ctrl_realize.numerics.engine.responses import StepSequence
 from ctrl_realize.numerics.engine.structures import (
-    PLAUSIBLE,
     Candidate,
     choose,
     needless_parameters,
@@ -62,7 +62,7 @@ def test_what_is_near_the_best_is_plausible_and_so_are_lags_that_fit_no_worse():
     shapes = [(3, 2), (1, 1), (2, 2), (2, 1), (4, 4), (5, 5)]
     all_of = {Structure(n, r): candidate(n, r, 1000.0) for n, r in shapes}
     all_of[chosen.structure] = chosen
-    all_of[Structure(2, 2)] = candidate(2, 2, 100.0 + PLAUSIBLE * 0.5)
+    all_of[Structure(2, 2)] = candidate(2, 2, 100.0 + VERY_STRONG * 0.5)
     all_of[Structure(4, 4)] = candidate(4, 4, 50.0)
     values = dict(zip(all_of, [60.0, 900.0, 900.0, 69.0, 900.0, 71.0], strict=True))
     left = plausible(all_of, values, 0.5, chosen, 60.0)

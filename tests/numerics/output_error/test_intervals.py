@@ -7,9 +7,10 @@ import pytest
 
 from benchmarks.accuracy.cramer_rao import dead_time_bound
 from ctrl_realize.identification.output_error.flags import sampled_flags
+from ctrl_realize.numerics.constants import VERY_STRONG
 from ctrl_realize.numerics.engine.eliminate import evaluate
 from ctrl_realize.numerics.engine.problem import KnownFactor, Structure
-from ctrl_realize.numerics.engine.structures import PLAUSIBLE, Scales, needless_parameters
+from ctrl_realize.numerics.engine.structures import Scales, needless_parameters
 from ctrl_realize.numerics.engine.window_fit import WindowFit, fit_window
 from ctrl_realize.numerics.output_error.interval import likelihood_fit
 from ctrl_realize.numerics.output_error.margins import CLOSE, close_to
@@ -88,7 +89,7 @@ def decided(whole, excess):
 
 
 def test_two_structures_with_one_criterion_are_a_marginal_decision(whole):
-    close, flags = decided(whole, 0.5 * CLOSE * PLAUSIBLE)
+    close, flags = decided(whole, 0.5 * CLOSE * VERY_STRONG)
     assert [(one.key, one.structure) for one in close] == [("structure", LAGS[1])]
     assert "order 2, relative degree 2 fits as well" in flags[0].message
 

@@ -91,6 +91,16 @@ def test_lines_are_found_strongest_first_and_not_more_than_asked_for():
     assert not any(hum_frequencies(white(1000, seed)) for seed in range(20))
 
 
+@pytest.mark.parametrize("pole", [0.8, 0.9, 0.97])
+def test_swings_of_slow_noise_are_no_sinusoid(pole):
+    for seed in range(20):
+        slow = lfilter([1.0], [1.0, -pole], white(500, seed))[200:]
+        assert not hum_frequencies(slow)
+        # and one in the middle of its spectrum, as strong as the noise, is found
+        line = np.sqrt(2) * np.std(slow) * np.sin(2 * np.pi * 0.11 * np.arange(slow.size))
+        assert_allclose(hum_frequencies(slow + line), [0.11], atol=1e-3)
+
+
 RADIUS, ANGLE = 0.95, 2 * np.pi / 20
 RINGING = np.array([1.0, -2 * RADIUS * np.cos(ANGLE), RADIUS**2])
 

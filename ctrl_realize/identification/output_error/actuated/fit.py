@@ -17,10 +17,10 @@ from ....numerics.actuated.intervals import propagated
 from ....numerics.actuated.motions import at_parts
 from ....numerics.actuated.records import FEW_MOVES, ActuatedRecord, actuated_record
 from ....numerics.arrays import FloatArray, IntArray
-from ....numerics.constants import CHI2_95, Z_95
+from ....numerics.constants import CHI2_95, VERY_STRONG, Z_95
 from ....numerics.engine.local_terms import Segments, local_columns
 from ....numerics.engine.problem import Structure
-from ....numerics.engine.structures import PLAUSIBLE, Scales
+from ....numerics.engine.structures import Scales
 from ....numerics.output_error.any_input.stretch import WHITE
 from ....numerics.output_error.result import (
     Followed,
@@ -89,7 +89,7 @@ def with_actuator(
 
 def _both(result: OutputErrorFit, found: ActuatedFit) -> OutputErrorFit:
     """Let the interval cover a model with an actuator that is not ruled out."""
-    if found.evidence < -PLAUSIBLE:
+    if found.evidence < -VERY_STRONG:
         return result
     low, high = found.ends[0]
     old = result.estimate
