@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Sequence
 from html import escape
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 
@@ -93,11 +93,28 @@ class Card(NamedTuple):
 
 
 class ShownSystem:
-    """How systems of this toolbox are shown: one line, which is `_line`, or their `_card`.
+    """How systems of this toolbox are shown, one line or a card, and how they are copied.
 
     python-control shows all matrices: of systems with delays too many, and as LaTeX, which not
-    every page renders.
+    every page renders. Its systems hold closures, which can be neither stored nor shared by a copy:
+    a copy is made anew by what made the system. Everything inside is read-only and may be shared.
     """
+
+    _state_names: dict[str, int] | None = None
+    _repr_format: str | None
+
+    def _made_by(self) -> tuple[Callable[..., Any], tuple[Any, ...], dict[str, Any]]:
+        """What makes an equal system, with its arguments."""
+        raise NotImplementedError
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        states = None if self._state_names is None else list(self._state_names)
+        return _made_again, (*self._made_by(), states, self._repr_format)
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> Self:
+        make, arguments = self.__reduce__()
+        copy: Self = make(*arguments)
+        return copy
 
     def _line(self) -> str:
         raise NotImplementedError
@@ -120,6 +137,24 @@ class ShownSystem:
 
     def _repr_markdown_(self) -> None:
         return None
+
+
+def _made_again(
+    make: Callable[..., Any],
+    arguments: tuple[Any, ...],
+    settings: dict[str, Any],
+    states: Iterable[str] | None,
+    repr_format: str | None,
+) -> Any:
+    return shown_alike(make(*arguments, **settings), states, repr_format)
+
+
+def shown_alike(made: Any, states: Iterable[str] | None, repr_format: str | None) -> Any:
+    """Give a system user-defined state names, if they fit, and a `repr_format`."""
+    if states is not None and len(labels := list(states)) == made.nstates:
+        made.set_states(labels)
+    made.repr_format = repr_format
+    return made
 
 
 def as_asked(system: Any) -> str:

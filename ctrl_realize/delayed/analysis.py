@@ -6,10 +6,10 @@ from typing import Any
 
 import control as ct
 import numpy as np
-from scipy.optimize import brentq
 
-from .._checks import integer, real
+from .._checks import integer
 from ..numerics.arrays import ComplexArray
+from ..numerics.internal_delays.form import DelayForm
 from .parts import CoreAndDelays
 
 
@@ -50,46 +50,9 @@ class DelayedAnalysis(CoreAndDelays):
             return np.asarray(self._core.zeros(), dtype=np.complex128)
         return np.asarray(super().zeros(), dtype=np.complex128)
 
-    def damp(self) -> Any:
-        """Natural frequency, damping and poles; delay poles have infinite frequency."""
-        # log(0) of the poles at 0 is intended, and python-control would warn about each.
-        with np.errstate(divide="ignore", invalid="ignore"):
-            return super().damp()
-
-    def bandwidth(self, dbdrop: float = -3) -> float:
-        """Lowest frequency in rad/s at which the gain is `dbdrop` dB below that at 0.
-
-        python-control 0.10.2 raises an error for every discrete system: it evaluates G(jw) instead
-        of G(exp(jw dt)).
-        """
-        if not self.issiso():
-            raise TypeError("system should be a SISO system")
-        drop = real(dbdrop, "dbdrop", "drop of the gain in dB, below 0")
-        if drop >= 0:
-            raise ValueError("expecting dbdrop be a negative scalar in dB")
-        level = abs(complex(self(1.0, warn_infinite=False))) * 10 ** (drop / 20)
-        if not np.isfinite(level):
-            return float("nan")
-        nyquist = np.pi / self.dt
-        grid = np.concatenate(
-            [np.geomspace(nyquist * 1e-7, nyquist, 2000), np.linspace(0, nyquist, 2000)[1:]]
-        )
-        grid.sort()
-        gain = np.abs(self._core(np.exp(1j * grid * self.dt)))
-        below = np.flatnonzero(gain < level)
-        if below.size == 0:
-            return float("inf")
-        first = int(below[0])
-        if first == 0:
-            return float(grid[0])
-        return float(
-            brentq(
-                lambda w: abs(complex(self._core(np.exp(1j * w * self.dt)))) - level,
-                grid[first - 1],
-                grid[first],
-                xtol=1e-14 * nyquist,
-            )
-        )
+    def _gain_form(self) -> DelayForm:
+        core = self._core
+        return DelayForm(core.A, core.B, core.C, core.D)
 
     def to_tf(self, *args: Any, **kwargs: Any) -> ct.TransferFunction:
         """Transfer function: that of the core, with d further poles at zero.

@@ -4,11 +4,16 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
+from scipy.optimize import brentq
 
+from .._checks import real
 from ..errors import UnsuitableSystemError
 from ..numerics.arrays import ComplexArray, FloatArray
+from ..numerics.internal_delays.form import DelayForm
+from ..numerics.internal_delays.stability import grid
 from ..numerics.loops.crossings import follow, frequency_grid
 from .deferred import DeferredMatrices
 
@@ -22,7 +27,7 @@ response is left out."""
 
 
 class HostMargins(DeferredMatrices):
-    """Unpacks as a frequency response, which functions for margins accept."""
+    """Unpacks as a frequency response, which functions for margins accept; gain and bandwidth."""
 
     @abstractmethod
     def features(self) -> tuple[ComplexArray, float]:
@@ -57,24 +62,62 @@ class HostMargins(DeferredMatrices):
         features, dead_time = self.features()
         sizes = np.abs(features)
         sizes = sizes[sizes > 0]
-        dt = float(self.dt or 0)
         fastest = float(sizes.max(initial=1 / dead_time if dead_time else 1.0))
-        top = np.pi / dt if dt else self._gain_is_gone(fastest)
+        top = np.pi / self.dt if self.dt else self._gain_is_gone(fastest)
         low = 1e-3 * min(float(sizes.min(initial=top)), 1 / dead_time if dead_time else top)
-
-        def curve(omega: FloatArray) -> ComplexArray:
-            x = np.exp(1j * omega * dt) if dt else 1j * omega
-            return np.asarray(self.horner(x, warn_infinite=False)[0, 0])
-
-        omega, values = follow(curve, frequency_grid(low, top, features, dead_time))
-        omega, values = follow(curve, omega[: _last(values)], FINE)
+        omega, values = follow(self._at, frequency_grid(low, top, features, dead_time))
+        omega, values = follow(self._at, omega[: _last(values)], FINE)
         known = np.isfinite(values)
         return omega[known], values[known]
+
+    def damp(self) -> Any:
+        """Natural frequency, damping and poles; poles at z = 0 have infinite frequency."""
+        # log(0) of the poles at 0 is intended, and python-control would warn about each.
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return super().damp()
+
+    def bandwidth(self, dbdrop: float = -3) -> float:
+        """Lowest frequency in rad/s at which the gain is `dbdrop` dB below that at 0.
+
+        python-control 0.10.2 raises an error for every discrete system: it evaluates G(jw) instead
+        of G(exp(jw dt)).
+        """
+        if not self.issiso():
+            raise TypeError("system should be a SISO system")
+        drop = real(dbdrop, "dbdrop", "drop of the gain in dB, below 0")
+        if drop >= 0:
+            raise ValueError("expecting dbdrop be a negative scalar in dB")
+        level = abs(self.dcgain()) * 10 ** (drop / 20)
+        if not np.isfinite(level):
+            return float("nan")
+        dt = float(self.dt or 0)
+
+        def excess(omega: FloatArray) -> FloatArray:
+            return np.asarray(np.abs(self._at(omega)) - level)
+
+        omega = grid(self._gain_form(), dt)
+        below = np.flatnonzero(excess(omega) < 0)
+        if below.size == 0:
+            return float("inf")
+        first = int(below[0])
+        if first == 0:
+            return float(omega[0])
+        ends = omega[first - 1], omega[first]
+        return float(brentq(lambda w: excess(np.array([w]))[0], *ends, xtol=1e-14 * omega[-1]))
+
+    def _gain_form(self) -> DelayForm:
+        """Return a form with the gain of the system."""
+        return self._form()
+
+    def _at(self, omega: FloatArray) -> ComplexArray:
+        """Response of the first channel at frequencies in rad/s."""
+        x = np.exp(1j * omega * float(self.dt)) if self.dt else 1j * omega
+        return np.asarray(self.horner(x, warn_infinite=False)[0, 0])
 
     def _gain_is_gone(self, fastest: float) -> float:
         """Find a frequency above which the gain of a system is too low for any margin."""
         omega = fastest * np.geomspace(1e-3, 1e5, 4000)
-        size = np.abs(self.horner(1j * omega, warn_infinite=False)[0, 0])
+        size = np.abs(self._at(omega))
         (large,) = np.nonzero(
             ~(size < 0.1 * DECIDES * min(1.0, float(np.median(size[:100])) or 1.0))
         )  # a gain that does not roll off is evaluated up to ten times the fastest pole

@@ -125,14 +125,10 @@ class HostResponses(HostMargins):
         """
         if set(settings) - PLAIN or not self.dt:
             return super().forced_response(timepts, inputs, initial_state, **settings)
-        given = np.atleast_2d(finite(inputs, "inputs"))
-        times = self._times(timepts, given.shape[-1])
-        rows = np.broadcast_to(given, (self.ninputs, times.size)) if given.size == 1 else given
-        if rows.shape != (self.ninputs, times.size):
-            raise DataError(
-                f"inputs has shape {np.shape(inputs)}; expected ({self.ninputs}, {times.size})"
-            )
-        outputs = self._simulated(np.ascontiguousarray(rows), self._state(initial_state))
+        given = finite(inputs, "inputs")
+        times = self._times(timepts, np.atleast_2d(given).shape[-1])
+        rows = self._input_rows(given, times.size)
+        outputs = self._simulated(rows, self._state(initial_state))
         return self._data(times, outputs, inputs=rows, plot_inputs=True, **settings)
 
     def initial_response(
@@ -308,12 +304,14 @@ class HostResponses(HostMargins):
 
     def _state(self, given: ArrayLike) -> FloatArray | None:
         """Check an initial state; None if it is zero."""
-        state = np.ravel(finite(given, "initial_state"))
-        if not np.any(state):
-            return None
-        if state.size not in (1, self.nstates):
-            raise DataError(f"initial_state has {state.size} values; expected {self.nstates}")
-        return np.broadcast_to(state, self.nstates).astype(np.float64)
+        return spread(given, self.nstates, "initial_state") if np.any(given) else None
+
+    def _input_rows(self, given: ArrayLike, count: int) -> FloatArray:
+        """Check inputs for `count` times; one number is for all of them."""
+        rows, shape = np.atleast_2d(finite(given, "inputs")), (self.ninputs, count)
+        if rows.size != 1 and rows.shape != shape:
+            raise DataError(f"inputs has shape {np.shape(given)}; expected {shape}")
+        return np.ascontiguousarray(np.broadcast_to(rows, shape))
 
     def _data(
         self, times: FloatArray, outputs: FloatArray, inputs: FloatArray | None = None, **more: Any
@@ -329,3 +327,11 @@ class HostResponses(HostMargins):
             sysname=self.name,
             **more,
         )
+
+
+def spread(given: ArrayLike, count: int, name: str) -> FloatArray:
+    """Return `count` values; one number is for all of them."""
+    values = np.ravel(finite(given, name))
+    if values.size not in (1, count):
+        raise DataError(f"{name} has {values.size} values; expected {count}")
+    return np.broadcast_to(values, count).astype(np.float64)

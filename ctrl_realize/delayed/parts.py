@@ -103,6 +103,19 @@ def named(
     return made
 
 
+def parts_of(core: ct.StateSpace) -> tuple[Matrices, float | None, list[str]]:
+    """Return what `with_core` needs of a core: a system of python-control cannot be stored."""
+    return (core.A, core.B, core.C, core.D), core.dt, core.state_labels
+
+
+def with_core(
+    kind: Any, matrices: Matrices, dt: float | None, states: list[str], **settings: Any
+) -> Any:
+    """Make a system of some kind from the parts of its core."""
+    core = ct.StateSpace(*matrices, dt, states=states, remove_useless_states=False)
+    return kind(core, **settings)
+
+
 def settled_values(
     values: ComplexArray, points: ComplexArray, *, warn_infinite: bool
 ) -> ComplexArray:

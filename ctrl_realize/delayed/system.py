@@ -11,12 +11,13 @@ transformation would move its d poles at 0 to |z| = eps^(1/d), 0.37 for d = 37.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from typing import Any, Self, TypeVar
+from collections.abc import Sequence
+from typing import Any, TypeVar
 
 import control as ct
 
 from .._checks import system_name
+from .._shown import shown_alike
 from ..errors import DelayRangeError, OptionError, UnsuitableSystemError
 from ..results import Drawable, ModelFit
 from .algebra import DelayedAlgebra
@@ -24,7 +25,7 @@ from .analysis import DelayedAnalysis
 from .cards import DelayedCards
 from .chains import parse_delays
 from .operators import ENDS
-from .parts import MAX_DELAY, check_core, named, signal_names
+from .parts import MAX_DELAY, check_core, named, parts_of, signal_names, with_core
 from .responses import DelayedResponses
 
 AnyFit = TypeVar("AnyFit", bound=ModelFit)
@@ -164,7 +165,17 @@ class DelayedStateSpace(
 
     def replace(self, **changes: Any) -> DelayedStateSpace:
         """Copy the system with another `delay`, `output_delay`, `fit`, `name` or labels."""
-        settings: dict[str, Any] = {
+        settings = self._settings()
+        unknown = set(changes) - set(settings)
+        if unknown:
+            raise TypeError(f"replace() takes {', '.join(settings)}; got {', '.join(unknown)}")
+        settings.update(changes)
+        made = DelayedStateSpace(self.delay_free, settings.pop("delay"), **settings)
+        copy: DelayedStateSpace = shown_alike(made, self._state_names, self._repr_format)
+        return copy
+
+    def _settings(self) -> dict[str, Any]:
+        return {
             "delay": self.input_delays,
             "output_delay": self.output_delays,
             "fit": self.fit,
@@ -172,39 +183,9 @@ class DelayedStateSpace(
             "inputs": self.input_labels,
             "outputs": self.output_labels,
         }
-        unknown = set(changes) - set(settings)
-        if unknown:
-            raise TypeError(f"replace() takes {', '.join(settings)}; got {', '.join(unknown)}")
-        settings.update(changes)
-        made = DelayedStateSpace(self.delay_free, settings.pop("delay"), **settings)
-        return made._as_shown(self._state_names, self._repr_format)
 
-    def _as_shown(self, states: Iterable[str] | None, repr_format: str | None) -> Self:
-        """Copy user-defined state names, if they fit, and `repr_format`."""
-        if states is not None and len(labels := list(states)) == self.nstates:
-            self.set_states(labels)
-        self.repr_format = repr_format
-        return self
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        core = self.delay_free
-        settings = {
-            "output_delay": self.output_delays,
-            "fit": self.fit,
-            "name": self.name,
-            "inputs": self.input_labels,
-            "outputs": self.output_labels,
-        }
-        given = None if self._state_names is None else list(self._state_names)
-        matrices = core.A, core.B, core.C, core.D, core.dt
-        return _rebuild, (
-            matrices, core.state_labels, self.input_delays, settings, given, self._repr_format,
-        )  # fmt: skip
-
-    def __deepcopy__(self, memo: dict[int, Any]) -> DelayedStateSpace:
-        # Everything inside is read-only and may be shared; the closures of python-control must
-        # not be, and a new object makes its own.
-        return self.replace()
+    def _made_by(self) -> tuple[Any, ...]:
+        return with_core, (type(self), *parts_of(self.delay_free)), self._settings()
 
 
 def fit_of(system: DelayedStateSpace, kind: type[AnyFit]) -> AnyFit:
@@ -220,15 +201,3 @@ def fit_of(system: DelayedStateSpace, kind: type[AnyFit]) -> AnyFit:
             f"the fit of {system.name!r} is {system.fit!r}; expected a {kind.__name__}"
         )
     return system.fit
-
-
-def _rebuild(
-    matrices: tuple[Any, ...],
-    core_states: list[str],
-    delay: tuple[int, ...],
-    settings: dict[str, Any],
-    states: list[str] | None,
-    repr_format: str | None,
-) -> DelayedStateSpace:
-    core = ct.StateSpace(*matrices, states=core_states, remove_useless_states=False)
-    return DelayedStateSpace(core, delay, **settings)._as_shown(states, repr_format)

@@ -176,7 +176,7 @@ class DelayLineController(ShownSystem, DelayOperators):
         """Describe the controller and its closed loop as plain text."""
         return text_card(*self._card())
 
-    def __reduce__(self) -> tuple[Any, ...]:
+    def _made_by(self) -> tuple[Any, ...]:
         settings = {
             "name": self.name,
             "inputs": self.input_labels[0],
@@ -184,16 +184,11 @@ class DelayLineController(ShownSystem, DelayOperators):
             "pulses": self._pulses,
             **self._design(),
         }
-        return _rebuild, (type(self), self._parts, self.dt, settings)
+        return type(self), (*self._parts, self.dt), settings
 
     def _design(self) -> dict[str, Any]:
         """Further arguments of a subclass that describe its design."""
         return {}
-
-    def __deepcopy__(self, memo: dict[int, Any]) -> DelayLineController:
-        build, arguments = self.__reduce__()
-        copy: DelayLineController = build(*arguments)
-        return copy
 
     def paths(self, z: ComplexArray) -> tuple[ComplexArray, ComplexArray]:
         """Split the response into forward / back; the zeros of `back` are the controller's poles.
@@ -233,13 +228,3 @@ class DelayLineController(ShownSystem, DelayOperators):
 
 def _radius(A: FloatArray) -> float:
     return float(np.abs(np.linalg.eigvals(A)).max(initial=0.0))
-
-
-def _rebuild(
-    kind: type[DelayLineController],
-    parts: tuple[FloatArray, ...],
-    dt: float,
-    settings: dict[str, Any],
-) -> DelayLineController:
-    A, B, C, D, E, h = parts
-    return kind(A, B, C, D, E, h, dt, **settings)

@@ -12,6 +12,7 @@ from ..._checks import finite, positive
 from ...errors import DataError, ModelWarning, UnsuitableSystemError, warn_caller
 from ...numerics.arrays import FloatArray
 from ...numerics.internal_delays.equation import Solution, TooManyStepsError, solve
+from ..host_responses import spread
 from .poles import InsidePoles
 
 POINTS = 401
@@ -46,7 +47,7 @@ class Motion(InsidePoles):
 
             breaks = np.zeros(0)
         else:
-            rows = _rows(inputs, m, times.size)
+            rows = self._input_rows(inputs, times.size)
 
             def signal(t: FloatArray) -> FloatArray:
                 return np.stack([np.interp(t, times, row) for row in rows])
@@ -56,18 +57,8 @@ class Motion(InsidePoles):
         found = self._solved(
             signal, times, breaks, tolerance, initial_state=initial_state, history=history
         )
-        return ct.TimeResponseData(
-            times,
-            found.outputs,
-            inputs=signal(times),
-            issiso=self.issiso(),
-            input_labels=self.input_labels,
-            output_labels=self.output_labels,
-            sysname=self.name,
-            plot_inputs=True,
-            squeeze=squeeze,
-            transpose=transpose,
-        )
+        options = {"squeeze": squeeze, "transpose": transpose, "plot_inputs": True}
+        return self._data(times, found.outputs, signal(times), **options)
 
     def _unit_motion(
         self,
@@ -109,8 +100,8 @@ class Motion(InsidePoles):
     ) -> Solution:
         form = self._form()
         wanted = positive(tolerance, "tolerance", "largest error, relative to the largest output")
-        state = _spread(initial_state, form.states, "initial_state")
-        before = _spread(history, len(form.delays), "history")
+        state = spread(initial_state, form.states, "initial_state")
+        before = spread(history, len(form.delays), "history")
         try:
             found = solve(
                 form,
@@ -168,19 +159,3 @@ def _checked_times(timepts: ArrayLike | None, name: str) -> FloatArray:
     if times.ndim != 1 or times.size < 2 or times[0] != 0 or np.any(np.diff(times) <= 0):
         raise DataError("timepts must increase from 0 and have at least two values")
     return times
-
-
-def _rows(inputs: ArrayLike, m: int, count: int) -> FloatArray:
-    given = np.atleast_2d(finite(inputs, "inputs"))
-    if given.size == 1:
-        return np.full((m, count), float(given.ravel()[0]))
-    if given.shape != (m, count):
-        raise DataError(f"inputs has shape {np.shape(inputs)}; expected ({m}, {count})")
-    return given
-
-
-def _spread(given: ArrayLike, count: int, name: str) -> FloatArray:
-    values = np.ravel(finite(given, name))
-    if values.size not in (1, count):
-        raise DataError(f"{name} has {values.size} values; expected {count}")
-    return np.broadcast_to(values, count).astype(np.float64)

@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import control as ct
 import numpy as np
-from scipy.optimize import brentq
 
-from ..._checks import integer, real
+from ..._checks import integer
 from ...errors import UnsuitableSystemError
 from ...numerics.arrays import ComplexArray
 from ...numerics.internal_delays import characteristic, dominant, spectrum, stability
@@ -114,31 +111,6 @@ class InsidePoles(HostResponses, DelayOperators):
         """
         return 0.0 if self.dt else spectrum.neutral_gain(self._form())
 
-    def bandwidth(self, dbdrop: float = -3) -> float:
-        """Lowest frequency in rad/s at which the gain is `dbdrop` dB below that at 0."""
-        if not self.issiso():
-            raise TypeError("system should be a SISO system")
-        drop = real(dbdrop, "dbdrop", "drop of the gain in dB, below 0")
-        if drop >= 0:
-            raise ValueError("expecting dbdrop be a negative scalar in dB")
-        level = abs(self.dcgain()) * 10 ** (drop / 20)
-        if not np.isfinite(level):
-            return float("nan")
-
-        def excess(omega: Any) -> Any:
-            s = 1j * np.atleast_1d(omega)
-            points = np.exp(s * float(self.dt)) if self.dt else s
-            return np.abs(self.horner(points, warn_infinite=False)[0, 0]) - level
-
-        grid = stability.grid(self._form(), float(self.dt or 0))
-        (below,) = np.nonzero(excess(grid) < 0)
-        if below.size == 0:
-            return float("inf")
-        first = int(below[0])
-        if first == 0:
-            return float(grid[0])
-        return float(brentq(lambda w: float(excess(w)[0]), grid[first - 1], grid[first]))
-
     def characteristic(self, x: ComplexArray) -> ComplexArray:
         """Evaluate a function whose zeros are the poles, and which has no unstable poles.
 
@@ -190,11 +162,6 @@ class InsidePoles(HostResponses, DelayOperators):
                 "sample time, or the zeros of single channels (sys[i, j].zeros())"
             )
         return np.asarray(super().zeros(), dtype=np.complex128)
-
-    def damp(self) -> Any:
-        """Natural frequency, damping and poles; poles at z = 0 have infinite frequency."""
-        with np.errstate(divide="ignore", invalid="ignore"):
-            return super().damp()
 
     def features(self) -> tuple[ComplexArray, float]:
         """Poles in the s-plane where the response changes quickly, and the largest delay in s."""

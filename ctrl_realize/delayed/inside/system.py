@@ -7,7 +7,7 @@ sums of those.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from typing import Any, Self
 
 import control as ct
@@ -22,7 +22,7 @@ from ...numerics.internal_delays.response import Response
 from ..chains import Matrices
 from ..operands import plain
 from ..operators import INSIDE, DelayOperators
-from ..parts import named, signal_names
+from ..parts import named, parts_of, signal_names, with_core
 from .cards import InsideCards
 from .checks import check_core, check_delays, not_rational, without_zeros
 from .conversions import InsideConversions
@@ -206,39 +206,14 @@ class DelaySystem(InsideResponses, InsideConversions, InsideCards, DelayOperator
         """Return the system itself: its structure already has the fewest delays."""
         return self._joined(self._form(), self.dt, self.input_labels, self.output_labels)
 
-    def __reduce__(self) -> tuple[Any, ...]:
-        core = self._core
-        names = {
+    def _made_by(self) -> tuple[Any, ...]:
+        settings = {
+            "internal_delays": self.internal_delays,
             "name": self.name,
             "inputs": self.input_labels,
             "outputs": self.output_labels,
         }
-        matrices = core.A, core.B, core.C, core.D, core.dt
-        given = None if self._state_names is None else list(self._state_names)
-        parts = matrices, core.state_labels, self.internal_delays, names, given, self._repr_format
-        return _rebuild, (type(self), *parts)
-
-    def __deepcopy__(self, memo: dict[int, Any]) -> DelaySystem:
-        build, parts = self.__reduce__()
-        copy: DelaySystem = build(*parts)
-        return copy
-
-
-def _rebuild(
-    kind: type[DelaySystem],
-    matrices: tuple[Any, ...],
-    states: list[str],
-    delays: tuple[float, ...],
-    names: dict[str, Any],
-    given: Iterable[str] | None,
-    repr_format: str | None,
-) -> DelaySystem:
-    core = ct.StateSpace(*matrices, states=states, remove_useless_states=False)
-    made = kind(core, delays, **names)
-    if given is not None and len(labels := list(given)) == made.nstates:
-        made.set_states(labels)
-    made.repr_format = repr_format
-    return made
+        return with_core, (type(self), *parts_of(self._core)), settings
 
 
 def _ends_of(system: DelaySystem) -> ct.StateSpace:

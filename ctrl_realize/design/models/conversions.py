@@ -113,8 +113,8 @@ class ContinuousModel(Result):
     def __reduce__(self) -> tuple[Any, ...]:
         # python-control's systems cannot be pickled.
         core = self.core
-        parts = (core.A, core.B, core.C, core.D, core.name, core.input_labels, core.output_labels)
-        return _rebuild_model, (*parts, self.dead_time, self.dt)
+        names = {"name": core.name, "inputs": core.input_labels, "outputs": core.output_labels}
+        return _rebuild_model, ((core.A, core.B, core.C, core.D), names, self.dead_time, self.dt)
 
     @property
     def system(self) -> DelaySystem:
@@ -159,18 +159,9 @@ class ContinuousModel(Result):
 
 
 def _rebuild_model(
-    A: FloatArray,
-    B: FloatArray,
-    C: FloatArray,
-    D: FloatArray,
-    name: str,
-    inputs: list[str],
-    outputs: list[str],
-    dead_time: float,
-    dt: float,
+    matrices: tuple[FloatArray, ...], names: dict[str, Any], dead_time: float, dt: float
 ) -> ContinuousModel:
-    core = ct.StateSpace(A, B, C, D, 0, name=name, inputs=inputs, outputs=outputs)
-    return ContinuousModel(core, dead_time, dt)
+    return ContinuousModel(ct.StateSpace(*matrices, 0, **names), dead_time, dt)
 
 
 @single_threaded

@@ -169,11 +169,8 @@ class PIDController(ShownSystem, Delivered, BesideDelays):
         names = ("dt", "method", "rule", "model", "name", "check", "gain_unit", "time_unit")
         return {name: getattr(self, name) for name in names}
 
-    def __reduce__(self) -> tuple[Any, ...]:
-        return _rebuild, ((self.kp, self.ti, self.td, self.tf), self._settings())
-
-    def __deepcopy__(self, memo: dict[int, Any]) -> PIDController:
-        return self._again()
+    def _made_by(self) -> tuple[Any, ...]:
+        return PIDController, self.ideal, self._settings()
 
     def _repr_eval_(self) -> str:
         parameters = ", ".join(
@@ -230,7 +227,3 @@ class PIDController(ShownSystem, Delivered, BesideDelays):
             flags = [str(flag) for flag in self.check.flags]
         rows.append(("to enter it", ".as_form(name), .forms(); .algorithm() has limits and code"))
         return Card(f"PID controller {self.name}", rows, flags=flags)
-
-
-def _rebuild(parameters: tuple[float, ...], settings: dict[str, Any]) -> PIDController:
-    return PIDController(*parameters, **settings)
