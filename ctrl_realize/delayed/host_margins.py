@@ -10,12 +10,12 @@ import numpy as np
 from scipy.optimize import brentq
 
 from .._checks import real
-from ..errors import UnsuitableSystemError
 from ..numerics.arrays import ComplexArray, FloatArray
 from ..numerics.internal_delays.form import DelayForm
 from ..numerics.internal_delays.stability import grid
 from ..numerics.loops.crossings import follow, frequency_grid
 from .deferred import DeferredMatrices
+from .parts import check_single
 
 FINE = 0.1
 """Phase in rad between the points of a response from which margins are interpolated: the cubic
@@ -48,11 +48,7 @@ class HostMargins(DeferredMatrices):
         UnsuitableSystemError
             More than one input or output.
         """
-        if not self.issiso():
-            raise UnsuitableSystemError(
-                f"{self.name!r} has {self.ninputs} inputs and {self.noutputs} outputs; margins are "
-                "those of one of each"
-            )
+        check_single(self, "a margin")
         omega, values = self._followed()
         phase = np.degrees(np.unwrap(np.angle(values)))
         return iter((np.abs(values), phase, omega))

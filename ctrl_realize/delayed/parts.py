@@ -170,6 +170,15 @@ def check_entries(system: Any) -> None:
         raise UnsuitableSystemError(f"{name} has non-finite entries; expected finite numbers")
 
 
+def check_single(system: Any, purpose: str) -> None:
+    """Refuse a system with several inputs or outputs."""
+    if not system.issiso():
+        raise UnsuitableSystemError(
+            f"{purpose} needs one input and one output; {system.name!r} has {system.ninputs} "
+            f"inputs and {system.noutputs} outputs. Take one channel, such as sys[0, 0]"
+        )
+
+
 def signal_names(given: str | Sequence[str] | None, core: Sequence[str], letter: str) -> list[str]:
     """Name signals: as given, as those of the core, or by a letter if the core has no names."""
     if given is not None:

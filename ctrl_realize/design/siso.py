@@ -10,7 +10,7 @@ import numpy as np
 from .._checks import band
 from ..delayed import DelayedStateSpace, DelaySystem
 from ..delayed.operands import check_proper
-from ..delayed.parts import check_entries
+from ..delayed.parts import check_entries, check_single
 from ..errors import OptionError, UnsuitableSystemError
 
 FEW_STATES = 200
@@ -29,11 +29,8 @@ def delayed_system(system: Any, purpose: str, *, siso: bool = True) -> DelayedSt
         raise UnsuitableSystemError(
             f"{purpose} needs a discrete system; got a {type(system).__name__}"
         )
-    if siso and not system.issiso():
-        raise UnsuitableSystemError(
-            f"{purpose} needs one input and one output; {system.name!r} has {system.ninputs} "
-            f"inputs and {system.noutputs} outputs"
-        )
+    if siso:
+        check_single(system, purpose)
     if isinstance(system, DelayedStateSpace):
         return system
     if isinstance(system, DelaySystem) and (not system.dt or system.nstates > FEW_STATES):
@@ -64,11 +61,7 @@ def core_and_dead_time(system: Any, purpose: str) -> tuple[ct.StateSpace, float]
     UnsuitableSystemError
         Several channels, or a dead time in a loop or one of several paths.
     """
-    if not system.issiso():
-        raise UnsuitableSystemError(
-            f"{purpose} needs one input and one output; {system.name!r} has {system.ninputs} "
-            f"inputs and {system.noutputs} outputs"
-        )
+    check_single(system, purpose)
     if not isinstance(system, DelaySystem):
         return proper_ss(system, purpose), 0.0
     rest, dead_time = system.delay_apart()
@@ -99,11 +92,7 @@ def same_rate(controller: Any, dt: float, purpose: str) -> ct.StateSpace:
         check_entries(controller)
         return ct.ss([], [], [], float(controller), dt)
     system = proper_ss(controller, purpose)
-    if not system.issiso():
-        raise UnsuitableSystemError(
-            f"{purpose} needs a controller with one input and one output; {system.name!r} has "
-            f"{system.ninputs} inputs and {system.noutputs} outputs"
-        )
+    check_single(system, f"a controller for {purpose}")
     if system.dt is None:
         return ct.StateSpace(system, dt) if system.nstates else ct.ss([], [], [], system.D, dt)
     if system.dt is True or not np.isclose(system.dt, dt, rtol=1e-6, atol=0.0):

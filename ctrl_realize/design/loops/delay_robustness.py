@@ -104,25 +104,8 @@ def _continuous(system: Any, controller: Any, given: tuple[float, float] | None)
     core, nominal = core_and_dead_time(system, "robustness to the dead time")
     interval = _interval(system, given)
     loop = open_loop(core, controller, nominal)
-    found = loop_margins(loop)
     delays = np.unique([*np.linspace(*interval, MAX_DELAYS), nominal])
-    sizes = np.array(
-        [
-            _modulus(found if d == nominal else loop_margins(replace(loop, dead_time=float(d))))
-            for d in delays
-        ]
-    )
-    earlier, later = _room(found)
-    return DelayRobustness(
-        delays=read_only(delays),
-        stable_at=locked(sizes > 0),
-        modulus_margin=read_only(sizes),
-        dead_time_interval=interval,
-        nominal=nominal,
-        dt=0.0,
-        stable_from=float(np.maximum(0.0, nominal - earlier)),
-        stable_to=nominal + later,
-    )
+    return _tried(loop, loop_margins(loop), delays, interval, nominal)
 
 
 def over_interval(
@@ -142,29 +125,40 @@ def over_interval(
     last = int(np.ceil((high + held) / dt - 1e-9))
     step = max(1, -(-(last - first) // (most - 1)))
     delays = np.unique([*range(first, last, step), last, nominal]).astype(np.int64)
-    sizes = np.array([_modulus(found if d == nominal else _at(loop, int(d))) for d in delays])
-    earlier, later = _room(found)
+    return _tried(loop, found, delays, interval, nominal, held)
+
+
+def _tried(
+    loop: Loop,
+    found: Margins,
+    delays: Any,
+    interval: tuple[float, float],
+    nominal: float,
+    held: float = 0.0,
+) -> DelayRobustness:
+    """Compute the margins at each delay, in samples, or in s for a continuous loop."""
+    margins = [found if d == nominal else loop_margins(_with_delay(loop, d)) for d in delays]
+    sizes = np.array([one.modulus_margin if one.stable else 0.0 for one in margins])
+    (earlier, later), unit = _room(found), loop.dt or 1.0
     return DelayRobustness(
         delays=locked(delays),
         stable_at=locked(sizes > 0),
         modulus_margin=read_only(sizes),
         dead_time_interval=interval,
         nominal=nominal,
-        dt=dt,
-        stable_from=float(np.maximum(0.0, dt * (nominal - earlier) - held)),
-        stable_to=dt * (nominal + later) - held,
+        dt=loop.dt,
+        stable_from=float(np.maximum(0.0, unit * (nominal - earlier) - held)),
+        stable_to=unit * (nominal + later) - held,
         fractional_time=held,
     )
 
 
-def _at(loop: Loop, delay: int) -> Margins:
+def _with_delay(loop: Loop, delay: float) -> Loop:
+    if not loop.dt:
+        return replace(loop, dead_time=float(delay))
     # The matrices for such a long delay are not needed for its response.
-    plant = replace(loop.factors[0], delay=delay)
-    return loop_margins(replace(loop, factors=(plant, *loop.factors[1:])))
-
-
-def _modulus(found: Margins) -> float:
-    return found.modulus_margin if found.stable else 0.0
+    plant = replace(loop.factors[0], delay=int(delay))
+    return replace(loop, factors=(plant, *loop.factors[1:]))
 
 
 def _room(found: Margins) -> tuple[float, float]:

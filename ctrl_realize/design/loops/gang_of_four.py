@@ -10,6 +10,7 @@ import numpy as np
 from ...delayed import DelaySystem
 from ...delayed.operands import common_dt
 from ...delayed.operators import DelayOperators
+from ...delayed.parts import check_single
 from ...errors import UnsuitableSystemError
 from ..siso import proper_ss
 
@@ -76,9 +77,5 @@ def _with_delays(system: Any, dt: float | None) -> Any:
     if not isinstance(system, DelayOperators):
         plain = proper_ss(system, "a loop")
         system = DelaySystem(ct.StateSpace(plain, dt=dt))
-    if not system.issiso():
-        raise UnsuitableSystemError(
-            f"{system.name!r} has {system.ninputs} inputs and {system.noutputs} outputs; expected "
-            "one of each"
-        )
+    check_single(system, "a loop")
     return system

@@ -12,7 +12,7 @@ from ..._checks import positive
 from ..._wording import in_time
 from ...delayed import DelayedStateSpace, DelaySystem
 from ...errors import ModelWarning, UnsuitableSystemError, warn_caller
-from ...numerics.arrays import FloatArray
+from ...numerics.arrays import ComplexArray, FloatArray
 from ...numerics.blas_threads import single_threaded
 from ...numerics.loops.circle import damped_circle, step_on_circle
 from ..resolved import warn_unresolved
@@ -94,28 +94,29 @@ def step_responses(
     -------
     setpoint, load : ndarray, shape (count,)
     """
-    z = damped_circle(count)
-    loop = open_loop(plant, controller)
-    values = np.ones(z.size, dtype=np.complex128)
-    for factor in loop.factors:
-        values = values * factor.response(z - 1) * z ** (-factor.delay)
-    process = np.asarray(plant.horner(z)[0, 0])
+    z, values, process = _on_circle(plant, controller, count)
     setpoint = step_on_circle(values / (1 + values), z, count)
     load = step_on_circle(process / (1 + values), z, count)
     return setpoint, load
+
+
+def _on_circle(
+    plant: DelayedStateSpace, controller: Any, count: int
+) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
+    """Points of a circle with the responses of the open loop and of the plant."""
+    z = damped_circle(count)
+    values = np.ones(z.size, dtype=np.complex128)
+    for factor in open_loop(plant, controller).factors:
+        values = values * factor.response(z - 1) * z ** (-factor.delay)
+    return z, values, np.asarray(plant.horner(z)[0, 0])
 
 
 def controller_responses(
     plant: DelayedStateSpace, controller: Any, count: int
 ) -> tuple[FloatArray, FloatArray]:
     """Output of the controller after unit steps of set-point and of load; see `step_responses`."""
-    z = damped_circle(count)
-    loop = open_loop(plant, controller)
-    values = np.ones(z.size, dtype=np.complex128)
-    for factor in loop.factors:
-        values = values * factor.response(z - 1) * z ** (-factor.delay)
+    z, values, process = _on_circle(plant, controller, count)
     closed = values / (1 + values)
-    process = np.asarray(plant.horner(z)[0, 0])
     return step_on_circle(closed / process, z, count), -step_on_circle(closed, z, count)
 
 
@@ -194,9 +195,7 @@ def continuous_performance(plant: DelaySystem, controller: Any, total_time: floa
         times = np.linspace(0, end, POINTS)
         setpoint = np.asarray(loop.step_response(times, tolerance=SETTLED / 100).outputs)
         load = np.asarray(to_load.step_response(times, tolerance=SETTLED / 100).outputs)
-        tail = slice(-POINTS // 20, None)
-        left = max(np.ptp(setpoint[tail]), np.ptp(load[tail]) / max(np.abs(load).max(), 1e-300))
-        if left < SETTLED:
+        if _still(setpoint, load, POINTS // 20 + 1):
             break
         end *= 2
     else:
@@ -250,14 +249,16 @@ def settled_responses(
     while True:
         # Half of the record is discarded: circular wrap-around shows at the end.
         setpoint, load = (y[: count // 2] for y in step_responses(plant, controller, count))
-        tail = slice(-max(1, count // 40), None)
-        left = max(
-            np.ptp(setpoint[tail]),
-            np.ptp(load[tail]) / max(np.abs(load).max(), 1e-300),
-        )
-        if left < SETTLED or count >= LONGEST:
-            return setpoint, load, bool(left < SETTLED)
+        settled = _still(setpoint, load, max(1, count // 40))
+        if settled or count >= LONGEST:
+            return setpoint, load, settled
         count *= 2
+
+
+def _still(setpoint: FloatArray, load: FloatArray, last: int) -> bool:
+    """Whether both responses have settled over their last samples."""
+    moving = np.ptp(setpoint[-last:]), np.ptp(load[-last:]) / max(np.abs(load).max(), 1e-300)
+    return bool(max(moving) < SETTLED)
 
 
 def measured(setpoint: FloatArray, load: FloatArray, dt: float) -> Performance:
@@ -269,21 +270,18 @@ def measured(setpoint: FloatArray, load: FloatArray, dt: float) -> Performance:
         setpoint_error=float("inf") if kept[0] else float(np.abs(1 - setpoint).sum() * dt),
         load_error=float("inf") if kept[1] else float(np.abs(load).sum() * dt),
         overshoot=_overshoot(float(setpoint.max()) / final) if final else float("nan"),
-        settling_time=settling(setpoint) * dt,
+        settling_time=settling(setpoint, final) * dt,
     )
 
 
 def lasting(setpoint: FloatArray, load: FloatArray) -> int:
     """Samples until both responses stay within 2 % of their ends (for the load: of its peak)."""
-    away = np.abs(load - load[-1])
-    moving = np.flatnonzero(away > SETTLING_BAND * np.abs(load).max())
-    return max(settling(setpoint), int(moving[-1]) + 1 if moving.size else 0)
+    return max(settling(setpoint, setpoint[-1]), settling(load, np.abs(load).max()))
 
 
-def settling(response: FloatArray) -> int:
-    """First sample from which on a response stays within 2 % of its final value."""
-    away = np.abs(response - response[-1])
-    outside = np.flatnonzero(away > SETTLING_BAND * abs(response[-1]))
+def settling(response: FloatArray, size: float) -> int:
+    """First sample from which on a response stays within 2 % of a size about its final value."""
+    outside = np.flatnonzero(np.abs(response - response[-1]) > SETTLING_BAND * abs(size))
     return int(outside[-1]) + 1 if outside.size else 0
 
 

@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..._checks import numbers, real
-from ...errors import DataError, OptionError, UnsuitableSystemError
+from ...delayed.parts import check_single
+from ...errors import DataError, OptionError
 from ...numerics.arrays import FloatArray
 from ...numerics.loops.crossings import follow
 from ...numerics.rational.phase import dead_time_from_phase, unwrap_with_dead_time
@@ -82,10 +83,7 @@ def unwrapped_phase(
 
 
 def _of_data(data: ct.FrequencyResponseData, dead_time: float | None) -> FloatArray:
-    if not data.issiso():
-        raise UnsuitableSystemError(
-            f"{data.name!r} has {data.ninputs} inputs and {data.noutputs} outputs; take one channel"
-        )
+    check_single(data, "a phase")
     omega = np.asarray(data.omega, dtype=np.float64)
     order = np.argsort(omega)
     values = np.asarray(data.frdata[0, 0], dtype=np.complex128)[order]

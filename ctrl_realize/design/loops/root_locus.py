@@ -11,7 +11,8 @@ from scipy.optimize import linear_sum_assignment
 
 from ..._checks import integer, numbers
 from ...delayed import DelayedStateSpace, DelaySystem
-from ...errors import DataError, UnsuitableSystemError
+from ...delayed.parts import check_single
+from ...errors import DataError
 from ...numerics.arrays import ComplexArray, FloatArray
 from ...numerics.blas_threads import single_threaded
 from ..siso import proper_ss
@@ -99,11 +100,7 @@ def _with_delays(system: Any) -> Any:
     if not isinstance(system, (DelayedStateSpace, DelaySystem)):
         plain = proper_ss(system, "a root locus")
         system = DelaySystem(plain, name=plain.name)
-    if not system.issiso():
-        raise UnsuitableSystemError(
-            f"a root locus needs one input and one output; {system.name!r} has {system.ninputs} "
-            f"inputs and {system.noutputs} outputs"
-        )
+    check_single(system, "a root locus")
     return system
 
 

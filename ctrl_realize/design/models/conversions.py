@@ -12,6 +12,7 @@ import numpy as np
 from ..._checks import positive
 from ..._wording import in_time
 from ...delayed import DelayedStateSpace, DelaySystem, delay, delayed_ss
+from ...delayed.parts import check_single
 from ...errors import OptionError, UnsuitableSystemError
 from ...numerics.arrays import FloatArray
 from ...numerics.blas_threads import single_threaded
@@ -135,8 +136,7 @@ class ContinuousModel(Result):
         """Continuous system with the dead time as a Pade approximant, see `pade_ss`."""
         if self.dead_time == 0:
             return self.core
-        if not self.core.issiso():
-            raise UnsuitableSystemError("pade is for one input and one output")
+        check_single(self.core, "pade")
         return self.core * pade_ss(self.dead_time, order)
 
     def _title(self) -> str:

@@ -11,6 +11,7 @@ from scipy.optimize import least_squares
 
 from ..._checks import one_of
 from ...delayed import DelayedStateSpace
+from ...delayed.parts import check_single
 from ...errors import UnsuitableSystemError
 from ...numerics.arrays import FloatArray
 from ...numerics.blas_threads import single_threaded
@@ -182,11 +183,7 @@ def _dead_time(plant: DelayedStateSpace) -> float:
 
 def _step_record(plant: DelayedStateSpace) -> tuple[FloatArray, FloatArray, bool, float]:
     """Step response until it has settled (or follows its ramp), thinned; and its gain."""
-    if not plant.issiso():
-        raise UnsuitableSystemError(
-            f"a reduction needs one input and one output; {plant.name!r} has {plant.ninputs} "
-            f"inputs and {plant.noutputs} outputs"
-        )
+    check_single(plant, "a reduction")
     dt, core = plant.dt, plant.delay_free
     poles = np.asarray(core.poles())
     at_one = np.abs(poles - 1) < 1e-9

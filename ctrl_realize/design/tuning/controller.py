@@ -16,7 +16,7 @@ from ...errors import OptionError
 from ...numerics.arrays import FloatArray
 from ..loops.loop_check import LoopCheck
 from ..models.process_model import ProcessModel
-from .algorithm import DISCRETIZATIONS as DISCRETIZATIONS
+from .algorithm import DISCRETIZATIONS, SHARES
 from .delivery import Delivered
 
 
@@ -130,8 +130,7 @@ class PIDController(ShownSystem, Delivered, BesideDelays):
         if h == 0:
             return 0.0, 1.0, self.kp / self.ti, 0.0
         share = self.kp * h / self.ti
-        direct = {"forward": 0.0, "tustin": 0.5, "backward": 1.0}[self.method]
-        return 1.0, 1.0, share, share * direct
+        return 1.0, 1.0, share, share * SHARES[self.method]
 
     def _derivative(self, h: float) -> tuple[float, float, float, float]:
         if h == 0:

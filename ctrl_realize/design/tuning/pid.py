@@ -18,7 +18,8 @@ from ..loops.loop_check import MOST_SENSITIVE, loop_check, refuse_unstable, warn
 from ..loops.margins import margins
 from ..models.process_model import ProcessModel
 from ..models.reduction import METHODS as REDUCTIONS
-from .controller import DISCRETIZATIONS, PIDController
+from .algorithm import DISCRETIZATIONS
+from .controller import PIDController
 from .optimal import optimal
 from .plant import reduced, reference_plant, total_time
 from .rules import MODEL_RULES, SYSTEM_RULES, Parameters, kinds_of, ultimate
