@@ -140,6 +140,14 @@ def one_of(value: Choice, name: str, choices: tuple[str, ...]) -> Choice:
     raise OptionError(f"{name}={value!r}; choose one of {', '.join(map(repr, choices))}")
 
 
+def check_type(
+    value: object, kind: Any, name: str, expected: str, error: type[Exception] = DataError
+) -> None:
+    """Refuse a value that is not of a type, or of one of several."""
+    if not isinstance(value, kind):
+        raise error(f"{name} is a {type(value).__name__}; expected {expected}")
+
+
 def spelled_out(text: str) -> str:
     """Escape lone surrogates, as in file names that are not UTF-8, so that the text is writable."""
     return text.encode("utf-8", "backslashreplace").decode("utf-8")

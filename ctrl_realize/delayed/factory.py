@@ -9,7 +9,7 @@ from typing import Any
 import control as ct
 import numpy as np
 
-from .._checks import positive, real
+from .._checks import check_type, positive, real
 from ..errors import DelayRangeError, OptionError, UnsuitableSystemError
 from ..numerics.state_space.sampling import sample_with_dead_time, split_dead_time
 from ..results import ModelFit
@@ -79,10 +79,11 @@ def delayed_ss(
     >>> cr.delayed_ss(lag, dead_time=0.025, dt=0.01)
     <DelayedStateSpace: u -> y, order 1, z^-3 (0.03 s), dt = 0.01 s>
     """
-    if not isinstance(core, (ct.StateSpace, ct.TransferFunction)):
-        raise UnsuitableSystemError(
-            f"core is a {type(core).__name__}; expected a control.StateSpace or TransferFunction"
-        )
+    kinds, expected = (
+        (ct.StateSpace, ct.TransferFunction),
+        "a control.StateSpace or TransferFunction",
+    )
+    check_type(core, kinds, "core", expected, UnsuitableSystemError)
     if delay is not None and dead_time is not None:
         raise OptionError(f"delay={delay!r} and dead_time={dead_time!r}: expected one of them")
     if isinstance(core, ct.TransferFunction):

@@ -9,7 +9,7 @@ from typing import Any
 import control as ct
 import numpy as np
 
-from .._checks import system_names
+from .._checks import check_type, system_names
 from ..errors import OptionError, UnsuitableSystemError
 from ..numerics.arrays import ComplexArray, IntArray, read_only
 from .chains import Matrices, augment, chain_labels
@@ -134,11 +134,8 @@ def settled_values(
 
 def check_core(core: Any) -> None:
     """Refuse what is not a discrete state-space system with a sample time."""
-    if not isinstance(core, ct.StateSpace):
-        raise UnsuitableSystemError(
-            f"core is a {type(core).__name__}; expected a discrete control.StateSpace "
-            "(delayed_ss also takes transfer functions)"
-        )
+    expected = "a discrete control.StateSpace (delayed_ss also takes transfer functions)"
+    check_type(core, ct.StateSpace, "core", expected, UnsuitableSystemError)
     if core.dt is None or core.dt is True or not core.dt > 0:
         raise UnsuitableSystemError(
             f"the core's dt is {core.dt!r}; expected a sample time in s (delayed_ss samples a "

@@ -8,7 +8,7 @@ from typing import Any, Literal
 import control as ct
 import numpy as np
 
-from .._checks import one_of
+from .._checks import check_type, one_of
 from ..data import Record
 from ..data.given import check_complete, check_input
 from ..errors import DataError, UnsuitableSystemError
@@ -108,10 +108,8 @@ def _through_outputs(responses: FloatArray, model: DelayedStateSpace) -> FloatAr
 
 def as_delayed(system: Any, record: Record, *, stable: bool = True) -> DelayedStateSpace:
     """Check that a system fits a record; add zero delays if it has none."""
-    if not isinstance(system, (ct.StateSpace, ct.TransferFunction)):
-        raise UnsuitableSystemError(
-            f"system is a {type(system).__name__}; expected a discrete control.StateSpace"
-        )
+    kinds, expected = (ct.StateSpace, ct.TransferFunction), "a discrete control.StateSpace"
+    check_type(system, kinds, "system", expected, UnsuitableSystemError)
     model = system if isinstance(system, ct.StateSpace) else ct.ss(system)
     if not model.isdtime(strict=True) or model.dt is True:
         raise UnsuitableSystemError(

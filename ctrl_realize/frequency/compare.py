@@ -8,7 +8,7 @@ from typing import Any, Literal
 import control as ct
 import numpy as np
 
-from .._checks import one_of
+from .._checks import check_type, one_of
 from .._flags import Flag, flagged
 from ..delayed import DelayedStateSpace
 from ..errors import DataError, OptionError, UnsuitableSystemError
@@ -99,10 +99,8 @@ def compare_frf(
     >>> print(f"{cr.compare_frf(model, frf).max_relative_error:.2%}")
     0.03%
     """
-    if not isinstance(system, ct.LTI):
-        raise UnsuitableSystemError(
-            f"system is a {type(system).__name__}; expected a system of python-control"
-        )
+    expected = "a system of python-control"
+    check_type(system, ct.LTI, "system", expected, UnsuitableSystemError)
     check_single_channel(system, "system")
     dt = _sample_time(system)
     points, flags = _comparable(measured_points(frf), dt)

@@ -8,7 +8,7 @@ from typing import Any
 import control as ct
 import numpy as np
 
-from .._checks import band, one_of
+from .._checks import band, check_type, one_of
 from .._wording import plainly
 from ..data import MeasuredFRF
 from ..errors import DataError, OptionError, UnsuitableSystemError
@@ -152,10 +152,8 @@ class MeasuredPoints:
 
 def measured_points(frf: Any) -> MeasuredPoints:
     """Return the points of a single-channel FRF, with coherence and std if there are any."""
-    if not isinstance(frf, ct.FrequencyResponseData):
-        raise UnsuitableSystemError(
-            f"frf is a {type(frf).__name__}; expected a MeasuredFRF or a control FRD"
-        )
+    expected = "a MeasuredFRF or a control FRD"
+    check_type(frf, ct.FrequencyResponseData, "frf", expected, UnsuitableSystemError)
     check_single_channel(frf, "frf")
     order = np.argsort(frf.omega, kind="stable")
     measured = isinstance(frf, MeasuredFRF)

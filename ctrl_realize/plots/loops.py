@@ -11,7 +11,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import FigureBase
 
-from .._checks import positive
+from .._checks import check_type, positive
 from .._wording import in_time
 from ..delayed import DelayedStateSpace
 from ..design.loops.margin_result import Margins
@@ -26,7 +26,6 @@ from ..design.siso import delayed_system
 from ..design.tuning.algorithm import PIDAlgorithm
 from ..design.tuning.controller import PIDController
 from ..design.tuning.simulated import simulate_loop
-from ..errors import DataError
 from ..numerics.arrays import FloatArray
 from . import style
 from .names import plain
@@ -59,11 +58,8 @@ def margins_plot(
     >>> [axes.get_title() or axes.get_ylabel() for axes in cplt.figure.axes]
     ['loop gain [dB]', 'loop phase [deg]', 'imaginary part']
     """
-    if not isinstance(result, Margins):
-        raise DataError(
-            f"got a {type(result).__name__}; expected the margins of a loop, such as "
-            "design.margins(plant, controller)"
-        )
+    expected = "the margins of a loop, such as design.margins(plant, controller)"
+    check_type(result, Margins, "result", expected)
     omega, values = result.response
     frequency = omega / HERTZ
     gain = decibel(np.abs(values))

@@ -11,6 +11,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
+from .._checks import check_type
 from .._parameters import gain_unit
 from ..data import Record, StepResponse
 from ..data.given import as_record
@@ -204,11 +205,8 @@ def _steps(given: Any) -> list[StepResponse]:
     if not items:
         raise DataError("no step responses to plot")
     for item in items:
-        if not isinstance(item, Record | StepResponse):
-            raise DataError(
-                f"got a {type(item).__name__}; expected a Record or StepResponse first, "
-                "followed by the model"
-            )
+        expected = "a Record or StepResponse, followed by the model"
+        check_type(item, Record | StepResponse, "step", expected)
     return [unit_step(item) if isinstance(item, Record) else item for item in items]
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
-from .._checks import positive
+from .._checks import check_type, positive
 from ..data import ImpulseResponse
 from ..data.impulse_estimate import ImpulseEstimate
 from ..delayed import DelayedStateSpace
@@ -55,12 +55,10 @@ def impulse_plot(
     >>> cplt.axes[0, 0].get_ylabel()
     'impulse response [1/s]'
     """
-    if not isinstance(impulse, ImpulseResponse):
-        raise DataError(
-            f"got a {type(impulse).__name__}; expected an ImpulseResponse first, followed by "
-            "the models. To plot the response of a model alone use "
-            "control.impulse_response(...).plot()"
-        )
+    check_type(
+        impulse, ImpulseResponse, "impulse", "an ImpulseResponse, followed by the models. To plot "
+        "the response of a model alone use control.impulse_response(...).plot()",
+    )  # fmt: skip
     models: list[DelayedStateSpace]
     models = [systems] if isinstance(systems, DelayedStateSpace) else list(systems)
     for model in models:
@@ -202,8 +200,7 @@ def system_plot(
     >>> cplt.axes[0, 0].get_xlabel()
     'time after the step [s]'
     """
-    if not isinstance(system, DelayedStateSpace):
-        raise DataError(f"got a {type(system).__name__}; expected a DelayedStateSpace")
+    check_type(system, DelayedStateSpace, "system", "a DelayedStateSpace")
     end = _settling_time(system) if until is None else positive(until, "until", "time in s")
     count = max(int(np.ceil(end / system.dt)) + 1, 2)
     response = system.step(count).reshape(system.noutputs, system.ninputs, count)

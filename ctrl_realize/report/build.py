@@ -9,6 +9,7 @@ from typing import Any
 
 import control as ct
 
+from .._checks import check_type
 from .._wording import times_in
 from ..data import Record
 from ..data.given import as_record
@@ -107,11 +108,8 @@ def write_identification(
     7 figures
     """
     as_record(record)
-    if not isinstance(system, DelayedStateSpace):
-        raise UnsuitableSystemError(
-            f"system is a {type(system).__name__}; expected a model with dead time, as "
-            "returned by identify, followed by its record"
-        )
+    expected = "a model with dead time, as returned by identify, followed by its record"
+    check_type(system, DelayedStateSpace, "system", expected, UnsuitableSystemError)
     return write_report(
         path,
         title=f"Model of {record.name}" if record.name else "Identified model",

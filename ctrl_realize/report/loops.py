@@ -10,12 +10,12 @@ from typing import Any
 import numpy as np
 
 from .. import plots
+from .._checks import check_type
 from .._wording import in_time
-from ..errors import DataError
 from ..valves.loops.result import LoopDiagnosis
 from .build import write_report
 from .page import Column, Row, Table
-from .sketches import Sketch
+from .sketches import Sketch, sketch
 from .tables import Paths, data_table, settings_tables
 from .verdict import Level, Verdict
 
@@ -74,8 +74,7 @@ def write_loop_report(
     ...     print(path.read_text(encoding="utf-8").count("<svg "), "figures")
     4 figures
     """
-    if not isinstance(diagnosis, LoopDiagnosis):
-        raise DataError(f"diagnosis is a {type(diagnosis).__name__}; expected that of a loop")
+    check_type(diagnosis, LoopDiagnosis, "diagnosis", "that of a loop")
     many = diagnosis.signals.op.size
     return write_report(
         path,
@@ -105,33 +104,8 @@ def _verdict(diagnosis: LoopDiagnosis) -> Verdict:
 
 
 def _sketches(diagnosis: LoopDiagnosis) -> list[Sketch]:
-    return [
-        Sketch(
-            "trend",
-            "Trends",
-            "Controller output and process value, each scaled to its standard deviation.",
-            lambda figure: plots.loop_diagnosis_plot(diagnosis, panel="trend", ax=figure),
-        ),
-        Sketch(
-            "phase",
-            "PV over OP",
-            "With the ellipse of the fundamentals; its width in the direction of OP is the "
-            "apparent stiction, if the valve sticks.",
-            lambda figure: plots.loop_diagnosis_plot(diagnosis, panel="phase", ax=figure),
-        ),
-        Sketch(
-            "correlation",
-            "Cross-correlation",
-            "Odd about lag zero for stiction in a self-regulating loop, even otherwise.",
-            lambda figure: plots.loop_diagnosis_plot(diagnosis, panel="correlation", ax=figure),
-        ),
-        Sketch(
-            "shapes",
-            "Half cycles",
-            "Triangles for stiction, sines for tuning or an external oscillation.",
-            lambda figure: plots.loop_diagnosis_plot(diagnosis, panel="shapes", ax=figure),
-        ),
-    ]
+    panels = ("trend", "phase", "correlation", "shapes")
+    return [sketch(one, plots.loop_diagnosis_plot, diagnosis, panel=one) for one in panels]
 
 
 def _method_table(diagnosis: LoopDiagnosis) -> Table:

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -15,6 +15,7 @@ from markupsafe import Markup
 from matplotlib.figure import Figure
 
 from .. import plots
+from .._facts import facts
 from ..data import MeasuredFRF, Record, StepResponse
 from ..delayed import DelayedStateSpace
 from ..errors import DataError, NoStepError
@@ -33,6 +34,7 @@ from .svg import inline_svg, laid_out, missing_glyphs_allowed
 
 MOST_DRAWN = 60
 """Largest number of step responses in one plot."""
+_WORDS = facts("report/figures.toml")
 _LINEAR = " The model is the linear part, without the actuator."
 
 
@@ -92,6 +94,20 @@ def save_sketches(folder: str | os.PathLike[str], sketches: Sequence[Sketch]) ->
         sketch.save(place / f"{sketch.key}.png")
 
 
+def sketch(
+    name: str,
+    plot: Callable[..., Any],
+    *results: Any,
+    size: tuple[float, float] = (6.2, 4.0),
+    words: Mapping[str, str] | None = None,
+    **options: Any,
+) -> Sketch:
+    """Make a figure by a plot function, with the title and caption of a row of `figures.toml`."""
+    title, caption = (_WORDS[name][part].format(**(words or {})) for part in ("title", "caption"))
+    draw = lambda figure: plot(*results, ax=figure, **options)  # noqa: E731
+    return Sketch(name.partition(".")[0], title, caption, draw, size)
+
+
 def identification_sketches(
     system: DelayedStateSpace,
     record: Record,
@@ -104,27 +120,14 @@ def identification_sketches(
     sketches = []
     if step is not None:
         linear = system.fit is not None and system.fit.actuator is not None
-        sketches.append(
-            Sketch(
-                "onset",
-                "Start of the response",
-                f"Dead time of the model (line) and its interval (band).{_LINEAR * linear}",
-                lambda figure: plots.onset_plot(step, system, ax=figure),
-            )
-        )
+        words = {"linear": _LINEAR * linear}
+        sketches.append(sketch("onset", plots.onset_plot, step, system, words=words))
     sketches += fit_sketches(system, step)
     given = () if system.fit is None else system.fit.records
     several = [one for one in given if not np.isnan(one.input).any()]
     if len(several) > 1:
         sketches.append(_each_record(system, several))
-    sketches.append(
-        Sketch(
-            "record",
-            "The record",
-            "As measured: output above, input below.",
-            lambda figure: plots.record_plot(record, ax=figure),
-        )
-    )
+    sketches.append(sketch("record", plots.record_plot, record))
     return sketches + frf_sketches([system], frf, comparison)
 
 
@@ -133,53 +136,18 @@ def fit_sketches(system: DelayedStateSpace, step: StepResponse | None) -> list[S
     fit = system.fit
     sketches = []
     if isinstance(fit, OutputErrorFit):
-        sketches.append(
-            Sketch(
-                "fit",
-                "Data, model and residual",
-                "The residual should look like noise. Below: the dead time of each structure "
-                "and delay estimate; the band is the interval.",
-                lambda figure: plots.fit_plot(fit, ax=figure),
-                (6.2, 3.6 + evidence_height(fit)),
-            )
-        )
+        size = (6.2, 3.6 + evidence_height(fit))
+        sketches.append(sketch("fit", plots.fit_plot, fit, size=size))
     elif step is not None:
-        sketches.append(
-            Sketch(
-                "step",
-                "Response to a unit step",
-                "Measured, with the response of the model on top.",
-                lambda figure: plots.step_plot(step, system, ax=figure),
-            )
-        )
+        sketches.append(sketch("step", plots.step_plot, step, system))
     if isinstance(fit, StateSpaceFit) and fit.checks:
         labels = fit.records[0].output_labels
         sketches += [_output_sketch(fit, i, label) for i, label in enumerate(labels)]
     if isinstance(fit, DelayScan):
-        sketches += [
-            Sketch(
-                "delay",
-                "IAE against the delay",
-                "One model for every delay; a flat minimum means that the data do not "
-                "determine the delay.",
-                lambda figure: plots.delay_plot(fit, ax=figure),
-            ),
-            Sketch(
-                "impulse",
-                "Impulse response",
-                "Differentiated data and the realization.",
-                lambda figure: plots.impulse_plot(fit.impulse, system, ax=figure),
-            ),
-        ]
+        sketches.append(sketch("delay", plots.delay_plot, fit))
+        sketches.append(sketch("impulse", plots.impulse_plot, fit.impulse, system))
     if isinstance(fit, DelayScan | Realization):
-        sketches.append(
-            Sketch(
-                "singular_values",
-                "Singular values of the Hankel matrix",
-                "Only values above the noise level can be modelled.",
-                lambda figure: plots.singular_value_plot(fit, ax=figure),
-            )
-        )
+        sketches.append(sketch("singular_values", plots.singular_value_plot, fit))
     return sketches
 
 
@@ -187,66 +155,31 @@ def _each_record(
     system: DelayedStateSpace, records: Sequence[Record], more: int | None = None
 ) -> Sketch:
     more = len(records) - MOST_BESIDE if more is None else more
-    return Sketch(
-        "each_record",
-        "Each record beside the model",
-        "The model is simulated with the input of each record; the title has its fit."
-        + (f" {more} more records are not shown." if more > 0 else ""),
-        lambda figure: plots.each_record_plot(system, records, ax=figure),
-        (6.2, 0.6 + 1.7 * each_record_rows(len(records))),
-    )
+    words = {"more": f" {more} more records are not shown." if more > 0 else ""}
+    size = (6.2, 0.6 + 1.7 * each_record_rows(len(records)))
+    return sketch("each_record", plots.each_record_plot, system, records, size=size, words=words)
 
 
 def _output_sketch(fit: StateSpaceFit, output: int, label: str) -> Sketch:
-    return Sketch(
-        f"output_{output}",
-        f"The output {label}",
-        "Measured and simulated. Below: autocorrelation of the residual, and its "
-        "cross-correlation with the input.",
-        lambda figure: plots.state_space_fit_plot(fit, output=output, ax=figure),
-        (6.2, 5.4),
-    )
+    plot, words = plots.state_space_fit_plot, {"label": label}
+    made = sketch("output", plot, fit, output=output, size=(6.2, 5.4), words=words)
+    return replace(made, key=f"output_{output}")
 
 
 def frf_sketches(
     systems: list[Any],
     frf: ct.FrequencyResponseData | None,
     comparison: FRFComparison | None = None,
-    caption: str = "Measured, with the model on top. These data were not used for the fit.",
 ) -> list[Sketch]:
     """List the frequency-domain figures: of models alone, or with a measurement."""
     if not all(system.issiso() for system in systems):
         return []  # drawn one channel at a time
     if frf is None:
-        return [
-            Sketch(
-                "frf",
-                "Frequency response of the model",
-                "Up to half the sample rate, dead time included.",
-                lambda figure: plots.frf_plot(systems, ax=figure),
-                (6.2, 4.8),
-            )
-        ]
+        return [sketch("frf.model", plots.frf_plot, systems, size=(6.2, 4.8))]
     tall = 5.4 if isinstance(frf, MeasuredFRF) and frf.coherence is not None else 4.8
-    sketches = [
-        Sketch(
-            "frf",
-            "Frequency response",
-            caption,
-            lambda figure: plots.frf_plot([frf, *systems], ax=figure),
-            (6.2, tall),
-        )
-    ]
+    sketches = [sketch("frf", plots.frf_plot, [frf, *systems], size=(6.2, tall))]
     if comparison is not None:
-        sketches.append(
-            Sketch(
-                "frf_error",
-                "Relative error against frequency",
-                "Model against measurement; the trusted band is shaded.",
-                lambda figure: plots.comparison_plot(comparison, ax=figure),
-                (6.2, 4.6),
-            )
-        )
+        sketches.append(sketch("frf_error", plots.comparison_plot, comparison, size=(6.2, 4.6)))
     return sketches
 
 
@@ -254,32 +187,12 @@ def campaign_sketches(campaign: Campaign, *, truth: float | None = None) -> list
     """List the figures of a campaign, including those of the final model and the best record."""
     count = len(campaign.good)
     tall = min(max(0.27 * count + 1.6, 3.4), 8.0) if count <= 24 else 4.2
-    sketches = [
-        Sketch(
-            "delays",
-            "Delay of every record",
-            "Points: estimates; bars: their intervals; band: 95 % interval of the trimmed mean.",
-            lambda figure: plots.campaign_plot(campaign, truth=truth, ax=figure),
-            (6.2, tall),
-        )
-    ]
+    sketches = [sketch("delays", plots.campaign_plot, campaign, truth=truth, size=(6.2, tall))]
     system = campaign.system
     steps = _steps_of(campaign) if _from_a_step(system.fit) else []
     if steps:
-        sketches += [
-            Sketch(
-                "onset",
-                "Start of the response, all records",
-                "Dead time of the final model (line) and its interval (band).",
-                lambda figure: plots.onset_plot(steps, system, ax=figure),
-            ),
-            Sketch(
-                "step",
-                "Responses to a unit step, all records",
-                "Each divided by its own step amplitude; the final model on top.",
-                lambda figure: plots.step_plot(steps, system, ax=figure),
-            ),
-        ]
+        sketches.append(sketch("onset.campaign", plots.onset_plot, steps, system))
+        sketches.append(sketch("step.campaign", plots.step_plot, steps, system))
     records = [one for one in _records_of(campaign, MOST_BESIDE) if not one.n_missing]
     if len(records) > 1 and system.issiso():
         sketches.append(_each_record(system, records, count - len(records)))

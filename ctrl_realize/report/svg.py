@@ -8,6 +8,7 @@ import re
 import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from html import escape
 from typing import Any
 
 import matplotlib as mpl
@@ -192,16 +193,14 @@ def _scale(axis: Axis, ends: tuple[float, float], labels: list[str]) -> list[Any
 
 
 def _at_home(document: str, key: str, description: str, data: str) -> str:
+    aria, axes = escape(description), escape(data)
     body = document[document.index("<svg") :]
     body = re.sub(r"<metadata>.*?</metadata>", "", body, flags=re.DOTALL)
     body = re.sub(r"<defs>\s*<style.*?</style>\s*</defs>", "", body, count=1, flags=re.DOTALL)
     # Between the tags there are names from the data, which may be like "#0072b2" or 'id="'.
     body = re.sub(r"<[^>]*>", lambda tag: _tag_at_home(tag[0], key), body)
     body = re.sub(r"\s*\n\s*", " ", body)
-    head = (
-        f'<svg role="img" aria-label="{_attribute(description)}" class="plot" '
-        f'data-axes="{_attribute(data)}" '
-    )
+    head = f'<svg role="img" aria-label="{aria}" class="plot" data-axes="{axes}" '
     # By functions, not templates: a name in the data may contain a backslash.
     body = re.sub(
         r'<svg (?:xmlns:xlink="[^"]*" )?width="[^"]*" height="[^"]*" ',
@@ -226,9 +225,3 @@ def _tag_at_home(tag: str, key: str) -> str:
 
 def _rounded(match: re.Match[str]) -> str:
     return re.sub(r"-?\d+\.\d{3,}", lambda number: f"{float(number[0]):.2f}", match[0])
-
-
-def _attribute(text: str) -> str:
-    return (
-        text.replace("&", "&amp;").replace('"', "&quot;").replace("<", "&lt;").replace(">", "&gt;")
-    )

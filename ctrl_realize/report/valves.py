@@ -10,14 +10,14 @@ from typing import Any
 import numpy as np
 
 from .. import plots
-from ..errors import DataError
+from .._checks import check_type
 from ..valves.definitions import DEFINITIONS
 from ..valves.metrics import words_of
 from ..valves.result import ValveReport
 from ..valves.words import in_words, limit_in_words
 from .build import write_report
 from .page import Column, Row, Table, pairs
-from .sketches import Sketch
+from .sketches import Sketch, sketch
 from .tables import Paths, data_table, settings_tables
 from .verdict import Level, Verdict
 
@@ -77,8 +77,7 @@ def write_valve_report(
     ...     print(path.read_text(encoding="utf-8").count("<svg "), "figures")
     6 figures
     """
-    if not isinstance(result, ValveReport):
-        raise DataError(f"result is a {type(result).__name__}; expected that of valve_report")
+    check_type(result, ValveReport, "result", "that of valve_report")
     many = len(result.records)
     return write_report(
         path,
@@ -113,46 +112,15 @@ def _verdict(result: ValveReport) -> Verdict:
 
 
 def _sketches(result: ValveReport) -> list[Sketch]:
-    return [
-        Sketch(
-            "steps",
-            "Responses to steps",
-            "Each scaled to its own change, on one another; closing steps are dashed. Dotted: "
-            "63.2 and 86.5 %.",
-            lambda figure: plots.valve_plot(result, panel="steps", ax=figure),
-        ),
-        Sketch(
-            "t86",
-            "T86 against step size",
-            "With 95 % intervals. Small steps late: friction or dead band; large steps late: the "
-            "rate is limited.",
-            lambda figure: plots.valve_plot(result, panel="sizes", ax=figure),
-        ),
-        Sketch(
-            "dead_time",
-            "Dead time against step size",
-            "First motion, with 95 % intervals.",
-            lambda figure: plots.valve_plot(result, panel="sizes", metric="dead_time", ax=figure),
-        ),
-        Sketch(
-            "gain",
-            "Travel gain against step size",
-            "Change of the position over that of the command, with 95 % intervals.",
-            lambda figure: plots.valve_plot(result, panel="sizes", metric="gain", ax=figure),
-        ),
-        Sketch(
-            "loop",
-            "Position over command",
-            "All records.",
-            lambda figure: plots.valve_plot(result, panel="loop", ax=figure),
-        ),
-        Sketch(
-            "signature",
-            "Signature",
-            "Position minus command at rest: from the slow ramp, or from the levels of the steps.",
-            lambda figure: plots.valve_plot(result, panel="signature", ax=figure),
-        ),
-    ]
+    panels: dict[str, dict[str, Any]] = {
+        "steps": {"panel": "steps"},
+        "t86": {"panel": "sizes"},
+        "dead_time": {"panel": "sizes", "metric": "dead_time"},
+        "gain": {"panel": "sizes", "metric": "gain"},
+        "loop": {"panel": "loop"},
+        "signature": {"panel": "signature"},
+    }
+    return [sketch(key, plots.valve_plot, result, **shown) for key, shown in panels.items()]
 
 
 def _metric_table(result: ValveReport) -> Table:

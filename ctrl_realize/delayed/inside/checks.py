@@ -8,6 +8,7 @@ from typing import Any
 import control as ct
 import numpy as np
 
+from ..._checks import check_type
 from ...errors import DelayRangeError, UnsuitableSystemError
 from ...numerics.internal_delays.form import DelayForm, without_zero_delays
 from ..deferred import DeferredMatrices
@@ -68,10 +69,8 @@ def check_core(core: Any, delays: tuple[float, ...] = ()) -> float | None:
     ------
     UnsuitableSystemError
     """
-    if not isinstance(core, ct.StateSpace):
-        raise UnsuitableSystemError(
-            f"core is a {type(core).__name__}; expected a control.StateSpace (ct.ss converts)"
-        )
+    expected = "a control.StateSpace (ct.ss converts)"
+    check_type(core, ct.StateSpace, "core", expected, UnsuitableSystemError)
     if isinstance(core, DeferredMatrices):
         raise UnsuitableSystemError(
             f"core is a {type(core).__name__}, which already has delays; expected a plain "

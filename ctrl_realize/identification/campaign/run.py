@@ -8,7 +8,7 @@ from contextlib import closing
 from inspect import signature
 from typing import Any
 
-from ..._checks import one_of
+from ..._checks import check_type, one_of
 from ...data import Record
 from ...errors import DataError, OptionError
 from ..methods import METHODS, Method, identify
@@ -82,8 +82,7 @@ def identify_campaign(
     _check_options(options)
     if type(n_jobs) is not int or not 0 < abs(n_jobs) <= 10_000:
         raise OptionError(f"n_jobs={n_jobs!r}; expected a number of processes, or -1 for all")
-    if not isinstance(records, Iterable):
-        raise DataError(f"records is a {type(records).__name__}; expected several records")
+    check_type(records, Iterable, "records", "several records")
     sources = list(records)
     if not sources:
         raise DataError("there are no records to identify")

@@ -6,9 +6,9 @@ from typing import Literal
 
 import numpy as np
 
-from ..._checks import integer, one_of, positive
+from ..._checks import check_type, integer, one_of, positive
 from ...data import FilterSpec, ImpulseResponse, StepResponse
-from ...errors import DataError, OptionError
+from ...errors import OptionError
 from ...numerics.arrays import FloatArray
 from ...numerics.signals.filters import (
     backward_difference,
@@ -85,8 +85,7 @@ def impulse_from_step(
     >>> print(g.markov[9:13].round(4))
     [0.     0.     0.01   0.0099]
     """
-    if not isinstance(step, StepResponse):
-        raise DataError(f"step is a {type(step).__name__}; expected a StepResponse, see unit_step")
+    check_type(step, StepResponse, "step", "a StepResponse, see unit_step")
     order = integer(filter_order, "filter_order", 1, 10)
     difference = one_of(difference, "difference", ("backward", "central"))
     cutoff = _cutoff(step, cutoff_hz)

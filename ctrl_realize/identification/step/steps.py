@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..._checks import integer, real
+from ..._checks import check_type, integer, real
 from ..._wording import named
 from ...data import Record, StepEdge, StepResponse
 from ...data.given import as_record, check_complete, check_input
@@ -163,8 +163,7 @@ def unit_step(
     u = _single(as_record(record).input, "input", record)
     y = _single(record.output, "output", record)
     at = detect_step(record) if edge is None else edge
-    if not isinstance(at, StepEdge):
-        raise OptionError(f"edge is a {type(at).__name__}; expected the result of detect_step")
+    check_type(at, StepEdge, "edge", "the result of detect_step", OptionError)
     if not (0 <= at.index < at.stop <= record.n_samples and 0 <= at.start <= at.index):
         raise DataError(
             f"the edge lies at samples {at.start}...{at.index}...{at.stop}, the record has "
