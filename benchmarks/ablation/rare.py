@@ -210,20 +210,6 @@ def long_ramp(rng: Rng) -> Case:
     return Case(record(u, y + noise), plant.dead_time)
 
 
-def swing_in_few_samples(rng: Rng) -> Case:
-    """A pair of poles with a damping of 0.1 to 0.3; the record shows half a period to a whole one.
-
-    60 to 120 samples behind the step, 0.5 % noise.
-    """
-    count, damping = int(rng.integers(60, 121)), float(rng.uniform(0.1, 0.3))
-    dead_time, angle = float(rng.uniform(0.05, 0.15)), float(rng.uniform(3.0, 7.0))
-    u = step(count + 60, 60)
-    since = np.clip(DT * (np.arange(u.size) - 60) - dead_time, 0.0, None)
-    turn, root = angle / (DT * count) * since, float(np.sqrt(1 - damping**2))
-    wave = np.cos(root * turn) + damping / root * np.sin(root * turn)
-    return Case(record(u, noisy(rng, 1 - np.exp(-damping * turn) * wave)), dead_time)
-
-
 WORLDS = (
     tanks_in_a_row,
     settling_in_a_long_rest,
@@ -256,7 +242,6 @@ MADE_FOR = {
     "coarse converter": steps_of_a_converter,
     "coloured noise of any input": slow_disturbance,
     "integrator beside a lag of any ratio": long_ramp,
-    "faster pairs in a ramp": swing_in_few_samples,
     "start from the correlation": far_away,
     "start at the ringing": wandering_output,
     "records weighted by their noise": unequal_sensors,

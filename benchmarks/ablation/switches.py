@@ -230,12 +230,6 @@ SWITCHES = (
         (f"{STEP}:fit_window", f"{FITS}.any_input.window:fit_window"),
         called=True,
     ),
-    Switch(
-        "faster pairs in a ramp",
-        {f"{ENGINE}.structures:_NO_INTEGRATOR": value(1e-9)},
-        (f"{ENGINE}.structures:parameter_bounds",),
-        called=True,
-    ),
     Switch("chains of equal lags", {f"{FITS}.selection:fit_chains": giving([])}),
     Switch("chains that still improve", {f"{FITS}.interval:still_improving": giving(False)}),
     Switch("modes of diffusion", {f"{FITS}.selection:fit_diffusion": giving([])}),

@@ -39,10 +39,6 @@ SLOWEST = 1e-4
 """Smallest pole, over the length of the record: stands for an integrator."""
 _DAMPING = 20.0
 """Largest damping of a pair: two lags with a ratio of 1600."""
-_NO_INTEGRATOR = 10.0
-"""Natural frequency times length up to which a pair may be none in a record that looks integrating:
-in fewer than 600 samples that is more than the bound of an integrator and a lag. Ablation: faster
-pairs in a ramp."""
 FASTEST, SLOWER_WITH_ZEROS = 40.0, 2.0
 """Largest pole, in 1/samples. A response that jumps from one sample to the next needs it: with a
 lag of half a sample at least, its dead time would be known better than to the sample. Ablation:
@@ -198,7 +194,7 @@ def parameter_bounds(structure: Structure, scales: Scales) -> Bounds:
         if scales.integrating and pair == 0 and order % 2 == 0:
             # An integrator and a lag: the bounds of their sum and of its inverse, as of a pair.
             total = np.log(2 * _DAMPING) + fast
-            size = max((total + slow) / 2, np.log(_NO_INTEGRATOR / scales.length))
+            size = (total + slow) / 2
             damping = (total - slow) / 2 - np.log(2.0)
         low += [np.log(1e-2 / scales.length), np.log(0.005)]
         high += [size, damping]
