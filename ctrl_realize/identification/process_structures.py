@@ -11,6 +11,7 @@ from .._checks import band, real
 from ..errors import OptionError, OrderError
 from ..numerics.engine.problem import Structure
 from ..numerics.families.process_form import ProcessForm
+from ..numerics.output_error.other_structures import Requested
 
 MOST_ORDER = 8  # higher orders suffer from rounding in the partial fractions
 MOST_LAGS = 3
@@ -95,15 +96,7 @@ StructureLike: TypeAlias = "tuple[int, int] | str | ProcessStructure"
 Structures: TypeAlias = "Sequence[StructureLike] | str | ProcessStructure"
 
 
-@dataclass(frozen=True)
-class Requested:
-    """Structures that were asked for; `forms` are empty unless process models were."""
-
-    structures: tuple[Structure, ...]
-    forms: tuple[ProcessForm, ...] = ()
-
-
-def requested(given: Structures | None) -> Requested | None:
+def requested(given: Structures | None) -> Requested:
     """Check structures, pairs or names.
 
     Raises
@@ -112,7 +105,7 @@ def requested(given: Structures | None) -> Requested | None:
         What is no structure; none at all.
     """
     if given is None:
-        return None
+        return Requested()
     alone = isinstance(given, str | ProcessStructure)
     several: Iterable[Any] = [given] if alone else given  # type: ignore[assignment]
     pairs: list[Structure] = []
@@ -143,7 +136,7 @@ def plain_pairs(given: Structures | None, task: str) -> list[tuple[int, int]] | 
         A process model with more than poles, zeros and a dead time.
     """
     found = requested(given)
-    if found is None:
+    if found.structures is None:
         return None
     for form in found.forms:
         if form.prescribed or form.pair or form.integrator or not form.dead_time:

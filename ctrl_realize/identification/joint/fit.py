@@ -19,12 +19,13 @@ from ...frequency.frf_fit import FRFFit
 from ...numerics.arrays import ComplexArray, FloatArray
 from ...numerics.blas_threads import single_threaded
 from ...numerics.constants import SMALLEST
-from ...numerics.engine.problem import Structure
+from ...numerics.engine.problem import KnownFactor, Structure
 from ...numerics.engine.structures import Scales
 from ...numerics.engine.window import Window
-from ...numerics.joint.data import JointData, sampled_data, sampled_part, step_part
+from ...numerics.joint.data import JointData, sampled_part, step_part
 from ...numerics.joint.effects import Effect, with_random_effects
 from ...numerics.joint.fit import joint_fit
+from ...numerics.output_error.any_input.data import cut
 from ...numerics.output_error.result import OutputErrorEstimate
 from ...numerics.output_error.step_data import StepData, bare_data
 from ...numerics.rational.frf_data import FRFData
@@ -173,7 +174,7 @@ def fit_joint(
         agreement=agreed,
         choices=_choices(estimate, first, other, spread),
     )
-    result = replace(result, flags=joint_flags(result, max_delay))
+    result = replace(result, flags=joint_flags(result, latest))
     return fitted_model(fitted_core(estimate, result.poles), result)
 
 
@@ -188,7 +189,7 @@ def _records(
     names = repeats.names if repeats is not None else ("",)
     used = [r for r, name in zip(first.records, names, strict=True) if name not in left_out]
     outputs, inputs = ([np.ravel(getattr(r, k)) for r in used] for k in ("output", "input"))
-    data = sampled_data(outputs, inputs, first.dt, first.dead_time, first.data.every)
+    data = cut(outputs, inputs, first.dt, first.data.every, KnownFactor()).after(first.dead_time)
     time, signal = joined_signals(used, data)
     window, scales = sampled_part(data, first.estimate, latest)
     span = sum(data.lengths) * data.step

@@ -19,9 +19,9 @@ _SMOOTHED_POINTS = 3  # a single bad point is not a band
 _MUCH = 0.5  # of the largest shift of a response: where it is reported to be
 
 
-def joint_flags(fit: JointFit, max_delay: float | None) -> tuple[Flag, ...]:
+def joint_flags(fit: JointFit, latest: float | None) -> tuple[Flag, ...]:
     """List the flags of the joint model, and that of a contradiction first."""
-    of_model = model_flags(fit.estimate, fit.dt, fit.data.length, max_delay)
+    of_model = model_flags(fit.estimate, fit.dt, fit.data.length, latest)
     return (*_contradiction(fit), *of_model)
 
 

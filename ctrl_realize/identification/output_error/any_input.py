@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
@@ -17,6 +16,7 @@ from ...numerics.constants import SMALLEST
 from ...numerics.output_error.any_input.data import SampledData
 from ...numerics.output_error.any_input.fit import SampledFit, fit_sampled
 from ...numerics.output_error.any_input.stretch import FOLLOWS
+from ...numerics.output_error.other_structures import Requested
 from ...numerics.output_error.result import OutputErrorEstimate
 from ...numerics.output_error.step_data import bare_data
 from ...numerics.signals.counters import counter_period
@@ -41,8 +41,7 @@ class UnrelatedError(DataError):
 
 def fit_any_input(
     records: tuple[Record, ...],
-    limit: float | None,
-    settings: Mapping[str, Any],
+    requested: Requested,
     ratios: FloatArray | None = None,
     *,
     refuses: bool = True,
@@ -54,20 +53,18 @@ def fit_any_input(
     by them. A model that hardly follows the output is refused, or not.
     """
     dt = common_sample_time(records)
-    latest = None if limit is None else limit * dt
     used = tuple(range(len(records)))
     scales = np.ones(len(records)) if ratios is None else ratios
     signals = [(y, scale * u) for (y, u), scale in zip(map(_signals, records), scales, strict=True)]
     if len(records) == 1:
-        found = _fit(records, signals, dt, latest, settings, refuses)
-        return _summary(found, found.fit, records, used, limit, ())
+        found = _fit(records, signals, dt, requested, refuses)
+        return _summary(found, found.fit, records, used, requested.latest, ())
     while True:
         found = _fit(
             tuple(records[i] for i in used),
             [signals[i] for i in used],
             dt,
-            latest,
-            settings,
+            requested,
             refuses,
         )
         own = [found.own_delay(*pair) for pair in signals]
@@ -81,7 +78,7 @@ def fit_any_input(
         used = tuple(i for i in used if i not in apart)
     fit = widened(found.fit, repeats, used)
     flags = repeat_flags(repeats, fit.dead_time, dt)
-    return _summary(found, fit, records, used, limit, flags, repeats)
+    return _summary(found, fit, records, used, requested.latest, flags, repeats)
 
 
 def _signals(record: Record) -> tuple[FloatArray, FloatArray]:
@@ -92,14 +89,13 @@ def _fit(
     records: tuple[Record, ...],
     signals: list[tuple[FloatArray, FloatArray]],
     dt: float,
-    latest: float | None,
-    settings: Mapping[str, Any],
+    requested: Requested,
     refuses: bool,
 ) -> SampledFit:
     for record in records:
         _check_moves(record)
     outputs, inputs = zip(*signals, strict=True)
-    found = fit_sampled(outputs, inputs, dt, latest=latest, **settings)
+    found = fit_sampled(outputs, inputs, dt, requested)
     if refuses and found.explained < FOLLOWS:
         codes = [str(code) for y in found.data.measured if (code := missing_code(y))]
         raise UnrelatedError(
@@ -163,7 +159,7 @@ def _summary(
     fit: OutputErrorEstimate,
     records: tuple[Record, ...],
     used: tuple[int, ...],
-    limit: float | None,
+    latest: float | None,
     flags: tuple[Flag, ...],
     repeats: Repeatability | None = None,
 ) -> OutputErrorFit:
@@ -171,7 +167,7 @@ def _summary(
     data = found.data
     time, signal = joined_signals([records[i] for i in used], data)
     length = max(y.size for y in data.outputs) * data.step
-    flags = sampled_flags(fit, data.dt, length, limit) + _cut(records, used, found) + flags
+    flags = sampled_flags(fit, data.dt, length, latest) + _cut(records, used, found) + flags
     span = sum(data.lengths) * data.step
     output, noise = np.concatenate(data.measured), fit.residual.std
     joined = bare_data(output, signal, data.dt, noise, span, data.every)

@@ -132,19 +132,19 @@ def edges_of(record: Record) -> tuple[StepEdge, ...]:
             # It moves only at the very end: there is no response to fit.
             raise
         return ()
-    steps = len(edges) <= _MOST_EDGES and not _moves_before(signal, edges[0])
+    steps = len(edges) <= _MOST_EDGES and not _moves_before(signal, edges)
     return edges if steps and _holds_between(signal, edges) else ()
 
 
-def _moves_before(signal: FloatArray, edge: StepEdge) -> bool:
+def _moves_before(signal: FloatArray, edges: Sequence[StepEdge]) -> bool:
     """Whether a clean input moves before its first edge, by less than counts as one.
 
     The output may then move before the edge, or respond to it from a motion of its own.
     """
-    before = signal[: edge.index]
+    before = signal[: edges[0].index]
     if before.size <= 2 * _SPIKE or difference_noise(signal) > 0:
         return False
-    return float(np.ptp(despike(before, _SPIKE))) > _STRAY * abs(edge.amplitude)
+    return float(np.ptp(despike(before, _SPIKE))) > _STRAY * abs(edges[0].amplitude)
 
 
 def _holds_between(signal: FloatArray, edges: Sequence[StepEdge]) -> bool:

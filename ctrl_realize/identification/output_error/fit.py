@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
-from typing import Literal, TypedDict
+from typing import Literal
 
 import control as ct
 import numpy as np
@@ -18,8 +18,7 @@ from ...delayed import DelayedStateSpace
 from ...errors import DataError, OptionError
 from ...numerics.arrays import FloatArray
 from ...numerics.blas_threads import single_threaded
-from ...numerics.engine.problem import KnownFactor, Structure
-from ...numerics.families.process_form import ProcessForm
+from ...numerics.output_error.other_structures import Requested
 from ...numerics.output_error.step_data import own_regressors, step_data
 from ...numerics.output_error.step_fit import fit_step_record
 from ...results import Flag
@@ -218,30 +217,28 @@ def fit_output_error(
             raise OptionError(
                 f"actuator={actuator!r} with known dynamics or gains='own': expected one of them"
             )
-    asked = requested(structures)
+    tried = requested(structures)
     limit = None if max_delay is None else positive(max_delay, "max_delay", "number of samples")
     factor = known_factor(known)
     several = checked_records(records)
-    settings: _Settings = {
-        "structures": None if asked is None else asked.structures,
-        "forms": () if asked is None else asked.forms,
-        "known": factor,
-        "huber": loss == "huber",
-        "whiten": noise == "auto",
-    }
-    linear = partial(
-        _linear, several, limit, settings, own_gains=gains == "own", may_clip=actuator is None
+    tried = replace(
+        tried,
+        latest=None if limit is None else limit * several[0].dt,
+        known=factor,
+        huber=loss == "huber",
+        whiten=noise == "auto",
     )
+    linear = partial(_linear, several, tried, own_gains=gains == "own", may_clip=actuator is None)
     try:
         result = checked(linear(), alone=known is None)
         if actuator is not None:
-            result = with_actuator(result, actuator, settings["structures"])
+            result = with_actuator(result, actuator, tried.structures)
     except UnrelatedError:
         if actuator is None:
             raise
         # Beside what an actuator does, no linear model need follow the output.
         result = checked(linear(refuses=False), alone=known is None)
-        result = with_actuator(result, actuator, settings["structures"])
+        result = with_actuator(result, actuator, tried.structures)
         if result.actuator is None:
             raise
     core = fitted_core(result.estimate, result.poles)
@@ -250,18 +247,9 @@ def fit_output_error(
     return fitted_model(core, result)
 
 
-class _Settings(TypedDict):
-    structures: tuple[Structure, ...] | None
-    forms: tuple[ProcessForm, ...]
-    known: KnownFactor
-    huber: bool
-    whiten: bool
-
-
 def _linear(
     several: tuple[Record, ...],
-    limit: float | None,
-    settings: _Settings,
+    requested: Requested,
     *,
     own_gains: bool,
     may_clip: bool,
@@ -272,7 +260,7 @@ def _linear(
     if len(several) == 1:
         return fit_within_limits(
             several[0],
-            lambda record: _fit_one(record, limit, settings, any_input),
+            lambda record: _fit_one(record, requested, any_input),
             may_clip=may_clip,
         )
     several, at_limits = _without_cut_noise(several)
@@ -281,9 +269,9 @@ def _linear(
     way = _fit_mean if stepped else any_input
     if own_gains:
         start = relative_gains(aligned_steps(several)) if stepped else None
-        result = fit_own_gains(several, partial(way, several, limit, settings), start)
+        result = fit_own_gains(several, partial(way, several, requested), start)
     else:
-        result = way(several, limit, settings)
+        result = way(several, requested)
     return replace(result, flags=result.flags + at_limits + same_record_flags(several))
 
 
@@ -300,30 +288,26 @@ def _without_cut_noise(records: tuple[Record, ...]) -> tuple[tuple[Record, ...],
 
 def _fit_one(
     record: Record,
-    limit: float | None,
-    settings: _Settings,
+    requested: Requested,
     any_input: Callable[..., OutputErrorFit],
 ) -> OutputErrorFit:
     data = step_data_of(record)
     if data is None:
-        return any_input((record,), limit, settings)
-    latest = None if limit is None else limit * record.dt
-    data, fit = fit_step_record(data, latest=latest, **settings)
-    flags = fit_flags(data, fit, limit, float(record.time[0]))
+        return any_input((record,), requested)
+    data, fit = fit_step_record(data, requested)
+    flags = fit_flags(data, fit, requested.latest, float(record.time[0]))
     time = record.time[data.rows]
     return OutputErrorFit(fit, data, time, (record,), choices=choices_of(fit), flags=flags)
 
 
 def _fit_mean(
     records: tuple[Record, ...],
-    limit: float | None,
-    settings: _Settings,
+    requested: Requested,
     ratios: FloatArray | None = None,
 ) -> OutputErrorFit:
     steps = aligned_steps(records)
     if ratios is not None:
         steps = scaled(steps, ratios)
-    latest = None if limit is None else limit * steps[0].dt
     skip: tuple[int, ...] = ()
     for _ in range(2):
         mean = mean_step(steps, skip)
@@ -332,7 +316,7 @@ def _fit_mean(
             raise DataError(
                 "the mean of the records does not leave its baseline by 5 standard deviations"
             )
-        data, fit = fit_step_record(data, latest=latest, **settings)
+        data, fit = fit_step_record(data, requested)
         own = own_regressors(data, fit.poles if data.relaxing else None)
         repeats = repeatability(steps, mean, fit.fitted, fit.dead_time, own)
         apart = (
@@ -345,6 +329,6 @@ def _fit_mean(
         skip = apart
     fit = widened(fit, repeats, mean.used)
     time = mean.dt * np.arange(-mean.edge, mean.output.size - mean.edge, dtype=np.float64)
-    flags = fit_flags(data, fit, limit, float(time[0]))
+    flags = fit_flags(data, fit, requested.latest, float(time[0]))
     flags += repeat_flags(repeats, fit.dead_time, mean.dt)
     return OutputErrorFit(fit, data, time, records, repeats, choices=choices_of(fit), flags=flags)

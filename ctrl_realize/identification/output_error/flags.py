@@ -42,27 +42,30 @@ _DECISIONS: dict[DecisionKey, str] = {
 
 
 def fit_flags(
-    data: StepData, fit: OutputErrorEstimate, max_delay: float | None, start: float
+    data: StepData, fit: OutputErrorEstimate, latest: float | None, start: float
 ) -> tuple[Flag, ...]:
     """List the flags of a fit of one (mean) step record whose first sample is at `start` s."""
-    of_model = model_flags(fit, data.dt, data.length, max_delay)
+    of_model = model_flags(fit, data.dt, data.length, latest)
     return (*of_model, *_record_flags(data, fit, start))
 
 
 def sampled_flags(
-    fit: OutputErrorEstimate, dt: float, length: float, max_delay: float | None
+    fit: OutputErrorEstimate, dt: float, length: float, latest: float | None
 ) -> tuple[Flag, ...]:
     """List the flags of a fit of a record whose input is not a step."""
-    flags = tuple(model_flags(fit, dt, length, max_delay))
+    flags = tuple(model_flags(fit, dt, length, latest))
     if fit.adequate:
         return flags
     return (*flags, flagged("coloured_residual", samples=fit.residual.correlation))
 
 
 def model_flags(
-    fit: OutputErrorEstimate, dt: float, length: float, max_delay: float | None
+    fit: OutputErrorEstimate, dt: float, length: float, latest: float | None
 ) -> Iterator[Flag]:
-    """List the flags that follow from the model itself; `length` is that of the record in s."""
+    """List the flags that follow from the model itself.
+
+    `length` is that of the record in s, `latest` the dead time up to which was to be sought.
+    """
     extrapolated = [*_slow_modes(fit, length), *_unresolved_gain(fit, length)]
     firm = ""
     if not extrapolated and (fit.static is None or is_firm(fit.static.total, fit.total_ends)):
@@ -85,9 +88,9 @@ def model_flags(
         )
     if form and (bounds := [name for name in fit.process.at_bound if name in form.bounds]):
         yield flagged("parameter_at_bound", names=", ".join(bounds))
-    reached = max_delay is not None and fit.latest >= max_delay * dt * (1 - 1e-9)
+    reached = latest is not None and fit.latest >= latest * (1 - 1e-9)
     if reached and fit.high >= 0.98 * fit.latest:
-        yield flagged("delay_at_bound", max_delay=max_delay)
+        yield flagged("delay_at_bound", max_delay=fit.latest / dt)
     stated = form and (not form.dead_time or "dead_time" in form.fixed)
     if fit.low <= _SAMPLES_BESIDE_NOTHING * dt and not stated:
         yield flagged("no_delay_resolved", high=in_time(fit.high))

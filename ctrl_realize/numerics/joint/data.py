@@ -16,13 +16,11 @@ References
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 
-from ..arrays import FloatArray
 from ..engine.eliminate import evaluate
 from ..engine.local_terms import Segments
 from ..engine.poles import parameters_from_poles
@@ -31,7 +29,7 @@ from ..engine.responses import SeveralInputs
 from ..engine.structures import Scales
 from ..engine.window import Window
 from ..engine.window_fit import weighted_correlation
-from ..output_error.any_input.data import SampledData, cut
+from ..output_error.any_input.data import SampledData
 from ..output_error.any_input.window import window_of
 from ..output_error.result import OutputErrorEstimate
 from ..output_error.step_data import StepData, step_scales, window
@@ -39,7 +37,6 @@ from ..rational.frf_data import FRFData
 from ..signals.noise import correlation_time, is_coarse, mad_sigma
 
 _WILD = 5.0  # standard deviations, beyond which Gaussian noise has none of a million samples: cut
-_UNKNOWN = 1.5  # dead times at the start of a record that depend on the input before it
 _LATE = 1e200
 """Time in s at which every free response has ended: a frequency response has no initial state."""
 
@@ -122,27 +119,11 @@ def step_part(
     return part, step_scales(data, calm.size, latest)
 
 
-def sampled_data(
-    outputs: Sequence[FloatArray],
-    inputs: Sequence[FloatArray],
-    dt: float,
-    dead_time: float,
-    every: int = 1,
-) -> SampledData:
-    """Select the samples of records with any input that do not depend on unknown past input.
-
-    Of `every` samples the mean, if the plant is slow.
-    """
-    data = cut(outputs, inputs, dt, every)
-    late = int(np.ceil(_UNKNOWN * dead_time / data.step))
-    return replace(data, starts=tuple(min(late, y.size // 2) for y in data.outputs))
-
-
 def sampled_part(
     data: SampledData, fit: OutputErrorEstimate, latest: float | None
 ) -> tuple[Window, Scales]:
     """Set up records with any input; of long ones a part in which the input moves."""
-    part = window_of(data, KnownFactor())
+    part = window_of(data)
     problem = part.problem
     parameters = np.concatenate([[fit.dead_time], parameters_from_poles(fit.poles)])
     error = evaluate(problem, fit.structure, parameters[None]).residual[0]
@@ -153,12 +134,11 @@ def sampled_part(
     calm = problem.data - error + np.clip(error, -limit, limit)
     problem = replace(problem, data=calm, root_weight=problem.root_weight / np.sqrt(variance))
     lag = float(np.sum(1 / np.abs(fit.poles)))
-    quarter = 0.25 * max(y.size for y in data.outputs) * data.step
     scales = Scales(
         max(fit.dead_time, 0.5 * data.step),
         max(lag, 2 * data.step),
         max(data.lengths) * data.step,
         data.step,
-        quarter if latest is None else latest,
+        data.quarter if latest is None else latest,
     )
     return replace(part, problem=problem, samples=error.size / correlation), scales

@@ -1,4 +1,4 @@
-"""What structures that were not requested say of a record.
+"""What is requested of a fit, and what structures that were not requested say of a record.
 
 A structure is ruled out by a difference of criteria that [1]_ calls very strong.
 
@@ -11,11 +11,11 @@ References
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 
 from ..constants import VERY_STRONG
 from ..engine.compared_fits import SLACK, converged, on_new_data, settled
-from ..engine.problem import Structure
+from ..engine.problem import KnownFactor, Structure
 from ..engine.profile_ends import profile_limits
 from ..engine.structures import (
     ALL_STRUCTURES,
@@ -27,10 +27,39 @@ from ..engine.structures import (
     search,
 )
 from ..engine.window_fit import WindowFit
+from ..families.process_form import ProcessForm
 from .profiles import profile_of
 from .result import OtherStructures, StructureFit
 
 _MOST_ORDER = ALL_STRUCTURES[-1].order  # highest order that is tried
+
+
+@dataclass(frozen=True, eq=False)
+class Requested:
+    """What is requested of a fit.
+
+    Attributes
+    ----------
+    structures : tuple of Structure, optional
+        The dead time is that of the best of them, adequate or not. Default: structures are chosen.
+    forms : tuple of ProcessForm
+        Process models to which the choice is limited; `structures` are theirs.
+    latest : float, optional
+        Largest dead time, in s.
+    known : KnownFactor
+        Dynamics in cascade that are not part of the plant.
+    huber : bool
+        Huber's loss (k = 1.345) instead of least squares.
+    whiten : bool
+        Prewhiten the data if the noise is coloured.
+    """
+
+    structures: tuple[Structure, ...] | None = None
+    forms: tuple[ProcessForm, ...] = ()
+    latest: float | None = None
+    known: KnownFactor = field(default_factory=KnownFactor)
+    huber: bool = True
+    whiten: bool = True
 
 
 def other_structures(fits: WindowFit, refit: Callable[[], WindowFit]) -> OtherStructures:

@@ -66,7 +66,7 @@ from ..constants import Z_95
 from ..engine.compared_fits import at_dead_time
 from ..engine.eliminate import evaluate
 from ..engine.modal import respond
-from ..engine.problem import KnownFactor, Structure
+from ..engine.problem import Structure
 from ..engine.structures import (
     ALL_STRUCTURES,
     SIMPLE_STRUCTURES,
@@ -77,7 +77,6 @@ from ..engine.window_fit import WindowFit, among, fit_window, with_noise_of_resi
 from ..families.equal_lags import LagChain
 from ..families.flow import DispersedFlow
 from ..families.physical import without_errors
-from ..families.process_form import ProcessForm
 from .before_the_step import fitted_from_rest
 from .coloured import in_coloured_noise
 from .extrapolation import least_extrapolating
@@ -85,7 +84,7 @@ from .flat_likelihood import closer, later, moved, pinned, with_close_decision
 from .interval import likelihood_fit
 from .load import load_of
 from .margins import CloseDecision, close_to
-from .other_structures import other_structures
+from .other_structures import Requested, other_structures
 from .process_models import process_fit
 from .profiles import profile_of
 from .result import DelayInterval, OutputErrorEstimate, RobustKey, assembled
@@ -113,14 +112,7 @@ _FEWEST_LATE = 8  # bins in the later half of what comes when the response has s
 
 
 def fit_step_record(
-    data: StepData,
-    *,
-    structures: Sequence[Structure] | None = None,
-    forms: Sequence[ProcessForm] = (),
-    latest: float | None = None,
-    known: KnownFactor | None = None,
-    huber: bool = True,
-    whiten: bool = True,
+    data: StepData, requested: Requested | None = None
 ) -> tuple[StepData, OutputErrorEstimate]:
     """Estimate the dead time of a step record.
 
@@ -131,42 +123,23 @@ def fit_step_record(
     ----------
     data : StepData
         With a visible onset.
-    structures : sequence of Structure, optional
-        Default: orders 1 to 5, relative degrees 1 to the order. If structures are given, the dead
-        time is that of the best of them, adequate or not.
-    forms : sequence of ProcessForm, optional
-        Process models to which the choice is limited; `structures` are theirs.
-    latest : float, optional
-        Largest dead time, in s.
-    known : KnownFactor, optional
-        Dynamics in cascade that are not part of the plant.
-    huber : bool, optional
-        Huber's loss (k = 1.345) instead of least squares.
-    whiten : bool, optional
-        Prewhiten the data if the baseline noise is coloured.
+    requested : Requested, optional
+        By default orders 1 to 5 with relative degrees 1 to the order are tried; the noise is that
+        of the baseline.
     """
-    fit = partial(_fit_until, latest=latest, known=known or KnownFactor(), huber=huber)
-    given = data
-    data, fits = fitted_from_rest(
-        data, fit, ALL_STRUCTURES if structures is None else tuple(structures)
-    )
+    requested = requested or Requested()
+    fit = partial(_fit_until, requested=requested)
+    given, structures = data, requested.structures
+    data, fits = fitted_from_rest(data, fit, structures or ALL_STRUCTURES)
     free = cache(partial(fit, data, data.output.size, ALL_STRUCTURES))
     loaded = None if data.load is not None else load_of(data, fits, fit, free, _is_noise)
     if loaded is not None and not loaded[0].early:
-        data, found = fit_step_record(
-            given.with_load(*loaded),
-            structures=structures,
-            forms=forms,
-            latest=latest,
-            known=known,
-            huber=huber,
-            whiten=whiten,
-        )
+        data, found = fit_step_record(given.with_load(*loaded), requested)
         return data, replace(found, load=loaded[0])
     if structures is None:
-        found = _free_choice(data, fits, fit, whiten)
+        found = _free_choice(data, fits, fit, requested.whiten)
     else:
-        found = _given_structures(data, fits, free, forms, whiten)
+        found = _given_structures(data, fits, free, requested)
     return data, found if loaded is None else replace(found, load=loaded[0])
 
 
@@ -174,20 +147,20 @@ def _given_structures(
     data: StepData,
     fits: WindowFit,
     free: Callable[[], WindowFit],
-    forms: Sequence[ProcessForm],
-    whiten: bool,
+    requested: Requested,
 ) -> OutputErrorEstimate:
     """Estimate the dead time by the likelihood of the best of given structures, adequate or not."""
     adequate, near = _is_noise(data, fits, fits.best), _close_to_noise(data, fits)
     others = other_structures(fits, free)
-    if adequate and whiten:
+    if adequate and requested.whiten:
         fits = in_coloured_noise(fits, data)
     if adequate and fits.colour is None and others.better is None:
         fits = with_noise_of_residual(fits)
-    if forms:
+    if requested.forms:
         level = max(ADEQUATE * data.colour, fits.normalized_rms if adequate else 0.0)
-        return process_fit(fits, forms, is_noise=lambda rms, _: rms <= level, others=others,
-                           near=near)  # fmt: skip
+        return process_fit(
+            fits, requested.forms, is_noise=lambda rms, _: rms <= level, others=others, near=near
+        )
     given = replace(likelihood_fit(fits, adequate=adequate, near=near), others=others)
     return in_rounded_data(given, fits, data.quantum) if adequate and data.coarse else given
 
@@ -333,17 +306,14 @@ def _fit_until(
     data: StepData,
     stop: int,
     structures: Sequence[Structure],
-    *,
-    latest: float | None,
-    known: KnownFactor,
-    huber: bool,
+    requested: Requested,
 ) -> WindowFit:
     return fit_window(
-        window(data, stop, known),
+        window(data, stop, requested.known),
         structures,
-        step_scales(data, stop, latest),
+        step_scales(data, stop, requested.latest),
         (data.sigma, data.quantum),
-        huber,
+        requested.huber,
     )
 
 

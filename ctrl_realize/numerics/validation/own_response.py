@@ -15,7 +15,9 @@ References
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import TypeAlias
 
 import numpy as np
 from scipy.special import chdtrc, ndtri, stdtrit
@@ -33,6 +35,10 @@ _LARGEST_STRETCH = 0.5  # of the logarithm, in one turn
 _SETTLED = 1e-3  # samples, and part of the lags
 _STRETCH = 0.01  # of the time constants, for a slope by differences: off by 1e-4
 _FALSE_NAMES = 0.01  # chance that an outlier is named in a set without one
+
+
+Moved: TypeAlias = Callable[[float, float], tuple[FloatArray, FloatArray, FloatArray]]
+"""Common response (n,), shifted and stretched, and its derivatives by shift and log stretch."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -173,14 +179,47 @@ def own_step_response(
     """
     n = output.size
     line = np.arange(n) / n  # drifts may cancel in the mean of the records
-    beside = np.column_stack([line, own[:n]])
-    (gain, shift, _), (gain_error, error, _), _ = _matched(output, model, start, beside, 0.0)
-    (*_, lag), (*_, lag_error), settled = _matched(
-        output, model, start, beside, shift, with_lags=True
+    own = own[:n]
+
+    def moved(shift: float, stretch: float) -> tuple[FloatArray, FloatArray, FloatArray]:
+        return _moved(model, n, start, shift, stretch)
+
+    return matched(output, moved, np.column_stack([line, own]), own, 0.2 * start + 20, dt)
+
+
+def matched(
+    output: FloatArray,
+    moved: Moved,
+    beside: FloatArray,
+    own: FloatArray,
+    reach: float,
+    dt: float,
+) -> OwnResponse:
+    """Shift, scale and stretch a common response to fit one record best.
+
+    Parameters
+    ----------
+    output : ndarray, shape (n,)
+        The record.
+    moved : callable
+        The common response for a shift in samples and a stretch.
+    beside : ndarray, shape (n, p)
+        Further effects in the record.
+    own : ndarray, shape (n, q)
+        Those beside which the gain alone is estimated.
+    reach : float
+        Largest shift in one turn, in samples.
+    dt : float
+        Sample time in s.
+    """
+    (gain, shift, _), (gain_error, error, _), _ = _settled(output, moved, beside, reach, 0.0)
+    (*_, lag), (*_, lag_error), settled = _settled(
+        output, moved, beside, reach, shift, with_lags=True
     )
-    alone, errors = _regression(np.column_stack([model[:n], own[:n]]), output)
-    level = np.linalg.lstsq(beside, output - model[:n], rcond=None)[0]
-    followed = float(fit_percent(output[None], (model[:n] + beside @ level)[None])[0])
+    common = moved(0.0, 1.0)[0]
+    alone, errors = _regression(np.column_stack([common, own]), output)
+    level = np.linalg.lstsq(beside, output - common, rcond=None)[0]
+    followed = float(fit_percent(output[None], (common + beside @ level)[None])[0])
     return OwnResponse(
         shift * dt,
         max(error, 1e-12) * dt,
@@ -194,11 +233,11 @@ def own_step_response(
     )
 
 
-def _matched(
+def _settled(
     output: FloatArray,
-    model: FloatArray,
-    start: float,
+    moved: Moved,
     beside: FloatArray,
+    reach: float,
     shift: float,
     *,
     with_lags: bool = False,
@@ -208,10 +247,9 @@ def _matched(
     Without lags the stretch is 1. The errors of shift and stretch are those of the last turn.
     """
     stretch, free = 1.0, 3 if with_lags else 2
-    reach = 0.2 * start + 20
     for _ in range(_TURNS):
-        moved = _moved(model, output.size, start, shift, stretch)[:free]
-        solution, errors = _regression(np.column_stack([*moved, beside]), output)
+        columns = moved(shift, stretch)[:free]
+        solution, errors = _regression(np.column_stack([*columns, beside]), output)
         gain = float(solution[0]) or 1.0
         moves = np.append(solution[1:free] / gain, 0.0)
         shift += float(np.clip(moves[0], -reach, reach))

@@ -24,6 +24,8 @@ MOST_SAMPLES = 4000
 Where their response ends in time all samples are fitted afterwards (`condensed`); where the plant
 is slow means over blocks of samples are fitted, so many of them."""
 
+BEYOND = 1.5  # of a first-order model's dead time: no model's dead time is later
+
 _SPARSEST = 20
 """Samples, of which one is there, up to which a part is lengthened for what is missing in it. It is
 lengthened fully if the input moves seldom: time then grows with the samples that there are."""
@@ -57,6 +59,8 @@ class SampledData:
         First sample of each within its record.
     every, width : int
         Inputs in a block for each output, and the samples of it of which an output is the mean.
+    known : KnownFactor
+        Dynamics in cascade that are not part of the plant.
     """
 
     inputs: tuple[FloatArray, ...]
@@ -64,9 +68,10 @@ class SampledData:
     starts: tuple[int, ...]
     scales: tuple[float, ...]
     dt: float
-    offsets: tuple[int, ...] = ()
-    every: int = 1
-    width: int = 1
+    offsets: tuple[int, ...]
+    every: int
+    width: int
+    known: KnownFactor
 
     @property
     def step(self) -> float:
@@ -125,6 +130,16 @@ class SampledData:
         """Outputs of every record from the first one fitted on, missing ones included."""
         return [y.size - start for y, start in zip(self.outputs, self.starts, strict=True)]
 
+    def after(self, dead_time: float) -> SampledData:
+        """Leave out what may depend on the input before the records; at most half of each."""
+        late = int(np.ceil(BEYOND * dead_time / self.step))
+        return replace(self, starts=tuple(min(late, y.size // 2) for y in self.outputs))
+
+    @property
+    def quarter(self) -> float:
+        """A quarter of the longest record in s: no dead time is longer by default."""
+        return 0.25 * max(y.size for y in self.outputs) * self.step
+
     @property
     def edges(self) -> IntArray:
         """Bounds of the records in the concatenated data."""
@@ -146,13 +161,14 @@ class SampledData:
             starts=tuple(start + order for start in self.starts),
         )
 
-    def problem(self, known: KnownFactor) -> Problem:
-        """Set up the fit of all records together."""
+    @cached_property
+    def problem(self) -> Problem:
+        """The fit of all records together."""
         clocks = [
             self.step * (rows - start).astype(np.float64)
             for rows, start in zip(self.rows, self.starts, strict=True)
         ]
-        shapes = [_own_shapes(clock, known) for clock in clocks]
+        shapes = [_own_shapes(clock, self.known) for clock in clocks]
         m = int(self.edges[-1])
         inputs = [self._input(i) for i in range(len(self.inputs))]
         drive = SeveralInputs(*zip(*inputs, strict=True))
@@ -160,11 +176,15 @@ class SampledData:
             [y / scale for y, scale in zip(self.measured, self.scales, strict=True)]
         )
         segments = Segments(self.edges, np.concatenate(clocks), np.concatenate(shapes))
-        return Problem(joined, np.ones(m), drive, np.empty((m, 0)), known, segments)
+        return Problem(joined, np.ones(m), drive, np.empty((m, 0)), self.known, segments)
 
 
 def cut(
-    outputs: Sequence[FloatArray], inputs: Sequence[FloatArray], dt: float, every: int = 1
+    outputs: Sequence[FloatArray],
+    inputs: Sequence[FloatArray],
+    dt: float,
+    every: int,
+    known: KnownFactor,
 ) -> SampledData:
     """Shorten long records to a part in which the input moves; the shortest are kept complete.
 
@@ -202,6 +222,7 @@ def cut(
         offsets=tuple(span.start for span in spans),
         every=every,
         width=width,
+        known=known,
     )
 
 

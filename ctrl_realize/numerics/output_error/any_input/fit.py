@@ -26,24 +26,23 @@ import numpy as np
 
 from ...arrays import FloatArray
 from ...engine.compared_fits import converged
-from ...engine.poles import parameters_from_poles
+from ...engine.local_terms import local_columns
+from ...engine.poles import parameters_from_poles, poles_from_parameters
 from ...engine.problem import KnownFactor, Problem, Structure
 from ...engine.structures import Candidate, search
 from ...engine.window import window_of_rows
 from ...engine.window_fit import WindowFit, extended, with_known_noise
-from ...families.process_form import ProcessForm
 from ...signals.correlation import fit_percent
 from ...signals.noise import correlation_time, winsorised_sigma
-from ...validation.own_response import OwnResponse
+from ...validation.own_response import OwnResponse, matched, response_slopes
 from ..interval import likelihood_fit
 from ..margins import close_to
-from ..other_structures import other_structures
+from ..other_structures import Requested, other_structures
 from ..process_models import process_fit
 from ..result import OutputErrorEstimate, followed_by
 from ..selection import chains_of
 from .condensed import MOST_LAGS, Condensed, condensed
 from .data import SampledData, cut
-from .own_response import own_response
 from .stretch import WHITE, explained, fit_stretch, response_samples, samples_in_a_block
 from .window import ORDERS, SampledWindow, modelled, window_of
 
@@ -51,6 +50,8 @@ MORE_LAGS = (Structure(4, 4), Structure(5, 5))
 """Tried as well where three poles are chosen: zeros beside them imitate further lags. Ablation:
 fourth and fifth lag."""
 _LEAST_LAGS = 30  # of a response that is condensed; fewer cost as much
+_SHIFT = 0.25  # samples, for a slope by differences
+_REACH = 20.0  # samples by which the dead time of a record moves in one turn at most
 _CLEARLY = 4.0  # standard deviations of a chi-square: 3e-5 by chance
 
 
@@ -68,29 +69,34 @@ class SampledFit:
     data: SampledData
     fitted: tuple[FloatArray, ...]
     explained: float
-    known: KnownFactor
     noise: FloatArray
-    condensed: Condensed | None = None
+    condensed: Condensed | None
 
     def own_delay(self, output: FloatArray, signal: FloatArray) -> OwnResponse:
         """Shift and scale the common model to fit one record best, whether it was fitted or not."""
-        one = cut([output], [signal], self.data.dt, self.data.every)
-        start = min(max(self.data.starts), one.outputs[0].size // 2)
-        one = replace(one, starts=(start,)).whitened(self.noise)
-        return own_response(one, self.fit, self.known)
+        data = self.data
+        one = cut([output], [signal], data.dt, data.every, data.known)
+        start = min(max(data.starts), one.outputs[0].size // 2)
+        problem = replace(one, starts=(start,)).whitened(self.noise).problem
+        assert problem.segments is not None
+        poles = poles_from_parameters(parameters_from_poles(self.fit.poles)[None])[0]
+        own, step = local_columns(problem.segments, poles)[0], data.step
+
+        def moved(shift: float, stretch: float) -> tuple[FloatArray, FloatArray, FloatArray]:
+            at, model = self.fit.dead_time + shift * step, (self.fit.poles, self.fit.numerator)
+            here, later, longer = response_slopes(
+                problem.drive, data.known, at, *model, _SHIFT * step, stretch
+            )
+            return here, step * later, longer
+
+        return matched(problem.data, moved, own, own, _REACH, step)
 
 
 def fit_sampled(
     outputs: Sequence[FloatArray],
     inputs: Sequence[FloatArray],
     dt: float,
-    *,
-    structures: Sequence[Structure] | None = None,
-    forms: Sequence[ProcessForm] = (),
-    latest: float | None = None,
-    known: KnownFactor | None = None,
-    huber: bool = True,
-    whiten: bool = True,
+    requested: Requested,
 ) -> SampledFit:
     """Estimate the dead time of one plant from records with any input that moves.
 
@@ -100,8 +106,8 @@ def fit_sampled(
         One of each for every record; outputs are NaN where a sample is missing.
     dt : float
         Sample time in s.
-    structures, forms, latest, known, huber, whiten
-        See `fit_step_record`; orders up to 3 by default, `latest` a quarter of the longest record.
+    requested : Requested
+        By default orders up to 3 are tried, and dead times up to a quarter of the longest record.
 
     Notes
     -----
@@ -120,43 +126,51 @@ def fit_sampled(
     its samples as if they were neighbours: an average over the gaps, as it counts for the errors of
     slow parameters.
     """
-    factor = known or KnownFactor()
-    tried = ORDERS if structures is None else tuple(structures)
-    fit_part = partial(fit_stretch, factor, latest, huber)
-    every, done = samples_in_a_block(outputs, inputs, dt, whiten, fit_part)
+    structures, tried = requested.structures, requested
+    every, done = samples_in_a_block(outputs, inputs, dt, requested)
     if done is None or structures is not None:
-        whiten &= structures is None
-        done = fit_part(whiten, cut(outputs, inputs, dt, every), tried)
+        if structures is not None:
+            tried = replace(requested, whiten=False)
+        data = cut(outputs, inputs, dt, every, requested.known)
+        done = fit_stretch(data, structures or ORDERS, tried)
     part, unweighted = done
     data, stretch = part.data, part.fit
-    fits = stretch
+    fits, sums = stretch, None
     long = any(y.size > every * kept.size for y, kept in zip(outputs, data.outputs, strict=True))
-    usable = long and not any(np.isnan(y).any() for y in outputs)
-    sums = _condensed(outputs, inputs, data, stretch, huber) if usable else None
+    if long and not any(np.isnan(y).any() for y in outputs):
+        lags = min(response_samples(stretch.best, dt), MOST_LAGS + 1)
+        sums = condensed(
+            [y / scale for y, scale in zip(outputs, data.scales, strict=True)],
+            [u / scale for u, scale in zip(inputs, data.scales, strict=True)],
+            dt,
+            max(int(np.ceil(lags)), _LEAST_LAGS),
+            huber=requested.huber,
+        )
     if sums is not None:
         stretch = replace(stretch, scales=replace(stretch.scales, dt=dt))
-        fits = _fit_condensed(sums, stretch, factor)
+        fits = _fit_condensed(sums, stretch, requested.known)
     if structures is None and fits.best.structure.order == ORDERS[-1].order:
         fits = extended(fits, MORE_LAGS)
-    chains = chains_of(fits) if structures is None else []
     others = None
     if structures is not None:
         # On the part also if all samples were fitted: what is ruled out there is ruled out in any
         # case.
         others = other_structures(stretch, partial(part.fit_of, ORDERS))
     white = fits.correlation <= WHITE
-    if forms and others is not None:
+    if requested.forms and others is not None:
         fit = process_fit(
-            fits, forms, is_noise=lambda _, correlation: correlation <= WHITE, others=others
+            fits,
+            requested.forms,
+            is_noise=lambda _, correlation: correlation <= WHITE,
+            others=others,
         )
     else:
+        chains = chains_of(fits) if structures is None else []
         fit = replace(likelihood_fit(fits, adequate=white, chains=chains), others=others)
     if sums is not None:
-        fitted = _on_stretch(data, fit, factor)
-        left = winsorised_sigma(window_of(data, factor).output - fitted, 0.0)
-        fit = replace(fit, fitted=fitted, residual=fit.residual._replace(std=left))
+        fit = _of_measured(part, fit, 0)
     elif part.noise.size > 1:
-        fit = replace(_of_measured(part, fit), unweighted=unweighted)
+        fit = replace(_of_measured(part, fit, part.noise.size - 1), unweighted=unweighted)
     elif fit.distributed.chain:
         left = correlation_time(fits.window.output - fit.fitted)
         fit = replace(fit, residual=fit.residual._replace(correlation=left), adequate=left <= WHITE)
@@ -171,47 +185,27 @@ def fit_sampled(
         data,
         tuple(values * scale for values, scale in zip(parts, data.scales, strict=True)),
         explained(stretch),
-        factor,
         part.noise,
         sums,
     )
 
 
-def _of_measured(part: SampledWindow, fit: OutputErrorEstimate) -> OutputErrorEstimate:
-    """Describe a fit of filtered records in terms of those that were measured."""
-    fitted = _on_stretch(part.data, fit, part.known)
-    window = window_of(part.data, part.known)
+def _of_measured(
+    part: SampledWindow, fit: OutputErrorEstimate, noise_lags: int
+) -> OutputErrorEstimate:
+    """Describe a fit of filtered or condensed records in terms of those that were measured."""
+    window = window_of(part.data)
+    parameters = np.append(fit.dead_time, parameters_from_poles(fit.poles))
+    fitted = modelled(part.data, parameters, fit.numerator)
     measured = replace(part.fit, window=window, problem=window.problem)
-    chosen = Candidate(fit.structure, _parameters(fit), 0.0)
-    followed = followed_by(measured, chosen, fit.numerator)
+    followed = followed_by(measured, Candidate(fit.structure, parameters, 0.0), fit.numerator)
     complete = float(fit_percent(window.output[None], fitted[None])[0])
+    left = winsorised_sigma(window.output - fitted, 0.0)
     return replace(
         fit,
         fitted=fitted,
         followed=followed._replace(complete=complete),
-        residual=fit.residual._replace(
-            std=winsorised_sigma(window.output - fitted, 0.0), noise_lags=part.noise.size - 1
-        ),
-    )
-
-
-def _condensed(
-    outputs: Sequence[FloatArray],
-    inputs: Sequence[FloatArray],
-    data: SampledData,
-    stretch: WindowFit,
-    huber: bool,
-) -> Condensed | None:
-    """All samples of records of which a part was fitted, if their response is short enough."""
-    lags = response_samples(stretch.best, data.dt)
-    if not lags <= MOST_LAGS:
-        return None
-    return condensed(
-        [y / scale for y, scale in zip(outputs, data.scales, strict=True)],
-        [u / scale for u, scale in zip(inputs, data.scales, strict=True)],
-        data.dt,
-        max(int(np.ceil(lags)), _LEAST_LAGS),
-        huber=huber,
+        residual=fit.residual._replace(std=left, noise_lags=noise_lags),
     )
 
 
@@ -229,12 +223,3 @@ def _fit_condensed(sums: Condensed, stretch: WindowFit, known: KnownFactor) -> W
     colour = excess if excess > 1 + _CLEARLY * np.sqrt(2 / freedom) else 1.0
     window = replace(window_of_rows(problem), samples=sums.samples)
     return with_known_noise(window, fits, scales, sums.noise, colour)
-
-
-def _on_stretch(data: SampledData, fit: OutputErrorEstimate, known: KnownFactor) -> FloatArray:
-    """Model at the samples of the part, with local level, drift and initial state."""
-    return modelled(data, known, _parameters(fit), fit.numerator)
-
-
-def _parameters(fit: OutputErrorEstimate) -> FloatArray:
-    return np.concatenate([[fit.dead_time], parameters_from_poles(fit.poles)])

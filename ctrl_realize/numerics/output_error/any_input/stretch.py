@@ -6,19 +6,21 @@ time. The selection is our own rule.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
+from dataclasses import replace
 from typing import TypeAlias
 
 import numpy as np
 
 from ...arrays import FloatArray
-from ...engine.problem import KnownFactor, Structure
+from ...engine.problem import Structure
 from ...engine.structures import Candidate
 from ...engine.window_fit import WindowFit
+from ..other_structures import Requested
 from ..result import UnweightedModel
 from .condensed import MOST_LAGS
-from .data import SampledData, cut
-from .window import BEYOND, ORDERS, SampledWindow, fit_windows, in_coloured_noise
+from .data import BEYOND, SampledData, cut
+from .window import ORDERS, SampledWindow, fit_windows, in_coloured_noise
 
 FOLLOWS = 36.0
 """Least chi-square of the response to the input: six standard deviations. White noise without any
@@ -42,17 +44,12 @@ Stretch: TypeAlias = tuple[SampledWindow, UnweightedModel | None]
 
 
 def fit_stretch(
-    known: KnownFactor,
-    latest: float | None,
-    huber: bool,
-    whiten: bool,
-    data: SampledData,
-    structures: Sequence[Structure],
+    data: SampledData, structures: Sequence[Structure], requested: Requested
 ) -> Stretch:
     """Fit structures to a part of the records, by default dead times up to a quarter of it."""
-    limit = 0.25 * max(y.size for y in data.outputs) * data.step if latest is None else latest
-    part = fit_windows(data, known, structures, limit, huber, np.ones(1))
-    if not (part.fit.correlation > WHITE and whiten and data.complete):
+    limit = data.quarter if requested.latest is None else requested.latest
+    part = fit_windows(data, structures, limit, requested.huber, np.ones(1))
+    if not (part.fit.correlation > WHITE and requested.whiten and data.complete):
         return part, None
     return in_coloured_noise(part), part.model
 
@@ -61,8 +58,7 @@ def samples_in_a_block(
     outputs: Sequence[FloatArray],
     inputs: Sequence[FloatArray],
     dt: float,
-    whiten: bool,
-    fitted: Callable[[bool, SampledData, Sequence[Structure]], Stretch],
+    requested: Requested,
 ) -> tuple[int, Stretch | None]:
     """Samples of which the mean is fitted, so that a slow plant is seen for long enough.
 
@@ -72,18 +68,18 @@ def samples_in_a_block(
     part may be too short, show no response, or leave room for a fast pole that is none: longer
     blocks are looked at until they do not grow.
     """
-    sizes = [y.size for y in outputs]
+    sizes, plain = [y.size for y in outputs], replace(requested, whiten=False)
     longest, every = max(sizes), 1
     while True:
-        data = cut(outputs, inputs, dt, every)
+        data = cut(outputs, inputs, dt, every, requested.known)
         rows = max(y.size for y in data.outputs)
         if longest < _WORTHWHILE * every * rows:
             return every, None
-        fit = fitted(False, data, _SIMPLE)[0].fit
+        fit = fit_stretch(data, _SIMPLE, plain)[0].fit
         if every == 1 and _seen_to_end(fit, dt):
             return 1, None
-        if every == 1 and fit.correlation > WHITE and whiten and data.complete:
-            done = fitted(True, data, ORDERS)
+        if every == 1 and fit.correlation > WHITE and requested.whiten and data.complete:
+            done = fit_stretch(data, ORDERS, requested)
             fit = done[0].fit
             if _seen_to_end(fit, dt):
                 return 1, done

@@ -24,7 +24,7 @@ from ...engine.compared_fits import settled
 from ...engine.eliminate import evaluate
 from ...engine.modal import respond
 from ...engine.poles import poles_from_parameters
-from ...engine.problem import KnownFactor, Problem, Structure
+from ...engine.problem import Problem, Structure
 from ...engine.static_gain import StaticGain
 from ...engine.structures import Candidate, Scales, search
 from ...engine.window import Window, window_of_rows
@@ -37,7 +37,6 @@ from .data import SampledData
 
 ORDERS = tuple(Structure(n, r) for n in range(1, 4) for r in range(n, 0, -1))
 """Every sample counts here, so that orders 4 and 5 would take most of the time."""
-BEYOND = 1.5  # of a first-order model's dead time: no model's dead time is later
 _NOISE_TURNS = 2
 """Noise models, each from the residual of the previous fit: the first residual contains what
 the model followed of slow noise. Ablation: coloured noise of any input."""
@@ -60,13 +59,7 @@ class SampledWindow:
     noise: FloatArray
     scales: Scales
     fit: WindowFit
-    known: KnownFactor
     huber: bool
-
-    @property
-    def filtered(self) -> SampledData:
-        """What was fitted."""
-        return self.data.whitened(self.noise)
 
     @property
     def model(self) -> UnweightedModel:
@@ -77,12 +70,11 @@ class SampledWindow:
 
     def fit_of(self, structures: Sequence[Structure]) -> WindowFit:
         """Fit other structures to the same data."""
-        return _fit(self.filtered, self.known, structures, self.scales, self.huber)
+        return _fit(self.data.whitened(self.noise), structures, self.scales, self.huber)
 
 
 def fit_windows(
     data: SampledData,
-    known: KnownFactor,
     structures: Sequence[Structure],
     limit: float,
     huber: bool,
@@ -97,19 +89,18 @@ def fit_windows(
     alike = (1.0,) * len(data.outputs)
     data = replace(data, starts=tuple(y.size // 20 for y in data.outputs), scales=alike)
     filtered = data.whitened(noise)
-    rough = _first_order(filtered.problem(known), n, dt, usual, limit, _seen(filtered, limit))
+    rough = _first_order(filtered.problem, n, dt, usual, limit, _seen(filtered, limit))
     lag = float(-1.0 / rough.poles[0].real)
-    late = int(np.ceil(BEYOND * rough.dead_time / dt))
-    data = replace(data, starts=tuple(min(late, y.size // 2) for y in data.outputs))
+    data = data.after(rough.dead_time)
     length = (max(data.lengths) - order) * dt
     scales = Scales(max(rough.dead_time, 0.5 * usual), max(lag, 2 * usual), length, dt, limit)
-    fits = _fit(data.whitened(noise), known, structures, scales, huber)
+    fits = _fit(data.whitened(noise), structures, scales, huber)
     levels = _noise_levels(data.whitened(noise), fits)
     if levels.max() > _UNLIKE * levels.min():
         mean = float(np.exp(np.mean(np.log(levels))))
         data = replace(data, scales=tuple(float(level) / mean for level in levels))
-        fits = _fit(data.whitened(noise), known, structures, scales, huber)
-    return SampledWindow(data, noise, scales, fits, known, huber)
+        fits = _fit(data.whitened(noise), structures, scales, huber)
+    return SampledWindow(data, noise, scales, fits, huber)
 
 
 def in_coloured_noise(plain: SampledWindow) -> SampledWindow:
@@ -123,16 +114,16 @@ def in_coloured_noise(plain: SampledWindow) -> SampledWindow:
     found = plain
     for _ in range(_NOISE_TURNS):
         parameters = found.fit.best.parameters
-        model = modelled(found.data, found.known, parameters, found.model.numerator)
-        error = found.data.problem(found.known).data - model
+        model = modelled(found.data, parameters, found.model.numerator)
+        error = found.data.problem.data - model
         noise = whitening_filter(error, noise_lags(min(found.data.counts)))
         limit = plain.scales.latest
-        again = fit_windows(plain.data, plain.known, ORDERS, limit, plain.huber, noise)
+        again = fit_windows(plain.data, ORDERS, limit, plain.huber, noise)
         settling = [s for s, c in again.fit.candidates.items() if _settles(again.fit.static(c))]
         if not settling:
             break
         if len(settling) < len(ORDERS):
-            again = fit_windows(plain.data, plain.known, settling, limit, plain.huber, noise)
+            again = fit_windows(plain.data, settling, limit, plain.huber, noise)
         if not again.fit.correlation < plain.fit.correlation:
             break
         found = again
@@ -143,19 +134,15 @@ def _settles(static: StaticGain) -> bool:
     return static.significant and not static.integrates and static.slowest >= _SETTLED
 
 
-def window_of(data: SampledData, known: KnownFactor) -> Window:
+def window_of(data: SampledData) -> Window:
     """Set up the fit of all samples."""
-    return replace(window_of_rows(data.problem(known)), spacing=data.spacing / data.every)
+    return replace(window_of_rows(data.problem), spacing=data.spacing / data.every)
 
 
 def _fit(
-    data: SampledData,
-    known: KnownFactor,
-    structures: Sequence[Structure],
-    scales: Scales,
-    huber: bool,
+    data: SampledData, structures: Sequence[Structure], scales: Scales, huber: bool
 ) -> WindowFit:
-    window = window_of(data, known)
+    window = window_of(data)
     problem = window.problem
     # after a spike at the start there may be nothing left that moves
     fits = 1e-9 * max(float(np.ptp(y[~np.isnan(y)])) for y in data.outputs)
@@ -164,12 +151,10 @@ def _fit(
     return fit_window(window, structures, scales, noise, huber)
 
 
-def modelled(
-    data: SampledData, known: KnownFactor, parameters: FloatArray, numerator: FloatArray
-) -> FloatArray:
+def modelled(data: SampledData, parameters: FloatArray, numerator: FloatArray) -> FloatArray:
     """Output of a model, with local level, drift and initial state."""
-    problem = data.problem(known)
-    model = respond(problem.drive, known, numerator, parameters)
+    problem = data.problem
+    model = respond(problem.drive, data.known, numerator, parameters)
     own = problem.local_terms(poles_from_parameters(parameters[None, 1:])[0])
     rest = (problem.data - model)[None, :, None]
     return np.asarray(problem.data - own.without(rest)[0, :, 0])
