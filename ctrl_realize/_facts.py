@@ -1,9 +1,11 @@
-"""Tables of facts, which lie beside the code as TOML."""
+"""Tables of facts, which lie beside the code as TOML, and versions of packages."""
 
 from __future__ import annotations
 
 import pkgutil
 import tomllib
+from functools import cache
+from importlib import metadata
 from typing import Any
 
 
@@ -26,3 +28,12 @@ def _fixed(value: Any) -> Any:
     if isinstance(value, dict):
         return {key: _fixed(part) for key, part in value.items()}
     return tuple(map(_fixed, value)) if isinstance(value, list) else value
+
+
+@cache
+def version_of(package: str) -> str:
+    """Version of a package, determined once per process."""
+    try:
+        return metadata.version(package)
+    except metadata.PackageNotFoundError:
+        return "not installed"

@@ -34,9 +34,9 @@ for command in (identify, compare, valve, loop):
 
 def _version(asked: bool) -> None:
     if asked:
-        from importlib import metadata
+        from .._facts import version_of
 
-        typer.echo(f"ctrl-realize {metadata.version('ctrl-realize')}")
+        typer.echo(f"ctrl-realize {version_of('ctrl-realize')}")
         raise typer.Exit
 
 

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import os
 import stat
+from collections.abc import Iterator
+from contextlib import contextmanager
 from numbers import Real
 from pathlib import Path
 
@@ -82,3 +84,27 @@ def read_tail(path: Path, n_bytes: int) -> bytes:
         # an even start keeps two-byte characters whole
         file.seek(max(0, path.stat().st_size - n_bytes) // 2 * 2)
         return file.read()
+
+
+@contextmanager
+def told_if_damaged(path: Path, kind: str) -> Iterator[None]:
+    """Turn any error of a reader into one message: damaged files raise all kinds of them."""
+    try:
+        yield
+    except (FileFormatError, OptionError):
+        raise
+    except Exception as error:
+        reason = str(error).partition("\n")[0][:200]
+        raise FileFormatError(f"{path} is a damaged {kind}: {reason}") from error
+
+
+@contextmanager
+def package_for(path: Path, kind: str, extra: str, package: str) -> Iterator[None]:
+    """Say what to install, if an import fails, or what to do without it."""
+    try:
+        yield
+    except ImportError as error:
+        raise FileFormatError(
+            f"{path} is {kind}: pip install 'ctrl-realize[{extra}]' ({package}) to read it, or "
+            "save it as CSV"
+        ) from error

@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-import functools
 import hashlib
 import json
 import os
 import platform
 from collections.abc import Mapping
-from importlib import metadata
 from typing import Any, TypeAlias
 
 import control as ct
 import numpy as np
 
 from .._checks import integer
+from .._facts import version_of
 from ..delayed import DelayedStateSpace, DelaySystem
 from ..delayed.inside.pure import TransferDelay
 from ..errors import CtrlRealizeError, FileFormatError, OptionError
@@ -162,14 +161,15 @@ def model_to_text(
         "model": _model_content(model),
         "fit": summary_to_json(summary_of(fit)),
         "provenance": {
-            "versions": _versions(),
+            "versions": {"python": platform.python_version()}
+            | {package: version_of(package) for package in _PACKAGES},
             "created": created,
             "note": note,
             "settings": dict(settings or {}),
         },
     }
     try:
-        content["sha256"] = _checksum(content)
+        content["sha256"] = checksum(content)
         text = json.dumps(content, indent=1, allow_nan=False)
         # nothing is written that could not be read again
         _model_from(json.loads(text))
@@ -291,26 +291,14 @@ def _check_origin(content: object) -> None:
             "update ctrl_realize"
         )
     stored = content.get("sha256")
-    if stored != _checksum(content):
+    if stored != checksum(content):
         raise FileFormatError(
             "the checksum does not match the content: the file was edited or damaged"
         )
 
 
-def _checksum(content: Mapping[str, Any]) -> str:
+def checksum(content: Mapping[str, Any]) -> str:
     """SHA-256 of the content in a canonical form, without the checksum itself."""
     rest = {key: value for key, value in content.items() if key != "sha256"}
     canonical = json.dumps(rest, sort_keys=True, separators=(",", ":"), allow_nan=False)
     return hashlib.sha256(canonical.encode("ascii")).hexdigest()
-
-
-@functools.cache
-def _versions() -> dict[str, str]:
-    """Versions of the packages used; determined once per process."""
-    versions = {"python": platform.python_version()}
-    for package in _PACKAGES:
-        try:
-            versions[package] = metadata.version(package)
-        except metadata.PackageNotFoundError:
-            versions[package] = "unknown"
-    return versions

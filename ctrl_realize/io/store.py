@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
 import os
 from collections.abc import Iterator
@@ -17,10 +16,10 @@ from ..results import Flag
 from .atomic import write_text
 from .checks import usable_file
 from .json_content import field
-from .models import MAX_MODEL_BYTES, model_from_text, model_to_text
+from .models import MAX_MODEL_BYTES, checksum, model_from_text, model_to_text
 
 FORMAT = "ctrl_realize campaign row"
-SCHEMA = 3
+SCHEMA = 4
 _INTERVALS = ("interval", "total_delay_interval")
 _NUMBERS = ("amplitude", "delay", "dead_time", "residual", "gain", "gain_std", "total_delay")
 
@@ -98,22 +97,13 @@ class CampaignStore:
             "versions": versions(),
             "name": row.name,
             # JSON has no infinity or NaN; they are stored as text
-            "numbers": {
-                "amplitude": repr(float(row.amplitude)),
-                "delay": repr(float(row.delay)),
-                "dead_time": repr(float(row.dead_time)),
-                "residual": repr(float(row.residual)),
-                "gain": repr(float(row.gain)),
-                "gain_std": repr(float(row.gain_std)),
-                "total_delay": repr(float(row.total_delay)),
-            },
-            "interval": [repr(float(end)) for end in row.interval],
-            "total_delay_interval": [repr(float(end)) for end in row.total_delay_interval],
+            "numbers": {name: repr(float(getattr(row, name))) for name in _NUMBERS},
+            **{name: [repr(float(end)) for end in getattr(row, name)] for name in _INTERVALS},
             "flags": [[flag.code, flag.message] for flag in row.flags],
             "warnings": list(row.warnings),
             "model": json.loads(model_to_text(system)),
         }
-        content["sha256"] = _checksum(content)
+        content["sha256"] = checksum(content)
         write_text(self._path(key), json.dumps(content, indent=1, allow_nan=False) + "\n")
         return _row_from(content, key)
 
@@ -169,7 +159,7 @@ def _row_from(content: Any, key: str) -> CampaignRow:
         raise FileFormatError("a row of another format, or under another name")
     if content.get("versions") != versions():
         raise FileFormatError("a row made by another version")
-    if content.get("sha256") != _checksum(content):
+    if content.get("sha256") != checksum(content):
         raise FileFormatError("the checksum does not match the content")
     numbers: dict[str, Any] = {
         name: float(text)
@@ -194,9 +184,3 @@ def _row_from(content: Any, key: str) -> CampaignRow:
         flags=flags,
         warnings=tuple(str(text) for text in field(content, "warnings", list)),
     )
-
-
-def _checksum(content: dict[str, Any]) -> str:
-    """SHA-256 of a row in a canonical form, without the checksum itself."""
-    rest = {name: value for name, value in content.items() if name != "sha256"}
-    return hashlib.sha256(json.dumps(rest, sort_keys=True).encode("ascii")).hexdigest()

@@ -10,6 +10,7 @@ from typing import Any
 import control as ct
 
 from .._checks import check_type
+from .._facts import version_of
 from .._wording import times_in
 from ..data import Record
 from ..data.given import as_record
@@ -20,7 +21,7 @@ from ..frequency.comparison import FRFComparison
 from ..identification.campaign.campaign import Campaign
 from ..results import ModelFit
 from .page import Page, Table, pairs, write_page
-from .provenance import own_version, versions
+from .provenance import versions
 from .sketches import (
     Sketch,
     campaign_sketches,
@@ -303,7 +304,7 @@ def write_report(
         title=title,
         subtitle=subtitle,
         verdict=verdict,
-        version=own_version(),
+        version=version_of("ctrl-realize"),
         figures=[sketch.on_page() for sketch in sketches],
         tables=[*tables, pairs("Versions", versions(), folded=True)],
         calls=calls,

@@ -5,10 +5,10 @@ from __future__ import annotations
 import hashlib
 import os
 import platform
-from importlib import metadata
 
 import numpy as np
 
+from .._facts import version_of
 from ..data import Record
 from ..errors import MissingFileError
 
@@ -17,23 +17,9 @@ _PACKAGES = ("ctrl-realize", "control", "numpy", "scipy", "matplotlib", "slycot"
 
 def versions() -> list[tuple[str, str]]:
     """List the versions of all packages that affect the numbers."""
-    found = [("Python", platform.python_version())]
-    for package in _PACKAGES:
-        try:
-            found.append((package, metadata.version(package)))
-        except metadata.PackageNotFoundError:
-            if package == "slycot":
-                found.append((package, "not installed"))
-    found.append(("platform", f"{platform.system()} {platform.machine()}"))
-    return found
-
-
-def own_version() -> str:
-    """Return the version of this toolbox."""
-    try:
-        return metadata.version("ctrl-realize")
-    except metadata.PackageNotFoundError:
-        return "(not installed)"
+    found = [(package, version_of(package)) for package in _PACKAGES]
+    machine = f"{platform.system()} {platform.machine()}"
+    return [("Python", platform.python_version()), *found, ("platform", machine)]
 
 
 def record_sha256(record: Record) -> str:

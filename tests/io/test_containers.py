@@ -341,7 +341,7 @@ def test_what_cannot_be_opened_says_what_to_do(tmp_path, monkeypatch):
     for package in ("pyarrow", "openpyxl", "nptdms"):
         monkeypatch.setitem(sys.modules, package, None)  # not installed
     for name, match in (
-        ("a.parquet", "pip install pyarrow"),
+        ("a.parquet", r"a Parquet file.*ctrl-realize\[parquet\]"),
         ("a.xlsx", r"an Excel workbook.*ctrl-realize\[excel\].* save it as CSV"),
         ("a.tdms", r"TDMS file.*ctrl-realize\[tdms\].*as CSV"),
     ):

@@ -8,14 +8,13 @@ import warnings
 from collections.abc import Callable, Mapping
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, field, replace
-from importlib import metadata
 from typing import Any, Protocol
 
 import control as ct
 import numpy as np
-import scipy
 
 from ..._checks import spelled_out
+from ..._facts import version_of
 from ...data import Record
 from ...delayed import DelayedStateSpace, fit_of
 from ...errors import CtrlRealizeError, DataError
@@ -211,15 +210,7 @@ def fingerprint(record: Record, method: str, options: Mapping[str, Any]) -> str:
 
 def versions() -> dict[str, str]:
     """Versions of the packages that the results depend on."""
-    return {"ctrl-realize": _own_version(), "numpy": np.__version__, "scipy": scipy.__version__}
-
-
-@functools.cache
-def _own_version() -> str:
-    try:
-        return metadata.version("ctrl-realize")
-    except metadata.PackageNotFoundError:
-        return "unknown"
+    return {package: version_of(package) for package in ("ctrl-realize", "numpy", "scipy")}
 
 
 def _exact(value: Any) -> str:

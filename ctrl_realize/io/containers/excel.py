@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from ...errors import FileFormatError, OptionError
-from ..checks import MAX_COLUMNS, check_size
+from ..checks import MAX_COLUMNS, check_size, package_for, told_if_damaged
 from ..text.source import TextSource
 
 _FEWEST_ROWS = 3
@@ -49,14 +49,9 @@ def sheet_as_text(path: Path, name: str | None, max_bytes: float) -> TextSource:
     OptionError
         There is no such sheet, or several have data; they are listed.
     """
-    try:
+    with package_for(path, "an Excel workbook", "excel", "openpyxl"):
         import openpyxl
-    except ImportError as error:
-        raise FileFormatError(
-            f"{path} is an Excel workbook: pip install 'ctrl-realize[excel]' (openpyxl) to read "
-            "it, or save it as CSV"
-        ) from error
-    try:
+    with told_if_damaged(path, "Excel workbook"):
         with zipfile.ZipFile(path) as archive:
             size = sum(member.file_size for member in archive.infolist())
         check_size(path, size, max_bytes, ", unpacked,")
@@ -67,12 +62,6 @@ def sheet_as_text(path: Path, name: str | None, max_bytes: float) -> TextSource:
                 raise OptionError(f"variable={name!r}: {path} has the sheets {_listed(sheets)}")
             chosen = sheets if name is None else {name: sheets[name]}
             texts = {title: _text(path, sheet.rows) for title, sheet in chosen.items()}
-    except (FileFormatError, OptionError):
-        raise
-    # damaged workbooks raise errors of zipfile, of the XML parser, KeyError and others
-    except Exception as error:
-        reason = str(error).partition("\n")[0][:200]
-        raise FileFormatError(f"{path} is a damaged Excel workbook: {reason}") from error
     filled = {title: text for title, text in texts.items() if text.count("\n") >= _FEWEST_ROWS}
     if len(filled) > 1:
         raise OptionError(

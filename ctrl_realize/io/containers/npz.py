@@ -10,7 +10,7 @@ from typing import IO, Any
 import numpy as np
 
 from ...errors import FileFormatError
-from ..checks import check_size
+from ..checks import check_size, told_if_damaged
 from ..tables import Table
 from .arrays import AnyArray, table_of_arrays
 
@@ -27,18 +27,12 @@ def read_npz(path: Path, *, variable: str | None, max_bytes: float) -> Table:
     ------
     FileFormatError
     """
-    try:
+    with told_if_damaged(path, ".npz or .npy file"):
         if zipfile.is_zipfile(path):
             arrays = _members(path, max_bytes)
         else:
             with path.open("rb") as file:
                 arrays = {path.stem: _array(path, file, "", path.stat().st_size, max_bytes)}
-    except FileFormatError:
-        raise
-    # zipfile, zlib and NumPy's header parser raise all kinds of exceptions for damaged files
-    except Exception as error:
-        reason = str(error).partition("\n")[0][:200]
-        raise FileFormatError(f"{path} is a damaged .npz or .npy file: {reason}") from error
     fields = {
         f"{name}.{key}" if key else name: array[key] if key else array
         for name, array in arrays.items()

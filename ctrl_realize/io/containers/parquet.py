@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -11,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ...errors import FileFormatError
-from ..checks import MAX_COLUMNS, MAX_NAME, check_size, unpacked_limit
+from ..checks import MAX_COLUMNS, MAX_NAME, check_size, package_for, told_if_damaged, unpacked_limit
 from ..tables import Column, Table
 from ..units import unit_of
 
@@ -20,6 +19,7 @@ if TYPE_CHECKING:
 
 AnyArray = np.ndarray[Any, np.dtype[Any]]
 
+_KIND = "Parquet file"
 _OBJECT_BYTES = 64
 """Memory of a cell that becomes a Python object: a pointer and a small object."""
 
@@ -53,13 +53,9 @@ def read_parquet(path: Path, *, max_bytes: float) -> Table:
     FileFormatError
         pyarrow is not installed, or the file is damaged, or too large when unpacked.
     """
-    try:
+    with package_for(path, "a Parquet file", "parquet", "pyarrow"):
         import pyarrow.parquet as pq
-    except ImportError as error:
-        raise FileFormatError(
-            f"{path} is a Parquet file; install pyarrow to read it: pip install pyarrow"
-        ) from error
-    with _said_if_damaged(path), pq.ParquetFile(path) as file:
+    with told_if_damaged(path, _KIND), pq.ParquetFile(path) as file:
         fields = list(file.schema_arrow)
         if len(fields) > MAX_COLUMNS:
             raise FileFormatError(f"{path} has {len(fields)} columns, the limit is {MAX_COLUMNS}")
@@ -100,7 +96,8 @@ class _Reader:
             )
         # equal texts are stored once
         once = [field.name] if kind == "text" else None
-        with _said_if_damaged(self.path), pq.ParquetFile(self.path, read_dictionary=once) as file:
+        safely = told_if_damaged(self.path, _KIND)
+        with safely, pq.ParquetFile(self.path, read_dictionary=once) as file:
             if [one.name for one in file.schema_arrow].count(field.name) > 1:
                 raise FileFormatError(f"{self.path} has several columns {field.name!r}")
             if count is not None:
@@ -163,15 +160,3 @@ def _kind(of: pa.DataType) -> str:
         return "text"
     plain = (kinds.is_boolean, kinds.is_null, kinds.is_temporal, kinds.is_decimal)
     return "object" if any(one(of) for one in plain) else "other"
-
-
-@contextmanager
-def _said_if_damaged(path: Path) -> Iterator[None]:
-    try:
-        yield
-    except FileFormatError:
-        raise
-    # damaged metadata cause all kinds of exceptions, ArrowException and TypeError among them
-    except Exception as error:
-        reason = str(error).partition("\n")[0][:200]
-        raise FileFormatError(f"{path} is a damaged Parquet file: {reason}") from error

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from ...errors import FileFormatError
-from ..checks import check_size
+from ..checks import check_size, package_for, told_if_damaged
 from ..tables import Table
 from .arrays import AnyArray, table_of_arrays
 
@@ -30,37 +30,25 @@ def read_tdms(path: Path, *, variable: str | None, max_bytes: float) -> Table:
     FileFormatError
         npTDMS is not installed, or the file is damaged, too large or without channels.
     """
-    try:
+    with package_for(path, "a LabVIEW TDMS file", "tdms", "npTDMS"):
         from nptdms import TdmsFile
-    except ImportError as error:
-        raise FileFormatError(
-            f"{path} is a LabVIEW TDMS file: pip install 'ctrl-realize[tdms]' (npTDMS) to read "
-            "it, or export it as CSV"
-        ) from error
     content = path.read_bytes()
     _check_lead_in(path, content)
     arrays: dict[str, AnyArray] = {}
     steps: set[float] = set()
-    try:
-        # from memory: a file would make room for whatever length a damaged one announces
-        with TdmsFile.open(io.BytesIO(content)) as file:
-            channels = [channel for group in file.groups() for channel in group.channels()]
-            # samples are not packed: more than one for each byte are only announced
-            count = sum(len(channel) for channel in channels)
-            check_size(path, 8 * count, max_bytes, ", unpacked,")
-            if count > len(content):
-                raise FileFormatError(f"{path} is a damaged TDMS file: it is shorter than it says")
-            for channel in channels:
-                unit = channel.properties.get("unit_string")
-                name = f"{channel.group_name}.{channel.name}" + (f" [{unit}]" if unit else "")
-                arrays[name] = np.asarray(channel[:])
-                steps.add(float(channel.properties.get("wf_increment", 0.0)))
-    except FileFormatError:
-        raise
-    # damaged files raise errors of struct, ValueError, KeyError and others
-    except Exception as error:
-        reason = str(error).partition("\n")[0][:200]
-        raise FileFormatError(f"{path} is a damaged TDMS file: {reason}") from error
+    # from memory: a file would make room for whatever length a damaged one announces
+    with told_if_damaged(path, "TDMS file"), TdmsFile.open(io.BytesIO(content)) as file:
+        channels = [channel for group in file.groups() for channel in group.channels()]
+        # samples are not packed: more than one for each byte are only announced
+        count = sum(len(channel) for channel in channels)
+        check_size(path, 8 * count, max_bytes, ", unpacked,")
+        if count > len(content):
+            raise FileFormatError(f"{path} is a damaged TDMS file: it is shorter than it says")
+        for channel in channels:
+            unit = channel.properties.get("unit_string")
+            name = f"{channel.group_name}.{channel.name}" + (f" [{unit}]" if unit else "")
+            arrays[name] = np.asarray(channel[:])
+            steps.add(float(channel.properties.get("wf_increment", 0.0)))
     if len(steps) == 1 and (step := steps.pop()) > 0:
         arrays["dt"] = np.array(step)
     return table_of_arrays(path, arrays, variable)
