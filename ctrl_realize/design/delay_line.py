@@ -182,13 +182,8 @@ class DelayLineController(ShownSystem, DelayOperators):
             "inputs": self.input_labels[0],
             "outputs": self.output_labels[0],
             "pulses": self._pulses,
-            **self._design(),
         }
         return type(self), (*self._parts, self.dt), settings
-
-    def _design(self) -> dict[str, Any]:
-        """Further arguments of a subclass that describe its design."""
-        return {}
 
     def paths(self, z: ComplexArray) -> tuple[ComplexArray, ComplexArray]:
         """Split the response into forward / back; the zeros of `back` are the controller's poles.

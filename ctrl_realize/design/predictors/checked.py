@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Mapping
+from typing import Any, Self
 
 from ..._shown import Card
 from ...delayed import DelayedStateSpace
 from ..delay_line import DelayLineController
 from ..loops.delay_robustness_result import DelayRobustness
-from ..loops.loop_check import LoopCheck
+from ..loops.loop_check import LoopCheck, loop_check, refuse_unstable, warn_of
 
 
 class CheckedController(DelayLineController):
@@ -22,24 +23,32 @@ class CheckedController(DelayLineController):
         Check of the closed loop with `model`.
     """
 
-    def __init__(
-        self,
-        *arguments: Any,
-        model: DelayedStateSpace,
-        check: LoopCheck | None = None,
-        **settings: Any,
-    ) -> None:
-        self.model = model
-        self.check = check
+    model: DelayedStateSpace
+    check: LoopCheck | None = None
+
+    def __init__(self, *arguments: Any, design: Mapping[str, Any], **settings: Any) -> None:
+        # `design` has the attributes of the subclass, which a copy needs as well
+        self._design = design
+        self.__dict__.update(design)
         super().__init__(*arguments, **settings)
+
+    def verified(self, what: str, to_stabilize: str, more_robust: str) -> Self:
+        """Return the controller with the check of its loop; unstable loops are refused."""
+        check = loop_check(self.model, self)
+        refuse_unstable(check, what, to_stabilize)
+        warn_of(check, more_robust)
+        make, arguments, settings = self._made_by()
+        made: Self = make(*arguments, **settings | {"design": {**self._design, "check": check}})
+        return made
 
     @property
     def robustness(self) -> DelayRobustness | None:
         """Loop at the ends of the identified interval of the dead time; None without one."""
         return None if self.check is None else self.check.robustness
 
-    def _design(self) -> dict[str, Any]:
-        return {"model": self.model, "check": self.check}
+    def _made_by(self) -> tuple[Any, ...]:
+        make, arguments, settings = super()._made_by()
+        return make, arguments, settings | {"design": self._design}
 
     def _card(self) -> Card:
         card = super()._card()

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import control as ct
 import numpy as np
 from numpy.typing import ArrayLike
@@ -14,7 +12,7 @@ from ...delayed.deferred import MAX_STATES
 from ...errors import DelayRangeError
 from ...numerics.arrays import FloatArray
 from ...numerics.blas_threads import single_threaded
-from ..loops.loop_check import LoopCheck, loop_check, refuse_poles, refuse_unstable, warn_of
+from ..loops.loop_check import refuse_poles
 from ..resolved import check_sign, warn_unresolved
 from ..siso import delayed_system
 from .checked import CheckedController
@@ -45,23 +43,8 @@ class LQGController(CheckedController):
     (10, True)
     """
 
-    def __init__(
-        self,
-        *arguments: Any,
-        regulator: PredictorLQR,
-        estimator: KalmanPredictor,
-        **settings: Any,
-    ) -> None:
-        self.regulator = regulator
-        self.estimator = estimator
-        super().__init__(*arguments, **settings)
-
-    def _design(self) -> dict[str, Any]:
-        return {
-            **super()._design(),
-            "regulator": self.regulator,
-            "estimator": self.estimator,
-        }
+    regulator: PredictorLQR
+    estimator: KalmanPredictor
 
 
 @single_threaded
@@ -161,34 +144,18 @@ def lqg(
         # u[k] depends on the state alone, and acts at once.
         inner = inner - into @ K
 
-    def made(check: LoopCheck | None = None) -> LQGController:
-        # Negative feedback: the controller sees e = -y.
-        return LQGController(
-            inner,
-            -L,
-            -K[:, :n],
-            np.zeros((1, 1)),
-            line,
-            -K[:, n:],
-            float(plant.dt),
-            name=name,
-            inputs="e",
-            outputs=plant.input_labels[0],
-            check=check,
-            model=plant,
-            regulator=law,
-            estimator=estimator,
-            pulses=(
-                np.asarray(core.A, np.float64),
-                np.asarray(core.B, np.float64),
-                np.vstack([np.zeros((n, core.nstates)), -law.core_gain]),
-            ),
-        )
-
-    check = loop_check(plant, made())
-    refuse_unstable(check, "the controller", TOO_LONG)
-    warn_of(check, "Try 10 * R and 10 * RN: slower and more robust")
-    return made(check)
+    behind = np.vstack([np.zeros((n, core.nstates)), -law.core_gain])
+    # Negative feedback: the controller sees e = -y.
+    made = LQGController(
+        *(inner, -L, -K[:, :n], np.zeros((1, 1)), line, -K[:, n:]),
+        float(plant.dt),
+        name=name,
+        outputs=plant.input_labels[0],
+        pulses=(np.asarray(core.A, np.float64), np.asarray(core.B, np.float64), behind),
+        design={"model": plant, "regulator": law, "estimator": estimator},
+    )
+    more_robust = "Try 10 * R and 10 * RN: slower and more robust"
+    return made.verified("the controller", TOO_LONG, more_robust)
 
 
 def _several_channels(

@@ -13,7 +13,6 @@ from ...errors import OptionError, UnsuitableSystemError
 from ...numerics.arrays import FloatArray
 from ...numerics.state_space import responses
 from ...numerics.state_space.balancing import Part, split_modes
-from ..loops.loop_check import LoopCheck, loop_check, refuse_unstable, warn_of
 from ..resolved import check_sign, warn_unresolved
 from ..siso import delayed_system, same_rate
 from .checked import CheckedController
@@ -49,26 +48,9 @@ class SmithPredictor(CheckedController):
     (10, True)
     """
 
-    def __init__(
-        self,
-        *arguments: Any,
-        primary: DelayedStateSpace,
-        filter_time: float | None,
-        removed_poles: FloatArray,
-        **settings: Any,
-    ) -> None:
-        self.primary = primary
-        self.filter_time = filter_time
-        self.removed_poles = removed_poles
-        super().__init__(*arguments, **settings)
-
-    def _design(self) -> dict[str, Any]:
-        return {
-            **super()._design(),
-            "primary": self.primary,
-            "filter_time": self.filter_time,
-            "removed_poles": self.removed_poles,
-        }
+    primary: DelayedStateSpace
+    filter_time: float | None
+    removed_poles: FloatArray
 
 
 @overload
@@ -217,28 +199,26 @@ def smith_predictor(
         np.asarray(core.C),
         lambda z: bool(np.any(np.abs(z - drop) < 1e-9 * (1 + abs(z)))),
     )
-    A, B, C, D, E, h, pulses = _assemble(
+    *parts, pulses = _assemble(
         plant, primary, removed, kept, _filter(seconds, plant, slow, integrating)
     )
 
-    def made(check: LoopCheck | None = None) -> SmithPredictor:
-        return SmithPredictor(
-            *(A, B, C, D, E, h, float(plant.dt)),
-            name=name,
-            inputs="e",
-            outputs=plant.input_labels[0],
-            pulses=pulses,
-            check=check,
-            model=plant,
-            primary=DelayedStateSpace(primary, 0, name=primary.name),
-            filter_time=seconds,
-            removed_poles=drop,
-        )
-
-    check = loop_check(plant, made())
-    refuse_unstable(check, "the Smith predictor", STABILIZE)
-    warn_of(check, more_robust(filter_time, float(plant.dead_time)))
-    return made(check)
+    design = {
+        "model": plant,
+        "primary": DelayedStateSpace(primary, 0, name=primary.name),
+        "filter_time": seconds,
+        "removed_poles": drop,
+    }
+    made = SmithPredictor(
+        *parts,
+        float(plant.dt),
+        name=name,
+        outputs=plant.input_labels[0],
+        pulses=pulses,
+        design=design,
+    )
+    advice = more_robust(filter_time, float(plant.dead_time))
+    return made.verified("the Smith predictor", STABILIZE, advice)
 
 
 def _refuse_unstable(poles: FloatArray) -> None:
