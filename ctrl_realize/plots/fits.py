@@ -198,7 +198,7 @@ def data_and_model(
     """Draw data and model of the records, and below what is left, with the noise."""
     factor, unit = axis_time_unit(float(np.abs(result.time[[0, -1]]).max()), lower)
     time = factor * result.time
-    looks = {"color": style.MODEL, "linestyle": style.DASHES[0], "label": "model", **kwargs}
+    looks = {**style.model_looks(), "label": "model", **kwargs}
     label = f"mean of {len(result.records)} records" if _averaged(result) else "measured"
     data = list(upper.plot(time, result.measured, color=style.MEASURED, lw=1.5, label=label))
     data += upper.plot(time, result.fitted, **looks)

@@ -229,8 +229,7 @@ def _looks(curve: Curve, models: int) -> dict[str, Any]:
         return {"color": style.TRUTH, "linewidth": 1.5, "linestyle": ":"}
     if curve.measured:
         return {"color": style.MEASURED, "linewidth": 2.2}
-    dashes = style.DASHES[models % len(style.DASHES)]
-    return {"color": style.model_colour(models), "linestyle": dashes}
+    return style.model_looks(models)
 
 
 def _draw(axes: Axes, curve: Curve, values: FloatArray, looks: dict[str, Any]) -> list[Line2D]:

@@ -218,14 +218,9 @@ def closed_loop_plot(
             else:
                 signals = _linear_signals(plant, controller, count, (setpoint_step, load_step))
             for where, signal in enumerate(signals):
-                drawn[where] += axes[where].plot(
-                    time,
-                    signal,
-                    color=style.model_colour(number),
-                    linestyle="-" if number == 0 else style.DASHES[number % len(style.DASHES)],
-                    drawstyle="steps-post" if where > 1 else "default",
-                    label=plain(name),
-                )
+                looks = style.model_looks(number) | ({} if number else {"linestyle": "-"})
+                looks["drawstyle"] = "steps-post" if where > 1 else "default"
+                drawn[where] += axes[where].plot(time, signal, label=plain(name), **looks)
         axes[0].axhline(setpoint_step, color=style.INPUT, linewidth=1)
         axes[1].axhline(0, color=style.INPUT, linewidth=1)
         for limit in _drawn_limits(controllers, output_limits):

@@ -59,8 +59,8 @@ def record_plot(
     ) as (upper, lower):
         factor, unit = axis_time_unit(float(np.abs(record.time[[0, -1]]).max()), lower)
         time = factor * record.time
-        measured = _signals(upper, time, record.output, record.output_labels, **kwargs)
-        driven = _signals(lower, time, record.input, record.input_labels, color=style.INPUT)
+        measured = draw_signals(upper, time, record.output, record.output_labels, **kwargs)
+        driven = draw_signals(lower, time, record.input, record.input_labels, color=style.INPUT)
         upper.set_ylabel(_axis_label(record.output_labels, record.output_units, "output"))
         lower.set_ylabel(_axis_label(record.input_labels, record.input_units, "input", 16))
         lower.set_xlabel(f"time [{unit}]")
@@ -170,29 +170,33 @@ def draw_beside(
     seen = ~np.isnan(measured)
     lines = axes.plot(time[seen], measured[seen], color=style.MEASURED, label="measured")
     for values, looks in curves:
-        dashed = {"color": style.MODEL, "linestyle": style.DASHES[0], **looks}
-        lines += axes.plot(time, values, **dashed)
+        lines += axes.plot(time, values, **{**style.model_looks(), **looks})
     label = wrapped(with_unit(record.output_labels[row], record.output_units[row]), 16)
     axes.set(xlabel=f"time [{unit}]", ylabel=label)
     return list(lines)
 
 
-def _signals(
-    axes: Axes, time: FloatArray, signals: FloatArray, labels: Sequence[str], **kwargs: Any
+def draw_signals(
+    axes: Axes,
+    time: FloatArray,
+    signals: FloatArray,
+    labels: Sequence[str],
+    *,
+    first: str = style.MEASURED,
+    **kwargs: Any,
 ) -> list[Line2D]:
+    """Draw signals over one time, each in its colour, that of the first as given."""
     rows = np.atleast_2d(signals)
     lines: list[Line2D] = []
     for index, (row, label) in enumerate(zip(rows, labels, strict=True)):
-        first = {"color": style.MEASURED} if index == 0 else {}
         seen = ~np.isnan(row)
         # Single samples between missing ones would be lines without length.
         points = {} if seen.all() else {"marker": ".", "markersize": 3}
         looks = {
             **points,
-            "color": style.OTHERS[(index - 1) % len(style.OTHERS)],
+            "color": style.OTHERS[(index - 1) % len(style.OTHERS)] if index else first,
             "linewidth": 1.5,
             "label": plain(label),
-            **first,
             **(kwargs if len(rows) == 1 else {k: v for k, v in kwargs.items() if k != "color"}),
         }
         lines += axes.plot(time[seen], row[seen], **looks)
@@ -233,16 +237,9 @@ def _measured_steps(
 
 def _model_step(axes: Axes, system: DelayedStateSpace, until: float, factor: float) -> list[Line2D]:
     count = max(int(np.ceil(until / system.dt)) + 1, 2)
-    response = np.asarray(system.step(count)).reshape(-1, count)[0]
-    return list(
-        axes.plot(
-            factor * system.dt * np.arange(count),
-            response,
-            color=style.MODEL,
-            linestyle=style.DASHES[0],
-            label="model",
-        )
-    )
+    response = np.reshape(system.step(count), (-1, count))[0]
+    time = factor * system.dt * np.arange(count)
+    return list(axes.plot(time, response, label="model", **style.model_looks()))
 
 
 def _until(step: StepResponse, end: float) -> StepResponse:

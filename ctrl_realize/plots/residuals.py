@@ -63,9 +63,7 @@ def residual_plot(
         above = draw_beside(axes[0], check.record, row, [(simulated, {"label": label, **kwargs})])
         own = _stems(axes[1], lags[lags >= 0], check.autocorrelation[row], check.bound)
         cross = _stems(axes[2], lags, check.cross[row, column], check.cross_bound[row, column])
-        axes[1].set_ylabel("residual with\nitself")
-        axes[2].set_ylabel("residual with\ninput before")
-        axes[2].set_xlabel("lag [samples]")
+        _label_correlations(*axes[1:])
         return style.finished(axes, [above, own, cross], loc="above")
 
 
@@ -116,11 +114,7 @@ def model_comparison_plot(
         for number, (name, check) in enumerate(
             zip(comparison.names, comparison.checks, strict=True)
         ):
-            looks = {
-                "color": style.model_colour(number),
-                "linestyle": style.DASHES[number % len(style.DASHES)],
-                **kwargs,
-            }
+            looks = {**style.model_looks(number), **kwargs}
             label = f"{plain(name, 24)}, {check.fit_percent[row]:.1f} %"
             simulated, left = (
                 np.atleast_2d(values)[row] for values in (check.simulated, check.residual)
@@ -129,9 +123,8 @@ def model_comparison_plot(
             thin = {**looks, "linestyle": "-", "linewidth": 0.9}
             lines[1] += axes[1].plot(factor * record.time, left, **thin)
             dots = {**looks, "marker": "o", "markersize": 3.0, "linewidth": 1.0}
-            lines[2] += axes[2].plot(
-                check.lags[check.lags >= 0], check.autocorrelation[row], **dots
-            )
+            after = check.lags[check.lags >= 0]
+            lines[2] += axes[2].plot(after, check.autocorrelation[row], **dots)
             lines[3] += axes[3].plot(check.lags, check.cross[row, column], **dots)
         lines[0] = draw_beside(axes[0], record, row, curves)
         axes[1].sharex(axes[0])
@@ -139,9 +132,7 @@ def model_comparison_plot(
         axes[0].tick_params(labelbottom=False)
         axes[1].set_xlabel(f"time [{unit}]")
         axes[1].set_ylabel("residual")
-        axes[2].set_ylabel("residual with\nitself")
-        axes[3].set_ylabel("residual with\ninput before")
-        axes[3].set_xlabel("lag [samples]")
+        _label_correlations(*axes[2:])
         return style.finished(axes, lines, loc="above")
 
 
@@ -205,6 +196,11 @@ def prediction_plot(
         curves = [(values, {"label": label, **kwargs})]
         lines = draw_beside(axes, prediction.record, row, curves)
         return style.finished([axes], [lines], loc="above")
+
+
+def _label_correlations(own: Axes, cross: Axes) -> None:
+    own.set_ylabel("residual with\nitself")
+    cross.set(xlabel="lag [samples]", ylabel="residual with\ninput before")
 
 
 def _stems(axes: Axes, lags: FloatArray, rho: FloatArray, bound: float) -> list[Line2D]:

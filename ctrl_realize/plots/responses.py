@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import product
 from typing import Any
 
 import control as ct
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.lines import Line2D
 
 from .._checks import check_type, positive
 from ..data import ImpulseResponse
@@ -20,6 +19,7 @@ from ..numerics.arrays import FloatArray
 from . import style
 from .delays import mark_dead_time
 from .names import plain
+from .records import draw_signals
 from .shared_docs import documented
 from .style import axis_time_unit
 
@@ -78,9 +78,14 @@ def impulse_plot(
         factor, unit = axis_time_unit(count * impulse.dt, axes[-1])
         lines = []
         for index, (one, values) in enumerate(zip(axes, density, strict=True)):
-            drawn = _one(one, impulse, values[:count], factor, **kwargs)
+            looks = {"color": style.MEASURED, "linewidth": 1.5, "label": "measured", **kwargs}
+            drawn = one.plot(factor * impulse.time[:count], values[:count], **looks)
             for number, model in enumerate(models):
-                drawn += _model(one, model, index, count * impulse.dt, factor, number, len(models))
+                samples = max(int(np.ceil(count * impulse.dt / model.dt)), 2)
+                markov = np.reshape(model.markov(samples), (-1, samples))[index]
+                label = "model" if len(models) == 1 else plain(model.name)
+                time, looks = factor * model.dt * np.arange(samples), style.model_looks(number)
+                drawn += one.plot(time, markov / model.dt, label=label, **looks)
             lines.append(drawn)
             if rows * columns > 1:
                 way = f"input {index % columns} to output {index // columns}"
@@ -203,55 +208,18 @@ def system_plot(
     check_type(system, DelayedStateSpace, "system", "a DelayedStateSpace")
     end = _settling_time(system) if until is None else positive(until, "until", "time in s")
     count = max(int(np.ceil(end / system.dt)) + 1, 2)
-    response = system.step(count).reshape(system.noutputs, system.ninputs, count)
+    response = np.reshape(system.step(count), (-1, count))
     with style.canvas(ax, title=title, default_title=str(system.name)) as (axes,):
         factor, unit = axis_time_unit(end, axes)
         time = factor * system.dt * np.arange(count)
-        lines = []
-        for i, output in enumerate(system.output_labels):
-            for j, input in enumerate(system.input_labels):
-                position = i * system.ninputs + j
-                first = {"color": style.MODEL} if position == 0 else {}
-                looks: dict[str, Any] = {
-                    "color": style.OTHERS[(position - 1) % len(style.OTHERS)],
-                    "label": "model" if system.issiso() else plain(f"{output} after {input}"),
-                    **first,
-                    **kwargs,
-                }
-                lines += axes.plot(time, response[i, j], **looks)
+        channels = product(system.output_labels, system.input_labels)
+        names = [f"{output} after {input}" for output, input in channels]
+        looks = {"linewidth": 2.0, "first": style.MODEL, **kwargs}
+        lines = draw_signals(axes, time, response, ["model"] if system.issiso() else names, **looks)
         if system.issiso():
             mark_dead_time(axes, system, factor)
         axes.set(xlabel=f"time after the step [{unit}]", ylabel="unit step response")
         return style.finished([axes], [lines], loc="lower right")
-
-
-def _one(
-    axes: Axes, impulse: ImpulseResponse, density: FloatArray, factor: float, **kwargs: Any
-) -> list[Line2D]:
-    looks = {"color": style.MEASURED, "linewidth": 1.5, "label": "measured", **kwargs}
-    return list(axes.plot(factor * impulse.time[: density.size], density, **looks))
-
-
-def _model(
-    axes: Axes,
-    model: DelayedStateSpace,
-    channel: int,
-    until: float,
-    factor: float,
-    number: int,
-    models: int,
-) -> list[Line2D]:
-    count = max(int(np.ceil(until / model.dt)), 2)
-    markov = np.asarray(model.markov(count)).reshape(-1, count)[channel]
-    return list(
-        axes.plot(
-            factor * model.dt * np.arange(count),
-            markov / model.dt,
-            color=style.model_colour(number),
-            linestyle=style.DASHES[number % len(style.DASHES)],
-            label="model" if models == 1 else plain(model.name),
-        )
-    )
 
 
 def _settled(density: FloatArray) -> int:

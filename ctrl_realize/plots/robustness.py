@@ -43,18 +43,9 @@ def delay_robustness_plot(
         factor, unit = axis_time_unit(float(times.max()), axes)
         low, high = result.dead_time_interval
         axes.axvspan(low * factor, high * factor, color=style.BAND, alpha=0.2, label="interval")
-        axes.axvline(
-            result.nominal_dead_time * factor,
-            color=style.INPUT,
-            linewidth=1,
-        )
-        lines = axes.plot(
-            times * factor,
-            result.modulus_margin,
-            color=style.MODEL,
-            marker="o",
-            label="min |1 + L|",
-        )
+        axes.axvline(result.nominal_dead_time * factor, color=style.INPUT, linewidth=1)
+        looks: dict[str, Any] = {"color": style.MODEL, "marker": "o", "label": "min |1 + L|"}
+        lines = axes.plot(times * factor, result.modulus_margin, **looks)
         bad = ~result.stable_at
         if bad.any():
             axes.plot(
@@ -124,15 +115,8 @@ def robustness_plot(
         lines = _positive_loglog(axes, hertz, result.complementary, color=style.MODEL, label="|T|")
         with np.errstate(divide="ignore"):
             ceiling = 1 / bound.bound
-        keep = np.isfinite(ceiling)
-        lines += _positive_loglog(
-            axes,
-            hertz[keep],
-            ceiling[keep],
-            color=style.BAND,
-            linestyle=style.DASHES[0],
-            label="1 / uncertainty",
-        )
+        dashed = {"color": style.BAND, "linestyle": style.DASHES[0]}
+        lines += _positive_loglog(axes, hertz, ceiling, label="1 / uncertainty", **dashed)
         at = result.omega_critical / HERTZ
         axes.axvline(at, color=style.INPUT, linewidth=1, label=f"margin {result.margin:.3g}")
         axes.set(xlabel="frequency [Hz]", ylabel="magnitude")
@@ -144,5 +128,5 @@ def robustness_plot(
 
 def _positive_loglog(axes: Axes, x: FloatArray, y: FloatArray, **looks: Any) -> list[Line2D]:
     """Draw the positive values; a logarithmic axis accepts no others, and no empty curve."""
-    keep = y > 0
+    keep = (y > 0) & np.isfinite(y)
     return list(axes.loglog(x[keep], y[keep], **looks)) if keep.any() else []

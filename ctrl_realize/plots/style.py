@@ -58,6 +58,11 @@ def model_colour(number: int) -> str:
     return (MODEL, *OTHERS)[number % (1 + len(OTHERS))]
 
 
+def model_looks(number: int = 0) -> dict[str, Any]:
+    """Return colour and dashes of a model by its number from 0."""
+    return {"color": model_colour(number), "linestyle": DASHES[number % len(DASHES)]}
+
+
 @contextmanager
 def context() -> Iterator[None]:
     """Use the toolbox's style inside the block; the settings are restored afterwards."""
