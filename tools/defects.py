@@ -138,7 +138,7 @@ DEFECTS = (
        "high = min(float(dead_times[-2]), fits.scales.latest)",
        "step_data decisions step_fit", FITS),
     _d("records that differ", "jitter from record to record does not widen the interval",
-       "if repeats.p_value >= 0.01:", "if True:", "several decisions", FITS),
+       "if repeats.p_value < 0.01:", "if False:", "several decisions", FITS),
     # --- choices of the fit
     _d("coloured noise ignored", "noise is never made white",
        "in_coloured_noise(noisy, data) if whiten", "in_coloured_noise(noisy, data) if False",

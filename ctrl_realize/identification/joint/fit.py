@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import compress
 from typing import Literal
 
 import control as ct
@@ -185,9 +186,7 @@ def _records(
     if np.isfinite(first.onset):
         return *step_part(first.data, first.estimate, latest), first.data, first.time
     repeats = first.repeatability
-    left_out = () if repeats is None else repeats.outlying
-    names = repeats.names if repeats is not None else ("",)
-    used = [r for r, name in zip(first.records, names, strict=True) if name not in left_out]
+    used = first.records if repeats is None else list(compress(first.records, repeats.kept))
     outputs, inputs = ([np.ravel(getattr(r, k)) for r in used] for k in ("output", "input"))
     data = cut(outputs, inputs, first.dt, first.data.every, KnownFactor()).after(first.dead_time)
     time, signal = joined_signals(used, data)
@@ -202,7 +201,7 @@ def _spread(first: OutputErrorFit) -> list[tuple[Effect, float]]:
     repeats = first.repeatability
     if repeats is None:
         return []
-    kept = np.array([name not in repeats.outlying for name in repeats.names])
+    kept = repeats.kept
     tests: tuple[tuple[Effect, FloatArray, float], ...] = (
         ("gain", repeats.gains, repeats.gain_test[1]),
         ("dead_time", repeats.delays, repeats.p_value),

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from itertools import compress
 
 import numpy as np
 
@@ -20,19 +21,22 @@ from ...numerics.output_error.other_structures import Requested
 from ...numerics.output_error.result import OutputErrorEstimate
 from ...numerics.output_error.step_data import bare_data
 from ...numerics.signals.counters import counter_period
-from ...numerics.signals.noise import mad_sigma
 from ...numerics.validation.own_response import OwnResponse
-from .averaging import common_sample_time, compared, delay_outliers, widened
+from .averaging import common_sample_time
 from .flags import sampled_flags
-from .own_gains import unlike_records
 from .repeat_flags import repeat_flags
-from .repeatability import Repeatability, distinct
+from .repeatability import (
+    Repeatability,
+    delay_outliers,
+    fit_alike,
+    gain_outliers,
+    unlike_records,
+)
 from .result import OutputErrorFit
 from .sensor_flags import missing_code
 from .summary import choices_of
 
 _ALL = 0.99  # of a record, from which on the rest is not reported
-_APART = 5.0  # in standard deviations: largest distance of a record's gain from the others
 
 
 class UnrelatedError(DataError):
@@ -53,32 +57,27 @@ def fit_any_input(
     by them. A model that hardly follows the output is refused, or not.
     """
     dt = common_sample_time(records)
-    used = tuple(range(len(records)))
     scales = np.ones(len(records)) if ratios is None else ratios
     signals = [(y, scale * u) for (y, u), scale in zip(map(_signals, records), scales, strict=True)]
-    if len(records) == 1:
-        found = _fit(records, signals, dt, requested, refuses)
-        return _summary(found, found.fit, records, used, requested.latest, ())
-    while True:
-        found = _fit(
-            tuple(records[i] for i in used),
-            [signals[i] for i in used],
-            dt,
-            requested,
-            refuses,
-        )
-        own = [found.own_delay(*pair) for pair in signals]
-        repeats = _repeatability(own, records, used, found.fit.dead_time)
+
+    def fitted(used: tuple[int, ...]) -> tuple[SampledFit, OutputErrorEstimate, list[OwnResponse]]:
+        some = [records[i] for i in used]
+        found = _fit(some, [signals[i] for i in used], dt, requested, refuses)
+        own = [found.own_delay(*pair) for pair in signals] if len(records) > 1 else []
+        return found, found.fit, own
+
+    def unlike(repeats: Repeatability) -> list[int]:
         if ratios is None:
-            apart = {*delay_outliers(repeats, used), *_gain_outliers(own, used)}
-        else:
-            apart = set(unlike_records(repeats, used, dt))
-        if not apart:
-            break
-        used = tuple(i for i in used if i not in apart)
-    fit = widened(found.fit, repeats, used)
-    flags = repeat_flags(repeats, fit.dead_time, dt)
-    return _summary(found, fit, records, used, requested.latest, flags, repeats)
+            return delay_outliers(repeats) + gain_outliers(repeats)
+        return unlike_records(repeats, dt)
+
+    every = tuple(range(len(records)))
+    if len(records) == 1:
+        found, fit, _ = fitted(every)
+        return _summary(found, fit, records, requested.latest, None)
+    ranges = [float(np.ptp(record.input)) for record in records]
+    found, fit, repeats = fit_alike(fitted, unlike, [r.name for r in records], ranges, every)
+    return _summary(found, fit, records, requested.latest, repeats)
 
 
 def _signals(record: Record) -> tuple[FloatArray, FloatArray]:
@@ -86,7 +85,7 @@ def _signals(record: Record) -> tuple[FloatArray, FloatArray]:
 
 
 def _fit(
-    records: tuple[Record, ...],
+    records: Sequence[Record],
     signals: list[tuple[FloatArray, FloatArray]],
     dt: float,
     requested: Requested,
@@ -127,47 +126,27 @@ def _check_moves(record: Record) -> None:
             )
 
 
-def _named(records: tuple[Record, ...]) -> str:
+def _named(records: Sequence[Record]) -> str:
     if len(records) > 1:
         return f"{len(records)} records"
     return named("record", records[0].name)
-
-
-def _repeatability(
-    own: list[OwnResponse], records: tuple[Record, ...], used: tuple[int, ...], delay: float
-) -> Repeatability:
-    return compared(
-        distinct(record.name for record in records),
-        np.array([float(np.ptp(record.input)) for record in records]),
-        own,
-        used,
-        delay,
-    )
-
-
-def _gain_outliers(own: list[OwnResponse], used: tuple[int, ...]) -> tuple[int, ...]:
-    """Positions of records with an outlying gain: another plant, or no response."""
-    gains = np.array([own[i].gain for i in used])
-    centre, scatter = float(np.median(gains)), mad_sigma(gains)
-    return tuple(
-        i for i in used if abs(own[i].gain - centre) > _APART * max(scatter, own[i].gain_error)
-    )
 
 
 def _summary(
     found: SampledFit,
     fit: OutputErrorEstimate,
     records: tuple[Record, ...],
-    used: tuple[int, ...],
     latest: float | None,
-    flags: tuple[Flag, ...],
-    repeats: Repeatability | None = None,
+    repeats: Repeatability | None,
 ) -> OutputErrorFit:
     """Concatenate what was fitted on one time axis."""
     data = found.data
-    time, signal = joined_signals([records[i] for i in used], data)
+    used = records if repeats is None else tuple(compress(records, repeats.kept))
+    time, signal = joined_signals(used, data)
     length = max(y.size for y in data.outputs) * data.step
-    flags = sampled_flags(fit, data.dt, length, latest) + _cut(records, used, found) + flags
+    flags = [*sampled_flags(fit, data.dt, length, latest), *_cut(used, found)]
+    if repeats is not None:
+        flags += repeat_flags(repeats, fit.dead_time, data.dt)
     span = sum(data.lengths) * data.step
     output, noise = np.concatenate(data.measured), fit.residual.std
     joined = bare_data(output, signal, data.dt, noise, span, data.every)
@@ -185,9 +164,8 @@ def _summary(
             f"{sums.drive.factor.shape[1]} lags (prewhitened with a noise model of "
             f"{sums.noise_lags} lags); time, measured and fitted show a part of them",
         )
-    return OutputErrorFit(
-        fit, joined, time, records, repeats, choices=reasons + choices_of(fit), flags=flags
-    )
+    choices = reasons + choices_of(fit)
+    return OutputErrorFit(fit, joined, time, records, repeats, choices=choices, flags=tuple(flags))
 
 
 def joined_signals(records: Sequence[Record], data: SampledData) -> tuple[FloatArray, FloatArray]:
@@ -201,18 +179,16 @@ def joined_signals(records: Sequence[Record], data: SampledData) -> tuple[FloatA
     return np.concatenate(times), np.concatenate(signals)
 
 
-def _cut(records: tuple[Record, ...], used: tuple[int, ...], found: SampledFit) -> tuple[Flag, ...]:
+def _cut(records: Sequence[Record], found: SampledFit) -> Iterator[Flag]:
     """Report records of which only a part was used."""
-    if found.condensed is not None:
-        return ()
-    sizes = [found.data.every * output.size for output in found.data.outputs]
+    data = found.data
+    sizes = [data.every * output.size for output in data.outputs]
     long = [
-        (records[i].n_samples, size, offset)
-        for i, size, offset in zip(used, sizes, found.data.offsets, strict=True)
-        if size < _ALL * records[i].n_samples
+        (record.n_samples, size, offset)
+        for record, size, offset in zip(records, sizes, data.offsets, strict=True)
+        if size < _ALL * record.n_samples
     ]
-    if not long:
-        return ()
-    fits, size, offset = max(long)
-    others = f", and so of {len(long) - 1} more" if len(long) > 1 else ""
-    return (flagged("cut", used=size, first=offset, samples=fits, others=others),)
+    if long and found.condensed is None:
+        fits, size, offset = max(long)
+        others = f", and so of {len(long) - 1} more" if len(long) > 1 else ""
+        yield flagged("cut", used=size, first=offset, samples=fits, others=others)

@@ -15,12 +15,14 @@ from ..._wording import named
 from ...data import Record
 from ...data.shown_units import in_shown_units
 from ...delayed import DelayedStateSpace
-from ...errors import DataError, OptionError
+from ...errors import OptionError
 from ...numerics.arrays import FloatArray
 from ...numerics.blas_threads import single_threaded
 from ...numerics.output_error.other_structures import Requested
-from ...numerics.output_error.step_data import own_regressors, step_data
+from ...numerics.output_error.result import OutputErrorEstimate
+from ...numerics.output_error.step_data import StepData
 from ...numerics.output_error.step_fit import fit_step_record
+from ...numerics.validation.own_response import OwnResponse
 from ...results import Flag
 from ..process_structures import Structures, requested
 from .actuated.alternatives import ASKED, Asked
@@ -30,17 +32,17 @@ from .any_input import UnrelatedError, fit_any_input
 from .arguments import checked_records, edges_of, known_factor, step_data_of
 from .averaging import (
     aligned_steps,
-    delay_outliers,
     mean_step,
+    near_the_rest,
+    own_responses,
     relative_gains,
-    repeatability,
     scaled,
-    widened,
 )
 from .checks import checked
 from .flags import fit_flags
-from .own_gains import fit_own_gains, unlike_records
+from .own_gains import fit_own_gains
 from .repeat_flags import repeat_flags, same_record_flags
+from .repeatability import delay_outliers, fit_alike, unlike_records
 from .result import OutputErrorFit
 from .summary import choices_of, fitted_core, fitted_model
 
@@ -295,40 +297,29 @@ def _fit_one(
     if data is None:
         return any_input((record,), requested)
     data, fit = fit_step_record(data, requested)
-    flags = fit_flags(data, fit, requested.latest, float(record.time[0]))
+    flags = tuple(fit_flags(data, fit, requested.latest, float(record.time[0])))
     time = record.time[data.rows]
     return OutputErrorFit(fit, data, time, (record,), choices=choices_of(fit), flags=flags)
 
 
 def _fit_mean(
-    records: tuple[Record, ...],
-    requested: Requested,
-    ratios: FloatArray | None = None,
+    records: tuple[Record, ...], requested: Requested, ratios: FloatArray | None = None
 ) -> OutputErrorFit:
-    steps = aligned_steps(records)
-    if ratios is not None:
-        steps = scaled(steps, ratios)
-    skip: tuple[int, ...] = ()
-    for _ in range(2):
-        mean = mean_step(steps, skip)
-        data = step_data(mean.output, mean.input, mean.dt, [(mean.edge, 1)])
-        if data.motion is None:
-            raise DataError(
-                "the mean of the records does not leave its baseline by 5 standard deviations"
-            )
-        data, fit = fit_step_record(data, requested)
-        own = own_regressors(data, fit.poles if data.relaxing else None)
-        repeats = repeatability(steps, mean, fit.fitted, fit.dead_time, own)
-        apart = (
-            delay_outliers(repeats, mean.used)
-            if ratios is None
-            else unlike_records(repeats, mean.used, mean.dt)
-        )
-        if not apart:
-            break
-        skip = apart
-    fit = widened(fit, repeats, mean.used)
-    time = mean.dt * np.arange(-mean.edge, mean.output.size - mean.edge, dtype=np.float64)
+    aligned = aligned_steps(records)
+    steps = aligned if ratios is None else scaled(aligned, ratios)
+
+    def fitted(used: tuple[int, ...]) -> tuple[StepData, OutputErrorEstimate, list[OwnResponse]]:
+        data, fit = fit_step_record(mean_step(steps, used), requested)
+        return data, fit, own_responses(steps, data, fit)
+
+    data, fit, repeats = fit_alike(
+        fitted,
+        delay_outliers if ratios is None else partial(unlike_records, dt=steps[0].dt),
+        [step.name for step in steps],
+        [step.edge.amplitude for step in steps],
+        near_the_rest(steps),
+    )
+    time = data.dt * data.since.astype(np.float64)
     flags = fit_flags(data, fit, requested.latest, float(time[0]))
-    flags += repeat_flags(repeats, fit.dead_time, mean.dt)
-    return OutputErrorFit(fit, data, time, records, repeats, choices=choices_of(fit), flags=flags)
+    every = (*flags, *repeat_flags(repeats, fit.dead_time, data.dt))
+    return OutputErrorFit(fit, data, time, records, repeats, choices=choices_of(fit), flags=every)

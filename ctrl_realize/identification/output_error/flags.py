@@ -43,20 +43,19 @@ _DECISIONS: dict[DecisionKey, str] = {
 
 def fit_flags(
     data: StepData, fit: OutputErrorEstimate, latest: float | None, start: float
-) -> tuple[Flag, ...]:
+) -> Iterator[Flag]:
     """List the flags of a fit of one (mean) step record whose first sample is at `start` s."""
-    of_model = model_flags(fit, data.dt, data.length, latest)
-    return (*of_model, *_record_flags(data, fit, start))
+    yield from model_flags(fit, data.dt, data.length, latest)
+    yield from _record_flags(data, fit, start)
 
 
 def sampled_flags(
     fit: OutputErrorEstimate, dt: float, length: float, latest: float | None
-) -> tuple[Flag, ...]:
+) -> Iterator[Flag]:
     """List the flags of a fit of a record whose input is not a step."""
-    flags = tuple(model_flags(fit, dt, length, latest))
-    if fit.adequate:
-        return flags
-    return (*flags, flagged("coloured_residual", samples=fit.residual.correlation))
+    yield from model_flags(fit, dt, length, latest)
+    if not fit.adequate:
+        yield flagged("coloured_residual", samples=fit.residual.correlation)
 
 
 def model_flags(

@@ -22,13 +22,12 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..._flags import Flag, flagged
+from ..._flags import flagged
 from ...data import Record
 from ...numerics.arrays import FloatArray
 from ...numerics.constants import Z_95
-from ...numerics.validation.own_response import disagreeing, homogeneity
+from ...numerics.validation.own_response import homogeneity
 from .averaging import middle_gain
 from .record_gains import (
     ONE_POINT,
@@ -37,38 +36,15 @@ from .record_gains import (
     levels_of_output,
     middle_of_input,
 )
-from .repeatability import Repeatability
+from .repeatability import RESPONDS, Repeatability
 from .result import OutputErrorFit
 
 _TURNS = 8  # at most; two or three are usual
 _SETTLED = 0.25  # standard errors by which a ratio may still move: 3 % of the error in quadrature
 _ROUNDING = 1e-4  # the same of the ratio itself, for records without noise
-_RESPONDS = 5.0
-"""Standard errors that a gain must be away from zero to be one, as for an output that leaves its
-rest. A record below that does not respond."""
-_LATER = 1.0
-"""Samples by which dead times may differ in any case: the trigger falls between two samples."""
-_SLOWER = 0.1
-"""Part by which time constants may differ in any case. The likelihood of real records resolves less
-than a percent, at which no two of them have the same."""
 
 _COMMON = ("gains_differ", "no_common_gain")
 """Flags of fits with a common gain."""
-
-
-def unlike_records(found: Repeatability, used: tuple[int, ...], dt: float) -> tuple[int, ...]:
-    """Positions of records, among those used, whose response is not a multiple of the others'.
-
-    They do not respond, or their dead time or time constants disagree with those of the others.
-    """
-    answers = np.abs(found.gains_alone) > _RESPONDS * found.gain_alone_errors
-    silent = [i for i in used if not answers[i]]
-    rest = np.array([i for i in used if answers[i]], dtype=np.int64)
-    if rest.size == 0:
-        return ()
-    late = disagreeing(found.delays[rest], found.errors[rest], _LATER * dt)
-    slow = disagreeing(np.log(found.lags[rest]), found.lag_errors[rest], np.log1p(_SLOWER))
-    return tuple(sorted({*silent, *rest[late].tolist(), *rest[slow].tolist()}))
 
 
 def fit_own_gains(
@@ -89,19 +65,20 @@ def fit_own_gains(
     ratios = np.ones(len(records)) if start is None else start
     for _ in range(_TURNS):
         result = fit(ratios)
-        found = _compared(result)
-        used = np.array([name not in found.outlying for name in found.names])
+        assert result.repeatability is not None
+        found: Repeatability = result.repeatability
+        used = found.kept
         errors = found.gain_alone_errors
         moved = ratios * found.gains_alone
         moved = moved / middle_gain(moved[used])
-        answers = np.abs(found.gains_alone) > _RESPONDS * errors
+        answers = np.abs(found.gains_alone) > RESPONDS * errors
         turned = ratios / middle_gain(ratios[used])
         if start is None:
             turned = np.where(answers, moved, turned)
         if np.all(np.abs(turned / ratios - 1) <= np.maximum(_SETTLED * errors, _ROUNDING)):
             break
         ratios = turned
-    gains = _gains(records, result, found, moved, used)
+    gains = _gains(records, result, found, moved)
     repeats = replace(
         found,
         gains=found.gains * ratios,
@@ -110,20 +87,25 @@ def fit_own_gains(
         gain_alone_errors=found.gain_alone_errors * ratios,
         gain_test=(gains.chi_square, gains.p_value),
     )
-    kept = [flag for flag in result.flags if flag.code not in _COMMON]
+    flags = [flag for flag in result.flags if flag.code not in _COMMON]
+    if gains.differ:
+        flags.append(
+            flagged(
+                "gains_differ.own",
+                chi_square=gains.chi_square,
+                chance=gains.p_value,
+                median=gains.reference,
+                schedule=gains.in_words(),
+            )
+        )
     reason = f"gain of the model: the median of {int(used.sum())} records, each with its own"
     return replace(
         result,
         gains=gains,
         repeatability=repeats,
-        flags=(*kept, *_flags(gains)),
+        flags=tuple(flags),
         choices=(*result.choices, reason),
     )
-
-
-def _compared(result: OutputErrorFit) -> Repeatability:
-    assert result.repeatability is not None
-    return result.repeatability
 
 
 def at_model_gain(fit: OutputErrorFit) -> tuple[Record, ...]:
@@ -143,14 +125,13 @@ def _gains(
     result: OutputErrorFit,
     found: Repeatability,
     ratios: FloatArray,
-    used: NDArray[np.bool_],
 ) -> RecordGains:
     """Gains and their errors, from the common gain and the ratios.
 
     The common gain contains the noise of all records and the error of the dynamics; that of a
     record contains its own noise in place of the former.
     """
-    common = result.gain
+    common, used = result.gain, found.kept
     own = found.gain_alone_errors
     pooled = 1.0 / float(np.sum(own[used] ** -2.0))
     beyond = np.sqrt(np.maximum(own**2 - np.where(used, pooled, 0.0), 0.0))
@@ -177,19 +158,4 @@ def _gains(
         chi_square=test[0],
         p_value=test[1],
         outlying=found.outlying,
-    )
-
-
-def _flags(gains: RecordGains) -> tuple[Flag, ...]:
-    """Say where one model is not enough, and what the gain is elsewhere."""
-    if not gains.differ:
-        return ()
-    return (
-        flagged(
-            "gains_differ.own",
-            chi_square=gains.chi_square,
-            chance=gains.p_value,
-            median=gains.reference,
-            schedule=gains.in_words(),
-        ),
     )

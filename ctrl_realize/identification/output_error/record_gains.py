@@ -103,16 +103,9 @@ class RecordGains(Result):
     outlying: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        for values in (
-            self.operating_points,
-            self.input_levels,
-            self.output_levels,
-            self.gains,
-            self.errors,
-            self.low,
-            self.high,
-        ):
-            values.flags.writeable = False
+        for values in vars(self).values():
+            if isinstance(values, np.ndarray):
+                values.flags.writeable = False
 
     @property
     def ratios(self) -> FloatArray:

@@ -33,14 +33,12 @@ def time_apart(dead_time: float, dt: float) -> float:
     return max(_PART * dead_time, _SAMPLES * dt)
 
 
-def repeat_flags(result: Repeatability, dead_time: float, dt: float) -> tuple[Flag, ...]:
-    """List the flags of several records of one plant; times in s."""
-    return tuple(_differences(result, time_apart(dead_time, dt)))
+def repeat_flags(result: Repeatability, dead_time: float, dt: float) -> Iterator[Flag]:
+    """Say so where dead times, gains or time constants differ by more than their noise.
 
-
-def _differences(result: Repeatability, apart: float) -> Iterator[Flag]:
-    """Say so where dead times, gains or time constants differ by more than their noise."""
-    kept = np.array([name not in result.outlying for name in result.names])
+    Times in s.
+    """
+    apart, kept = time_apart(dead_time, dt), result.kept
     if result.outlying:
         yield flagged("outlying_records", names=", ".join(result.outlying))
     scatter = float(np.ptp(result.delays[kept]))

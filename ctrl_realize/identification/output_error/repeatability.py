@@ -2,20 +2,34 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 
 from ..._wording import in_time
-from ...numerics.arrays import FloatArray
+from ...numerics.arrays import BoolArray, FloatArray
+from ...numerics.constants import Z_95
+from ...numerics.output_error.result import OutputErrorEstimate
+from ...numerics.signals.noise import mad_sigma
+from ...numerics.validation.own_response import OwnResponse, disagreeing, homogeneity
 
 if TYPE_CHECKING:
     import pandas as pd
 
 _MOST_NAMED = 8
 """Largest number of records listed in a card; the table lists all."""
+APART = 5.0  # robust standard deviations from the others
+SAME_AMPLITUDE = 0.03  # relative, below which steps count as equally high
+RESPONDS = 5.0
+"""Standard errors that a gain must be away from zero to be one, as for an output that leaves its
+rest. A record below that does not respond."""
+_LATER = 1.0
+"""Samples by which dead times may differ in any case: the trigger falls between two samples."""
+_SLOWER = 0.1
+"""Part by which time constants may differ in any case. The likelihood of real records resolves less
+than a percent, at which no two of them have the same."""
 
 
 def distinct(names: Iterable[str]) -> tuple[str, ...]:
@@ -24,10 +38,6 @@ def distinct(names: Iterable[str]) -> tuple[str, ...]:
     return tuple(
         name if given.count(name) == 1 else f"{name} ({i})" for i, name in enumerate(given)
     )
-
-
-def _nothing() -> FloatArray:
-    return np.empty(0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,25 +78,29 @@ class Repeatability:
     delays: FloatArray
     errors: FloatArray
     gains: FloatArray
+    gain_errors: FloatArray
+    lags: FloatArray
+    lag_errors: FloatArray
+    fit_percent: FloatArray
+    gains_alone: FloatArray
+    gain_alone_errors: FloatArray
     chi_square: float
     p_value: float
+    gain_test: tuple[float, float]
+    lag_test: tuple[float, float]
     trend: float
     trend_error: float
     outlying: tuple[str, ...]
-    gain_errors: FloatArray = field(default_factory=_nothing)
-    lags: FloatArray = field(default_factory=_nothing)
-    lag_errors: FloatArray = field(default_factory=_nothing)
-    fit_percent: FloatArray = field(default_factory=_nothing)
-    gain_test: tuple[float, float] = (0.0, 1.0)
-    lag_test: tuple[float, float] = (0.0, 1.0)
-    gains_alone: FloatArray = field(default_factory=_nothing)
-    gain_alone_errors: FloatArray = field(default_factory=_nothing)
+
+    @property
+    def kept(self) -> BoolArray:
+        """Whether each record is in the fit, shape (R,)."""
+        return np.array([name not in self.outlying for name in self.names])
 
     @property
     def gain_spread(self) -> float:
         """Largest relative difference of a record's gain from the common one."""
-        kept = [name not in self.outlying for name in self.names]
-        return float(np.max(np.abs(self.gains[kept] - 1.0), initial=0.0))
+        return float(np.max(np.abs(self.gains[self.kept] - 1.0), initial=0.0))
 
     def table(self) -> pd.DataFrame:
         """One row for each record: its delay, gain and lags, and the fit of the common model.
@@ -100,19 +114,19 @@ class Repeatability:
         """
         import pandas as pd
 
-        unknown = np.full(len(self.names), np.nan)
-        columns = {
-            "amplitude": self.amplitudes,
-            "dead_time": self.delays,
-            "dead_time_error": self.errors,
-            "gain": self.gains,
-            "gain_error": self.gain_errors,
-            "lags": self.lags,
-            "lags_error": self.lag_errors,
-            "fit_percent": self.fit_percent,
-        }
-        table = pd.DataFrame({name: v if v.size else unknown for name, v in columns.items()})
-        table["outlying"] = [name in self.outlying for name in self.names]
+        table = pd.DataFrame(
+            {
+                "amplitude": self.amplitudes,
+                "dead_time": self.delays,
+                "dead_time_error": self.errors,
+                "gain": self.gains,
+                "gain_error": self.gain_errors,
+                "lags": self.lags,
+                "lags_error": self.lag_errors,
+                "fit_percent": self.fit_percent,
+                "outlying": ~self.kept,
+            }
+        )
         return table.set_index(pd.Index(self.names, name="record"))
 
     def rows(self) -> list[tuple[str, str]]:
@@ -131,7 +145,7 @@ class Repeatability:
             ("gains", self.gains, self.gain_test),
             ("time constants", self.lags, self.lag_test),
         ):
-            if ratios.size and statistic > 0:
+            if statistic > 0:
                 rows.append(
                     (
                         what,
@@ -149,3 +163,133 @@ class Repeatability:
                 ("trend with amplitude", f"{self.trend:.2g} +- {self.trend_error:.2g} s per unit")
             )
         return rows
+
+
+Fitted = TypeVar("Fitted")
+
+
+def fit_alike(
+    fit: Callable[[tuple[int, ...]], tuple[Fitted, OutputErrorEstimate, Sequence[OwnResponse]]],
+    unlike: Callable[[Repeatability], Iterable[int]],
+    names: Iterable[str],
+    amplitudes: Sequence[float],
+    used: tuple[int, ...],
+) -> tuple[Fitted, OutputErrorEstimate, Repeatability]:
+    """Fit records with one model, and again without those that are unlike the others.
+
+    The interval is widened by the standard error of the mean of the delays, if records differ by
+    more than their noise.
+
+    Parameters
+    ----------
+    fit : callable
+        Fit of the records at some positions, with the response of every record, fitted or not,
+        relative to the model.
+    unlike : callable
+        Positions of records that are to be left out.
+    names : iterable of str
+        Of all records.
+    amplitudes : sequence of float
+        Height of each step, or range of each input.
+    used : tuple of int
+        Positions of the records that are fitted first.
+    """
+    named = distinct(names)
+    while True:
+        found, estimate, own = fit(used)
+        repeats = _compared(named, np.array(amplitudes), own, used, estimate.dead_time)
+        apart = {*unlike(repeats)}
+        if not apart:
+            break
+        used = tuple(i for i in used if i not in apart)
+    if repeats.p_value < 0.01:
+        between = float(repeats.delays[list(used)].std(ddof=1)) / np.sqrt(len(used))
+        estimate = replace(
+            estimate,
+            low=max(estimate.low - Z_95 * between, 0.0),
+            high=estimate.high + Z_95 * between,
+            std=float(np.hypot(estimate.std, between)),
+        )
+    return found, estimate, repeats
+
+
+def _compared(
+    names: tuple[str, ...],
+    amplitudes: FloatArray,
+    own: Sequence[OwnResponse],
+    used: tuple[int, ...],
+    delay: float,
+) -> Repeatability:
+    """Test whether records, of which some were used, differ by more than the noise in each."""
+    table, kept = np.array(own).T, list(used)
+    shifts, errors, gains, gain_errors, lags, lag_errors, followed, alone, alone_errors = table
+    chi_square, p_value = homogeneity(shifts[kept], errors[kept])
+    trend, trend_error = _trend(np.abs(amplitudes[kept]), shifts[kept], errors[kept])
+    return Repeatability(
+        names=names,
+        amplitudes=amplitudes,
+        delays=delay + shifts,
+        errors=errors,
+        gains=gains,
+        gain_errors=gain_errors,
+        lags=lags,
+        lag_errors=lag_errors,
+        fit_percent=followed,
+        gains_alone=alone,
+        gain_alone_errors=alone_errors,
+        chi_square=chi_square,
+        p_value=p_value,
+        gain_test=homogeneity(gains[kept], gain_errors[kept]),
+        lag_test=homogeneity(np.log(lags[kept]), lag_errors[kept]),
+        trend=trend,
+        trend_error=trend_error,
+        outlying=tuple(name for i, name in enumerate(names) if i not in used),
+    )
+
+
+def delay_outliers(found: Repeatability) -> list[int]:
+    """Positions of records with an outlying delay."""
+    return _far(found, found.delays, found.errors)
+
+
+def gain_outliers(found: Repeatability) -> list[int]:
+    """Positions of records with an outlying gain: another plant, or no response."""
+    return _far(found, found.gains, found.gain_errors)
+
+
+def _far(found: Repeatability, values: FloatArray, errors: FloatArray) -> list[int]:
+    scale = np.maximum(mad_sigma(values[found.kept]), errors)
+    away = np.abs(values - float(np.median(values[found.kept])))
+    return np.flatnonzero(found.kept & (away > APART * scale)).tolist()
+
+
+def unlike_records(found: Repeatability, dt: float) -> list[int]:
+    """Positions of records, among those used, whose response is not a multiple of the others'.
+
+    They do not respond, or their dead time or time constants disagree with those of the others.
+    """
+    answers = np.abs(found.gains_alone) > RESPONDS * found.gain_alone_errors
+    rest = np.flatnonzero(found.kept & answers)
+    if rest.size == 0:
+        return []
+    late = disagreeing(found.delays[rest], found.errors[rest], _LATER * dt)
+    slow = disagreeing(np.log(found.lags[rest]), found.lag_errors[rest], np.log1p(_SLOWER))
+    return [*np.flatnonzero(found.kept & ~answers).tolist(), *rest[late], *rest[slow]]
+
+
+def _trend(amplitudes: FloatArray, shifts: FloatArray, errors: FloatArray) -> tuple[float, float]:
+    """Slope of the delays over the amplitudes and its standard error; zeros if there is none.
+
+    Scatter beyond the errors is estimated about the line: about the mean, the trend itself would
+    increase its error, and ten records or fewer could never show one.
+    """
+    weight = errors**-2
+    centre = float(np.sum(weight * amplitudes) / np.sum(weight))
+    spread = float(np.sum(weight * (amplitudes - centre) ** 2))
+    if np.ptp(amplitudes) <= SAME_AMPLITUDE * float(np.max(amplitudes)) or amplitudes.size < 3:
+        return 0.0, 0.0
+    mean = float(np.sum(weight * shifts) / np.sum(weight))
+    slope = float(np.sum(weight * (amplitudes - centre) * shifts)) / spread
+    left = shifts - mean - slope * (amplitudes - centre)
+    inflation = max(float(np.sum(weight * left**2)) / (amplitudes.size - 2), 1.0)
+    return slope, float(np.sqrt(inflation / spread))

@@ -201,8 +201,7 @@ class OutputErrorFit(FractionalDelayFit):
         repeats = self.repeatability
         if repeats is None or self.gains is not None or repeats.gain_test[1] >= BY_CHANCE:
             return low, high
-        kept = [name not in repeats.outlying for name in repeats.names]
-        own = self.gain * repeats.gains[kept]
+        own = self.gain * repeats.gains[repeats.kept]
         return float(min(low, *own)), float(max(high, *own))
 
     @property

@@ -16,8 +16,7 @@ References
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
-from typing import TypeAlias
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 from scipy.special import chdtrc, ndtri, stdtrit
@@ -41,8 +40,7 @@ Moved: TypeAlias = Callable[[float, float], tuple[FloatArray, FloatArray, FloatA
 """Common response (n,), shifted and stretched, and its derivatives by shift and log stretch."""
 
 
-@dataclass(frozen=True, eq=False)
-class OwnResponse:
+class OwnResponse(NamedTuple):
     """One record relative to the common model, with standard errors.
 
     `shift` in s and `gain` (a ratio) are estimated together, with common lags; `lag` is the ratio
@@ -55,11 +53,11 @@ class OwnResponse:
     error: float
     gain: float
     gain_error: float
-    lag: float = 1.0
-    lag_error: float = float("inf")
-    followed: float = float("nan")
-    gain_alone: float = 1.0
-    gain_alone_error: float = float("inf")
+    lag: float
+    lag_error: float
+    followed: float
+    gain_alone: float
+    gain_alone_error: float
 
 
 def response_slopes(
