@@ -133,7 +133,7 @@ def _best_fit(_: Any) -> Any:
 
 
 def _least_squares(fit: Any) -> Any:
-    return lambda *args, **kwargs: fit(*args, **{**kwargs, "huber": False})
+    return lambda data, requested: fit(data, replace(requested, huber=False))
 
 
 def _best_alone(_: Any) -> Any:
@@ -322,7 +322,7 @@ SWITCHES = (
         "noise of a rest that is constant",
         {f"{FITS}.step_data:rest_noise": _constant_rest},
     ),
-    Switch("drift", {f"{PUBLIC}.fit:step_data": _without_drift}),
+    Switch("drift", {f"{PUBLIC}.averaging:step_data": _without_drift}),
     Switch("load during the test", {f"{STEP}:load_of": giving(None)}),
     Switch("hum", {f"{FITS}.step_data:hum_frequencies": giving([])}),
     Switch("hum against slow noise", {f"{NUMERICS}.signals.noise:_is_line": giving(True)}),

@@ -164,7 +164,7 @@ def _summary(
             f"{sums.drive.factor.shape[1]} lags (prewhitened with a noise model of "
             f"{sums.noise_lags} lags); time, measured and fitted show a part of them",
         )
-    choices = reasons + choices_of(fit)
+    choices = (*reasons, *choices_of(fit))
     return OutputErrorFit(fit, joined, time, records, repeats, choices=choices, flags=tuple(flags))
 
 

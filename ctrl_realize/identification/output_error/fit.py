@@ -299,7 +299,7 @@ def _fit_one(
     data, fit = fit_step_record(data, requested)
     flags = tuple(fit_flags(data, fit, requested.latest, float(record.time[0])))
     time = record.time[data.rows]
-    return OutputErrorFit(fit, data, time, (record,), choices=choices_of(fit), flags=flags)
+    return OutputErrorFit(fit, data, time, (record,), choices=tuple(choices_of(fit)), flags=flags)
 
 
 def _fit_mean(
@@ -322,4 +322,6 @@ def _fit_mean(
     time = data.dt * data.since.astype(np.float64)
     flags = fit_flags(data, fit, requested.latest, float(time[0]))
     every = (*flags, *repeat_flags(repeats, fit.dead_time, data.dt))
-    return OutputErrorFit(fit, data, time, records, repeats, choices=choices_of(fit), flags=every)
+    return OutputErrorFit(
+        fit, data, time, records, repeats, choices=tuple(choices_of(fit)), flags=every
+    )

@@ -44,12 +44,8 @@ def fitted_core(fit: OutputErrorEstimate, poles: ComplexArray) -> ct.StateSpace:
     return ct.StateSpace(unit * matrix, unit * last, b[None], np.zeros((1, 1)))
 
 
-def choices_of(fit: OutputErrorEstimate) -> tuple[str, ...]:
+def choices_of(fit: OutputErrorEstimate) -> Iterator[str]:
     """Say what was chosen automatically, and why."""
-    return tuple(_choices(fit))
-
-
-def _choices(fit: OutputErrorEstimate) -> Iterator[str]:
     chain = fit.distributed.chain
     kind = model_words(chain) if chain else order_words(fit.structure)
     count = len(fit.structures)
