@@ -9,6 +9,7 @@ import numpy as np
 
 from .._checks import integer
 from ..numerics.arrays import ComplexArray
+from ..numerics.internal_delays.dominant import largest
 from ..numerics.internal_delays.form import DelayForm
 from .parts import CoreAndDelays
 
@@ -35,10 +36,7 @@ class DelayedAnalysis(CoreAndDelays):
             Descending in magnitude.
         """
         wanted = integer(count, "count", 1)
-        poles = np.asarray(self._core.poles(), dtype=np.complex128)
-        poles = poles[np.lexsort((-poles.imag, -np.abs(poles)))]
-        split = wanted < poles.size and poles[wanted - 1].imag > 0
-        return poles[: wanted + split]
+        return largest(np.asarray(self._core.poles(), dtype=np.complex128), wanted)
 
     def is_stable(self) -> bool:
         """Whether all poles are inside the unit circle; a delay has its poles at 0."""

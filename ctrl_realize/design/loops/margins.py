@@ -14,8 +14,8 @@ from ..._flags import Flag, flagged
 from ...errors import OptionError
 from ...numerics.arrays import ComplexArray, FloatArray, locked, read_only
 from ...numerics.loops.crossings import (
+    encircled,
     follow,
-    half_turns,
     negative_axis_crossings,
     smallest_distance,
     unit_crossings,
@@ -202,14 +202,7 @@ def closed_loop_count(
         rest = loop.beyond(float(omega[-1]))
         if rest.size:
             values = np.concatenate([values, follow(loop.open_characteristic, rest)[1]])
-    if np.any(values == 0):
-        return 0, True
-    steps = np.abs(np.angle(values[1:] / values[:-1]))
-    turns = half_turns(values)
-    # A real system starts on the real axis, unless a closed-loop pole is at frequency 0.
-    start = abs(float(np.sin(np.angle(values[0]))))
-    marginal = bool(np.any(steps > 2.0) or abs(turns - round(turns)) > 0.1 or start > 0.5)
-    return max(0, -round(turns)), marginal
+    return encircled(values)
 
 
 def _stability_flags(count: int, marginal: bool) -> tuple[Flag, ...]:

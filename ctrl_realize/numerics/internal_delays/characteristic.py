@@ -24,7 +24,7 @@ from scipy.sparse.csgraph import connected_components
 from ..arrays import ComplexArray, FloatArray
 from .form import DelayForm
 from .recurrence import absorbed
-from .response import CHUNK, characteristic_matrices, turns
+from .response import CHUNK, characteristic_matrices, solve_each, turns
 
 CONVERGED = 1e-13
 """Step, relative to the size of the root, at which a root counts as found."""
@@ -65,15 +65,7 @@ def newton_steps(
 
 
 def _reciprocal_traces(matrices: ComplexArray, rates: ComplexArray) -> ComplexArray:
-    try:
-        inverses = np.linalg.inv(matrices)
-    except np.linalg.LinAlgError:
-        inverses = np.full_like(matrices, np.inf)
-        for k, M in enumerate(matrices):
-            try:
-                inverses[k] = np.linalg.inv(M)
-            except np.linalg.LinAlgError:
-                continue
+    inverses = solve_each(matrices, np.broadcast_to(np.eye(matrices.shape[1]), matrices.shape))
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         steps = 1 / np.einsum("kii,ki->k", inverses, rates)
     # a singular P is a root

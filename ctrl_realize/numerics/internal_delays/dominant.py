@@ -58,7 +58,11 @@ def largest(poles: ComplexArray, count: int) -> ComplexArray:
     # rounded, so that the two of a pair stay together
     sizes, real = np.round(np.abs(poles), 12), np.round(poles.real, 10)
     order = np.lexsort((-poles.imag, -real, -sizes))
-    poles = poles[order]
+    return with_whole_pairs(poles[order], count)
+
+
+def with_whole_pairs(poles: ComplexArray, count: int) -> ComplexArray:
+    """Take the first poles; one more where a pair would be split."""
     if 0 < count < poles.size and poles[count - 1].imag > 1e-9 * abs(poles[count - 1]):
         count += 1
     return poles[:count]

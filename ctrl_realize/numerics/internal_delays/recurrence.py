@@ -11,7 +11,7 @@ import numpy as np
 
 from ..arrays import FloatArray
 from ..state_space.responses import BLOCK, block_operators, simulate
-from .form import DelayForm
+from .form import DelayForm, with_states
 
 SHORT = 16
 """Samples below which a delay is as fast as states of the core."""
@@ -19,11 +19,6 @@ SHORT = 16
 
 def absorbed(form: DelayForm, at: list[int]) -> DelayForm:
     """Turn some delays into shift registers; states [core; w_i[k+1-d] ...], newest sample first."""
-    n, m, p = form.states, form.inputs, form.outputs
-    rest = [i for i in range(len(form.delays)) if i not in at]
-    split = form.channels([*rest, *at])
-    B, C, D = split.B, split.C, split.D
-    outside_in, outside_out = m + len(rest), p + len(rest)
     lengths = np.array([int(form.delays[i]) for i in at], dtype=np.int64)
     ends = np.cumsum(lengths)
     first, last = ends - lengths, ends - 1
@@ -33,16 +28,7 @@ def absorbed(form: DelayForm, at: list[int]) -> DelayForm:
     writes[first, np.arange(len(at))] = 1.0
     shift = np.eye(count, k=-1)
     shift[first] = 0.0
-    B2, D12 = B[:, outside_in:], D[:outside_out, outside_in:]
-    C2, D21, D22 = C[outside_out:], D[outside_out:, :outside_in], D[outside_out:, outside_in:]
-    A = np.block([[form.A, B2 @ reads], [writes @ C2, shift + writes @ D22 @ reads]])
-    return DelayForm(
-        A.reshape(n + count, n + count),
-        np.vstack([B[:, :outside_in], writes @ D21]),
-        np.hstack([C[:outside_out], D12 @ reads]),
-        D[:outside_out, :outside_in].copy(),
-        tuple(form.delays[i] for i in rest),
-    )
+    return with_states(form, at, shift, writes, reads)
 
 
 def recurrence(form: DelayForm, inputs: FloatArray, state: FloatArray | None = None) -> FloatArray:

@@ -99,11 +99,12 @@ def solved_response(form: DelayForm, points: ComplexArray, *, discrete: bool) ->
         right = np.zeros((late.shape[0], matrices.shape[1], m), dtype=np.complex128)
         right[:, :n] = form.B[:, :m]
         right[:, n:] = late[:, :, None] * form.D[p:, :m]
-        out[:, :, part] = np.moveaxis(seen @ _solve(matrices, right), 0, -1)
+        out[:, :, part] = np.moveaxis(seen @ solve_each(matrices, right), 0, -1)
     return out + form.D[:p, :m, None]
 
 
-def _solve(matrices: ComplexArray, right: ComplexArray) -> ComplexArray:
+def solve_each(matrices: ComplexArray, right: ComplexArray) -> ComplexArray:
+    """Solve several sets of equations; NaN for a singular one."""
     try:
         return np.asarray(np.linalg.solve(matrices, right))
     except np.linalg.LinAlgError:
@@ -168,7 +169,7 @@ def _closed(
         right = late[:, :, None] * np.moveaxis(core[p:, :m], -1, 0)
         finite = np.isfinite(loop).all(axis=(1, 2)) & np.isfinite(right).all(axis=(1, 2))
         w = np.full(right.shape, np.nan, dtype=np.complex128)
-        w[finite] = _solve(loop[finite], right[finite])
+        w[finite] = solve_each(loop[finite], right[finite])
         by_delay = np.moveaxis(np.moveaxis(core[:p, m:], -1, 0) @ w, 0, -1)
         residual = np.abs(loop).sum(axis=2).max(axis=1)
         lost = residual[None, None, :] / CANCELS

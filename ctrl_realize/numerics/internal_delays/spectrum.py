@@ -27,8 +27,8 @@ from scipy.linalg import block_diag, eig
 
 from ..arrays import ComplexArray, FloatArray
 from .characteristic import loops, newton_polished
-from .dominant import RESIDUAL, apart, with_pairs
-from .form import DelayForm
+from .dominant import RESIDUAL, apart, with_pairs, with_whole_pairs
+from .form import DelayForm, with_states
 
 FIRST_POINTS, MOST_POINTS = 16, 160
 """Chebyshev points of each delay, at first and at most."""
@@ -46,21 +46,13 @@ def discretised(form: DelayForm, points: int) -> DelayForm:
 
     The states are the values on Chebyshev points of what is on its way.
     """
-    q, n, m, p = len(form.delays), form.states, form.inputs, form.outputs
+    q = len(form.delays)
     D = _differences(points)
     # on [-tau, 0]: the first point holds z, the last one gives w
     lines = block_diag(*[D[1:, 1:] * (2 / tau) for tau in form.delays])
     entry = block_diag(*[D[1:, :1] * (2 / tau) for tau in form.delays])
     exit_ = block_diag(*[np.eye(1, points, points - 1)] * q)
-    B2, C2, D12 = form.B[:, m:], form.C[p:], form.D[:p, m:]
-    D21, D22 = form.D[p:, :m], form.D[p:, m:]
-    A = np.block([[form.A, B2 @ exit_], [entry @ C2, lines + entry @ D22 @ exit_]])
-    return DelayForm(
-        A.reshape(n + q * points, -1),
-        np.vstack([form.B[:, :m], entry @ D21]),
-        np.hstack([form.C[:p], D12 @ exit_]),
-        form.D[:p, :m].copy(),
-    )
+    return with_states(form, list(range(q)), lines, entry, exit_)
 
 
 def _differences(points: int) -> FloatArray:
@@ -139,10 +131,7 @@ def in_order(poles: ComplexArray, count: int) -> ComplexArray:
     scale = float(np.abs(poles).max(initial=0.0)) or 1.0
     real, turn = np.round(poles.real / scale, 11), np.round(np.abs(poles.imag) / scale, 11)
     order = np.lexsort((-poles.imag, turn, -real))
-    poles = poles[order]
-    if 0 < count < poles.size and poles[count - 1].imag > 1e-9 * abs(poles[count - 1]):
-        count += 1
-    return poles[:count]
+    return with_whole_pairs(poles[order], count)
 
 
 def neutral_gain(form: DelayForm) -> float:

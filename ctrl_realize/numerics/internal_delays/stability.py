@@ -18,7 +18,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..arrays import ComplexArray, FloatArray
-from ..loops.crossings import follow, frequency_grid, half_turns
+from ..loops.crossings import encircled, follow, frequency_grid
 from ..state_space.responses import frequency_response, schur_form
 from .characteristic import loops
 from .dominant import dominant_discrete_poles
@@ -140,13 +140,7 @@ def _count(part: DelayForm, dt: float) -> tuple[int, bool]:
         return characteristic(part, x, discrete=bool(dt), settles=low_gain is None)
 
     _, values = follow(curve, omega)
-    if np.any(values == 0) or not np.isfinite(values).all():
-        return 0, True
-    steps = np.abs(np.angle(values[1:] / values[:-1]))
-    turned = half_turns(values) + rest / np.pi
-    start = abs(float(np.sin(np.angle(values[0]))))
-    marginal = bool(np.any(steps > 2.0) or abs(turned - round(turned)) > 0.1 or start > 0.5)
-    return max(0, -round(turned)), marginal
+    return encircled(values, rest)
 
 
 def _between_delays(part: DelayForm, omega: FloatArray) -> ComplexArray:

@@ -108,6 +108,21 @@ def half_turns(values: ComplexArray) -> float:
     return float((offset + steps.sum()) / np.pi)
 
 
+def encircled(values: ComplexArray, rest: float = 0.0) -> tuple[int, bool]:
+    """Count the turns about 0 against the positive sense, and say whether that is doubtful.
+
+    `rest` is a turn in rad that is known beside the curve.
+    """
+    if np.any(values == 0) or not np.isfinite(values).all():
+        return 0, True
+    steps = np.abs(np.angle(values[1:] / values[:-1]))
+    turns = half_turns(values) + rest / np.pi
+    # A real system starts on the real axis, unless a closed-loop pole is at frequency 0.
+    start = abs(float(np.sin(np.angle(values[0]))))
+    doubtful = bool(np.any(steps > 2.0) or abs(turns - round(turns)) > 0.1 or start > 0.5)
+    return max(0, -round(turns)), doubtful
+
+
 def _roots(
     function: Callable[[FloatArray], FloatArray], low: FloatArray, high: FloatArray
 ) -> FloatArray:
