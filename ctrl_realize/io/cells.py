@@ -7,6 +7,7 @@ import re
 from pathlib import Path
 from typing import Literal
 
+from .._facts import facts
 from ..errors import FileFormatError
 
 DELIMITERS = ("\t", ";", "|", ",", " ")
@@ -21,26 +22,11 @@ _DATE = rf"(\d{{1,4}}[-/.]\d{{1,2}}[-/.]\d{{1,4}}\.?|\d{{1,2}}[-/. ]{_MONTH}[-/.
 _TIME = re.compile(rf"{_CLOCK}|{_DATE}([ T]+{_CLOCK})?")
 _PERCENT = re.compile(r"(?P<number>[+-]?[\d.,]+([eE][+-]?\d+)?) ?%")
 _THOUSANDS = re.compile(r"[+-]?[1-9]\d{0,2},\d{3}")
-MISSING = frozenset({"", "nan", "-nan", "na", "n/a", "#n/a", "null", "none", "-", "--", "?"})
-_NOT_NAMES = MISSING | {"inf", "+inf", "-inf", "infinity", "-infinity"}
-BAD_VALUES = frozenset(
-    {"bad", "bad data", "bad input", "bad quality", "bad value", "i/o timeout", "i/o-timeout",
-     "io timeout", "no data", "no sample", "no result", "not available", "not connect",
-     "not connected", "comm fail", "comm error", "calc failed", "pt created", "configure",
-     "intf shut", "interface shut", "shutdown", "scan off", "scan timeout", "over range",
-     "under range", "out of serv", "out of service", "arc off-line", "failed", "error", "invalid",
-     "timeout", "fault", "ungültig", "#value!", "#ref!", "#div/0!", "#num!", "#name?", "#null!",
-     "#n/a n/a", "[-11059] no good data for calculation"}
-)  # fmt: skip
-"""States that historians (the system digital states of AVEVA PI, OPC qualities) and spreadsheets
-write in place of a value."""
-
-STATES = {
-    "on": "1", "true": "1", "open": "1", "yes": "1", "ein": "1", "an": "1", "auf": "1",
-    "wahr": "1", "ja": "1", "running": "1", "opened": "1",
-    "off": "0", "false": "0", "closed": "0", "no": "0", "aus": "0", "zu": "0", "falsch": "0",
-    "nein": "0", "stopped": "0", "close": "0",
-}  # fmt: skip
+_WORDS = facts("io/words.toml")
+MISSING = frozenset(_WORDS["cells"]["missing"])
+BAD_VALUES = frozenset(_WORDS["cells"]["bad"])
+_NO_VALUES = MISSING.union(BAD_VALUES, _WORDS["cells"]["infinite"])
+STATES = {word: number for number, words in _WORDS["states"].items() for word in words}
 """Positions of a switch, as numbers."""
 
 FILLED = ("number", "time")
@@ -96,6 +82,6 @@ def kind_of(cell: str, decimal: str) -> Literal["number", "time", "missing", "te
     """Return the kind of a cell."""
     if NUMBER[decimal].fullmatch(without_percent(cell)):
         return "number"
-    if cell.lower() in _NOT_NAMES or cell.lower() in BAD_VALUES:
+    if cell.lower() in _NO_VALUES:
         return "missing"
     return "time" if _TIME.fullmatch(cell) else "text"

@@ -10,6 +10,7 @@ from typing import Literal
 
 import numpy as np
 
+from .._facts import facts
 from ..data import MeasuredFRF
 from ..errors import DataError, OptionError
 from ..numerics.arrays import ComplexArray, FloatArray
@@ -20,19 +21,7 @@ from .tables import Table
 from .text_options import TextOptions
 from .units import plain_unit
 
-_NAMES = {
-    "frequency": {"f", "freq", "frequency", "frequencies", "frequenz", "fréquence", "frecuencia",
-                  "omega", "ω", "w"},
-    "magnitude": {"magnitude", "mag", "gain", "amplitude", "amp", "abs", "|g|", "|h|", "betrag",
-                  "verstärkung", "magnitude ratio", "amplitude ratio"},
-    "phase": {"phase", "phi", "φ", "arg", "angle", "phase angle", "phasenwinkel"},
-    "real": {"real", "re", "real part", "realteil"},
-    "imag": {"imag", "im", "imaginary", "imaginary part", "imaginärteil"},
-    "response": {"response", "g", "h", "frf", "resp", "complex"},
-    "coherence": {"coherence", "coh", "gamma2", "γ2", "γ²", "cxy", "kohärenz"},
-    "std": {"std", "sigma", "std dev", "stddev", "standard deviation", "σ"},
-}  # fmt: skip
-
+_NAMES = facts("io/words.toml")["frf"]
 _IN_HZ = {"hz": 1.0, "khz": 1e3, "mhz": 1e6, "rad/s": 1 / (2 * np.pi)}
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from .._facts import facts
 from ..errors import OptionError
 from ..numerics.arrays import FloatArray
 
@@ -18,32 +19,13 @@ TIME_UNITS: dict[str, tuple[float, float]] = {
     "day": (86400.0, 1.0),
 }
 
-_SPELLINGS = {
-    "sec": "s", "secs": "s", "second": "s", "seconds": "s", "sek": "s", "sekunden": "s",
-    "msec": "ms", "millisecond": "ms", "milliseconds": "ms", "millis": "ms",
-    "µs": "us", "μs": "us", "usec": "us", "microsecond": "us", "microseconds": "us",
-    "micros": "us",
-    "nsec": "ns", "nanosecond": "ns", "nanoseconds": "ns",
-    "minute": "min", "minutes": "min", "hr": "h", "hour": "h", "hours": "h",
-    "days": "day", "tag": "day", "tage": "day",
-    "hertz": "hz", "rad_s": "rad/s", "rads": "rad/s", "rad/sec": "rad/s", "rps": "rad/s",
-    "degree": "deg", "degrees": "deg", "°": "deg",
-    "radian": "rad", "radians": "rad", "decibel": "db",
-    "-": "", "1": "", "abs": "", "linear": "",
-}  # fmt: skip
-
-_KNOWN = {*TIME_UNITS, "hz", "khz", "mhz", "rad/s", "deg", "rad", "db"}
-
-SAMPLE_TIMES = frozenset({"dt", "ts", "sample time", "sampletime", "sampling time"})
-"""Names of a sample time, beside the columns or above them."""
-
-_BELOW_NAMES = {
-    "%", "°c", "degc", "°f", "degf", "bar", "mbar", "kpa", "mpa", "rpm", "1/min", "l/min", "l/h",
-    "m3/h", "m³/h", "kg/h", "kg/s", "t/h", "mm", "cm",
-}  # fmt: skip
-"""Further units that stand alone below a header, and are hardly names of signals."""
-
-_NO_TIMES = (_KNOWN | _BELOW_NAMES | {"k", "c", "f", "°k", "degk"}) - TIME_UNITS.keys()
+_WORDS = facts("io/words.toml")
+_SPELLINGS: dict[str, str] = {
+    word: unit for unit, words in _WORDS["spellings"].items() for word in words
+}
+_KNOWN = {*TIME_UNITS, *_WORDS["units"]["in_names"]}
+_STANDING_ALONE = _KNOWN.union(_WORDS["units"]["below_names"])
+_NO_TIMES = _STANDING_ALONE.union(_WORDS["units"]["temperatures"]) - TIME_UNITS.keys()
 
 _PER_SECOND = ("rad_s", "rad/s", "rad/sec")
 _SEPARATORS = " _/"
@@ -97,7 +79,7 @@ def is_no_time(unit: str) -> bool:
 def sample_time_unit(name: str) -> str:
     """Return the unit in a name such as ``SampleTime[ms]``; empty for other names."""
     base, unit = split_unit(name.rpartition(".")[2].replace("_", " "))
-    return unit if base.lower() in SAMPLE_TIMES and unit in TIME_UNITS else ""
+    return unit if base.lower() in _WORDS["columns"]["sample_time"] and unit in TIME_UNITS else ""
 
 
 def bare_unit(text: str) -> str:
@@ -125,7 +107,7 @@ def is_units_line(cells: list[str]) -> bool:
     """Whether the cells below a header are units, not names or numbers."""
     filled = [cell.strip() for cell in cells if cell.strip()]
     bracketed = [cell[0] in "[({<" and cell[-1] in "])}>" for cell in filled]
-    known = [plain_unit(cell) in _KNOWN | _BELOW_NAMES for cell in filled]
+    known = [plain_unit(cell) in _STANDING_ALONE for cell in filled]
     return bool(filled) and (all(bracketed) or any(known))
 
 

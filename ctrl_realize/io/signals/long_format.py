@@ -11,14 +11,8 @@ from ...errors import DataError
 from ..columns import Selector, holds_numbers, named
 from ..tables import Column, Table
 from ..units import unit_of
-from .names import DATE_NAMES, TIME_NAMES
+from .names import NAMES
 
-TAG_NAMES = frozenset(
-    {"tag", "tags", "tagname", "tag name", "point", "point name", "pointname", "point id",
-     "variable", "item", "item id", "itemid", "node id", "nodeid", "signal", "sensor",
-     "messstelle", "kennzeichen"}
-)  # fmt: skip
-VALUE_NAMES = frozenset({"value", "values", "wert", "messwert", "reading", "vvalue", "valeur"})
 _MOST_TAGS = 1000
 
 
@@ -38,9 +32,9 @@ def long_table(
     It is long if it has one column of tags, one of values and one of time by their names, and no
     column has the name of a requested signal.
     """
-    tags = [k for k in named(table, TAG_NAMES) if not holds_numbers(table, k)]
-    values = named(table, VALUE_NAMES)
-    clocks = named(table, TIME_NAMES) or named(table, DATE_NAMES)
+    tags = [k for k in named(table, NAMES["tag"]) if not holds_numbers(table, k)]
+    values = named(table, NAMES["value"])
+    clocks = named(table, NAMES["time"]) or named(table, NAMES["date"])
     if isinstance(time, str):
         clocks = [k for k, one in enumerate(table.columns) if one.name == time]
     names = {column.name for column in table.columns}

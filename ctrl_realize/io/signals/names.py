@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..._facts import facts
 from ...errors import DataError, OptionError
 from ..columns import (
     Selector,
@@ -21,45 +22,10 @@ from ..columns import (
     plain_name,
 )
 from ..tables import Table
-from ..units import SAMPLE_TIMES, is_no_time, sample_time_unit, to_seconds
+from ..units import is_no_time, sample_time_unit, to_seconds
 
-TIME_NAMES = frozenset(
-    {"t", "time", "times", "timestamp", "timestamps", "time stamp", "datetime", "date time",
-     "date/time", "elapsed", "elapsed time", "time elapsed", "seconds", "sec", "secs", "ms",
-     "t stamp", "millis", "milliseconds", "micros", "microseconds", "minutes", "hours", "x value",
-     "zeit", "zeitstempel", "datum/zeit", "datum zeit", "uhrzeit", "temps", "tiempo", "tempo",
-     "tijd", "tid", "czas"}
-)  # fmt: skip
-DATE_NAMES = frozenset({"date", "datum", "fecha", "data"})
-"""Time if there is no other, or the date of a column with the time of day."""
-INPUT_NAMES = frozenset(
-    {"u", "in", "input", "inputs", "input signal", "drive", "command", "cmd", "excitation",
-     "stimulus", "op", "mv", "co", "lmn", "pwm", "controller output", "control output",
-     "control signal", "manipulated variable", "manipulated value", "eingang", "stellgröße",
-     "stellgroesse", "stellgrösse", "stellwert", "stellsignal", "stellgrad", "entrée", "entree",
-     "commande", "entrada", "ingresso"}
-)  # fmt: skip
-OUTPUT_NAMES = frozenset(
-    {"y", "out", "output", "outputs", "output signal", "response", "measured", "measurement",
-     "measured value", "actual value", "pv", "process variable", "process value",
-     "controlled variable", "ausgang", "istwert", "regelgröße", "regelgroesse", "regelgrösse",
-     "messwert", "sortie", "mesure", "salida", "uscita"}
-)  # fmt: skip
-SETPOINT_NAMES = frozenset(
-    {"sp", "sv", "set point", "setpoint", "sollwert", "führungsgröße", "fuehrungsgroesse",
-     "consigne", "consigna"}
-)  # fmt: skip
-"""Neither input nor output of a plant beside those."""
-_TAGS_INPUT = frozenset({"op", "mv", "co", "lmn"})
-_TAGS_OUTPUT = frozenset({"pv"})
-_TAGS_SETPOINT = frozenset({"sp", "sv"})
-"""Last part of a tag, such as ``TIC101_PV`` or ``Gas valve MV``."""
-QUALITY_NAMES = frozenset(
-    {"quality", "qualität", "qualitaet", "qual", "status", "opc quality", "opcquality",
-     "quality code", "qualitycode", "quality detail", "qualitydetail", "status code",
-     "statuscode", "good", "is good", "isgood"}
-)  # fmt: skip
-_RATE_NAMES = frozenset({"fs", "sample rate", "samplerate", "sampling rate"})
+NAMES = {key: frozenset(words) for key, words in facts("io/words.toml")["columns"].items()}
+"""Names of columns by what they hold, and the last parts of tags, such as ``TIC101_PV``."""
 
 
 @dataclass(frozen=True)
@@ -110,7 +76,7 @@ def choose_columns(
         if k not in (*known, *inputs, *outputs) and holds_numbers(table, k)
     ]
     if len(rest) > 1:
-        setpoints = named(table, SETPOINT_NAMES) + _tagged(table, _TAGS_SETPOINT, known)
+        setpoints = named(table, NAMES["setpoint"]) + _tagged(table, NAMES["setpoint_tag"], known)
         rest = [k for k in rest if k not in setpoints]
     if not inputs and not outputs and not has_header(table) and len(rest) == 2:
         inputs, outputs = rest[:1], rest[1:]
@@ -131,14 +97,10 @@ def choose_columns(
 
 def _signals(table: Table, kind: str, taken: Sequence[int]) -> list[int]:
     """Columns of a signal by their names: whole names first, then the last part of a tag."""
-    names, tags = {
-        "input": (INPUT_NAMES, _TAGS_INPUT),
-        "output": (OUTPUT_NAMES, _TAGS_OUTPUT),
-    }[kind]
-    found = named(table, names, taken) or _tagged(table, tags, taken)
-    parts = {family(table.columns[k].name) for k in found} & (_TAGS_INPUT | _TAGS_OUTPUT)
+    found = named(table, NAMES[kind], taken) or _tagged(table, NAMES[f"{kind}_tag"], taken)
+    families = {family(table.columns[k].name) for k in found}
     # channels have one name with numbers; two different names of a loop are two candidates
-    if len(found) > 1 and parts and len({family(table.columns[k].name) for k in found}) > 1:
+    if len(families) > 1 and families & (NAMES["input_tag"] | NAMES["output_tag"]):
         raise OptionError(
             f"{table.path} has {len(found)} columns that could be the {kind}; give {kind}=name or "
             f"number; it has {table.listing()}"
@@ -158,14 +120,14 @@ def _tagged(table: Table, tags: Iterable[str], taken: Iterable[int]) -> list[int
 
 
 def _clocks(table: Table, taken: Iterable[int]) -> list[int]:
-    found = named(table, TIME_NAMES, taken)
+    found = named(table, NAMES["time"], taken)
     return [k for k in found if not is_no_time(table.columns[k].unit)]
 
 
 def _dates(table: Table, clock: int | None, taken: Iterable[int]) -> list[int]:
     """Columns of dates beside that of time."""
     used = {*taken, *([] if clock is None else [clock])}
-    return [k for k in named(table, DATE_NAMES, used) if not holds_numbers(table, k)]
+    return [k for k in named(table, NAMES["date"], used) if not holds_numbers(table, k)]
 
 
 def _guessed_clock(table: Table, taken: Sequence[int]) -> tuple[int | None, float | None]:
@@ -181,8 +143,8 @@ def _guessed_clock(table: Table, taken: Sequence[int]) -> tuple[int | None, floa
     for key, value in table.constants.items():
         plain = key.rpartition(".")[2].replace("_", " ").lower()
         unit = sample_time_unit(key)
-        if unit or plain in SAMPLE_TIMES | _RATE_NAMES:
-            step = 1 / value if plain in _RATE_NAMES and value else value
+        if unit or plain in NAMES["sample_time"] | NAMES["sample_rate"]:
+            step = 1 / value if plain in NAMES["sample_rate"] and value else value
             step = float(to_seconds(np.asarray(step), unit or "s"))
             if not (math.isfinite(step) and step > 0):
                 raise DataError(f"{table.path}: {key}={value} is not a sample time; give dt=")

@@ -35,7 +35,7 @@ from ..cells import BAD_VALUES, NUMBER
 from ..columns import find_column
 from ..tables import Table
 from ..units import split_unit
-from .names import QUALITY_NAMES
+from .names import NAMES
 
 _GOOD, _FORCED, _UNCERTAIN = 192, 216, 64
 _SYSTEM_STATES = 220  # of PI, those that are no good code of OPC DA
@@ -177,7 +177,7 @@ def _qualities(table: Table) -> dict[int, str]:
     found: dict[int, str] = {}
     for k, column in enumerate(table.columns):
         name = _plain(column.name)
-        for word in sorted(QUALITY_NAMES, key=len):
+        for word in sorted(NAMES["quality"], key=len):
             if name == word or name.endswith(f" {word}"):
                 found[k] = name.removesuffix(word).strip()
     bare = [k for k, tag in found.items() if not tag]
