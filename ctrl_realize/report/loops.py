@@ -14,7 +14,7 @@ from .._checks import check_type
 from .._wording import in_time
 from ..valves.loops.result import LoopDiagnosis
 from .build import write_report
-from .page import Column, Row, Table
+from .page import Row, Table, headed
 from .sketches import Sketch, sketch
 from .tables import Paths, data_table, settings_tables
 from .verdict import Level, Verdict
@@ -109,13 +109,9 @@ def _sketches(diagnosis: LoopDiagnosis) -> list[Sketch]:
 
 
 def _method_table(diagnosis: LoopDiagnosis) -> Table:
-    columns = (
-        Column("method"), Column("of"), Column("index", "number"), Column("limit"),
-        Column("verdict"), Column("source"),
-    )  # fmt: skip
     rows = []
     for one in diagnosis.methods:
         known = [f"{each:.3g}" for each in (one.index, one.second_index) if np.isfinite(each)]
         said = f"{one.verdict}: {one.note}" if one.note else one.verdict
         rows.append(Row((one.name, one.signal, ", ".join(known), one.limit, said, one.source)))
-    return Table("Methods", tuple(rows), columns)
+    return headed("loop_methods", rows)

@@ -6,20 +6,24 @@ import base64
 import functools
 import hashlib
 import os
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from importlib import resources
 from pathlib import Path
+from typing import Any
 
 from jinja2 import DictLoader, Environment, StrictUndefined, Template
 from markupsafe import Markup
 
+from .._facts import facts
 from ..io.atomic import write_text
 from .verdict import Verdict
 
 # control characters, and those that change the direction of writing, may occur in file names
 _CONTROLS = (*range(9), 11, 12, *range(14, 32), *range(127, 160))
 _UNSEEN = dict.fromkeys((*_CONTROLS, *range(0x202A, 0x202F), *range(0x2066, 0x206A)), "\ufffd")
+
+_TABLES = facts("report/tables.toml")
 
 
 @dataclass(frozen=True)
@@ -194,6 +198,14 @@ def pairs(
         kinds=("label", "mono" if mono else "text"),
         folded=folded,
     )
+
+
+def headed(key: str, rows: Iterable[Row], **words: Any) -> Table:
+    """Make a table with the title, the columns and the note of a row of `tables.toml`."""
+    told = _TABLES[key]
+    columns = tuple(Column(name.format(**words), kind) for name, kind in told["columns"].items())
+    note = told.get("note", "").format(**words)
+    return Table(told["title"], tuple(rows), columns, note=note, folded=told.get("folded", False))
 
 
 def render(page: Page) -> str:

@@ -26,7 +26,7 @@ from ..identification.campaign.campaign import Campaign
 from ..identification.campaign.rows import CampaignRow
 from ..results import ModelFit
 from .facts import FACTS
-from .page import Column, Row, Table, pairs
+from .page import Row, Table, headed, pairs
 from .provenance import file_sha256, record_sha256
 
 Paths = Sequence[str | os.PathLike[str]]
@@ -50,18 +50,11 @@ def fit_tables(fit: ModelFit | None, title: str = "Details of the fit") -> list[
 
 def parameter_table(fit: ModelFit) -> Table:
     """List gain, dead time, lags, ... and those of an actuator, with errors and 95 % intervals."""
-    columns = (
-        Column("parameter"),
-        Column("estimate", "number"),
-        Column("standard error", "number"),
-        Column("95 % interval", "number"),
-        Column("interval for"),
-    )
     rows = [_parameter_row(one) for one in fit.parameters]
     actuator = fit.actuator
     if actuator is not None:
         rows += [_parameter_row(one, actuator.where) for one in actuator.parameters]
-    return Table("Parameters", tuple(rows), columns)
+    return headed("parameters", rows)
 
 
 def _parameter_row(one: Parameter, where: str = "") -> Row:
@@ -121,53 +114,33 @@ def settings_tables(settings: Mapping[str, Any] | None) -> list[Table]:
 
 def data_table(records: Sequence[Record], files: Paths) -> Table:
     """List data with their checksums: of files if there are any, otherwise of samples."""
-    columns = (
-        Column("data"),
-        Column("samples", "number"),
-        Column("sample time [s]", "number"),
-        Column("length [s]", "number"),
-        Column("SHA-256", "mono"),
-    )
     rows = []
     if files:
         known = {os.fspath(file): record for file, record in zip(files, records, strict=False)}
         for file in files:
             record = known.get(os.fspath(file))
             rows.append(Row((Path(file).name, *_extent(record), file_sha256(file))))
-        note = "Checksums of the files."
+        sums = "the files"
     else:
         rows = [
             Row((record.name or "record", *_extent(record), record_sha256(record)))
             for record in records
         ]
-        note = "Checksums of time, input and output as little-endian float64."
-    return Table("Data", tuple(rows), columns, note=note)
+        sums = "time, input and output as little-endian float64"
+    return headed("data", rows, sums=sums)
 
 
 def _extent(record: Record | None) -> tuple[str, str, str]:
     if record is None:
         return ("", "", "")
-    return (
-        str(record.n_samples),
-        f"{record.dt:.6g}",
-        f"{record.time[-1] - record.time[0]:.6g}",
-    )
+    length = float(record.time[-1] - record.time[0])
+    return str(record.n_samples), f"{record.dt:.6g}", f"{length:.6g}"
 
 
 def campaign_table(campaign: Campaign) -> Table:
     """List the records of a campaign: delay, interval, residual, or the error."""
     waits = [row.dead_time for row in campaign.good]
     scale, unit = time_unit(float(np.median(waits)))
-    columns = (
-        Column("record", "name"),
-        Column("step", "number"),
-        Column("delay [samples]", "number"),
-        Column(f"dead time [{unit}]", "number"),
-        Column(f"interval [{unit}]", "number"),
-        Column("order", "number"),
-        Column("residual", "number"),
-        Column("remarks"),
-    )
     best = campaign.best.name
     rows = []
     for row in campaign.rows:
@@ -180,9 +153,7 @@ def campaign_table(campaign: Campaign) -> Table:
         cells += [f"{low} to {high}", str(row.order), f"{row.residual:.3g}"]
         cells.append(", ".join([*(flag.code for flag in row.flags), *row.warnings]))
         rows.append(Row(tuple(cells), "best" if row.name == best else ""))
-    return Table(
-        "Records", tuple(rows), columns, note="In bold: the record with the smallest misfit."
-    )
+    return headed("campaign", rows, unit=unit)
 
 
 def _dead_time_cells(row: CampaignRow, scale: float) -> list[str]:
@@ -196,28 +167,8 @@ def _dead_time_cells(row: CampaignRow, scale: float) -> list[str]:
 
 def amplitude_table(campaign: Campaign) -> Table:
     """List delays and gains by the height of the step."""
-    table = campaign.by_amplitude()
-    columns = (
-        Column("step", "number"),
-        Column("records", "number"),
-        Column("mean delay [samples]", "number"),
-        Column("std [samples]", "number"),
-        Column("gain", "number"),
-        Column("std of gain", "number"),
-    )
-    rows = tuple(
-        Row(
-            (
-                in_digits(float(str(amplitude))),
-                str(int(line["records"])),
-                *(in_digits(float(line[name])) for name in ("delay", "std", "gain", "gain_std")),
-            )
-        )
-        for amplitude, line in table.iterrows()
-    )
-    return Table(
-        "By step amplitude",
-        rows,
-        columns,
-        note="Delays or gains that change with the amplitude indicate a nonlinear plant.",
-    )
+    rows = []
+    for amplitude, line in campaign.by_amplitude().iterrows():
+        found = (in_digits(float(line[name])) for name in ("delay", "std", "gain", "gain_std"))
+        rows.append(Row((in_digits(float(str(amplitude))), str(int(line["records"])), *found)))
+    return headed("amplitudes", rows)

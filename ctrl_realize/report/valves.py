@@ -16,7 +16,7 @@ from ..valves.metrics import words_of
 from ..valves.result import ValveReport
 from ..valves.words import in_words, limit_in_words
 from .build import write_report
-from .page import Column, Row, Table, pairs
+from .page import Row, Table, headed, pairs
 from .sketches import Sketch, sketch
 from .tables import Paths, data_table, settings_tables
 from .verdict import Level, Verdict
@@ -26,6 +26,7 @@ _JUDGEMENTS: dict[Level, str] = {
     "caution": "Measured, but not judged in full: see below.",
     "poor": "Limits are not met: see below.",
 }
+_SHOWN = ("dead_time", "t63", "t86", "t98", "overshoot", "gain")
 _FACTS = ("dead_time", "t63", "t86", "overshoot", "dead_band", "resolution",
           "stroke_time_opening", "stroke_time_closing")  # fmt: skip
 
@@ -124,10 +125,6 @@ def _sketches(result: ValveReport) -> list[Sketch]:
 
 
 def _metric_table(result: ValveReport) -> Table:
-    columns = (
-        Column("metric"), Column("value", "number"), Column("95 % interval", "number"),
-        Column("steps"), Column("limit", "number"), Column("judgement"),
-    )  # fmt: skip
     rows = []
     for one in result.metrics:
         value, interval = in_words(one.interval, one.definition.unit)
@@ -135,30 +132,21 @@ def _metric_table(result: ValveReport) -> Table:
         cells = (one.definition.name, value, interval.strip("()"), one.where, limit, one.judgement)
         kind = {"met": "best", "not met": "failed"}.get(one.judgement, "")
         rows.append(Row(cells, kind))
-    return Table(
-        "Metrics", tuple(rows), columns,
-        note="Of metrics that depend on the step, the worst size and direction.",
-    )  # fmt: skip
+    return headed("metrics", rows)
 
 
 def _size_table(result: ValveReport) -> Table:
-    names = ("dead_time", "t63", "t86", "t98", "overshoot", "gain")
-    columns = (
-        Column("steps"), Column("number", "number"), Column("moved, settled", "number"),
-        *(Column(DEFINITIONS[name].name, "number") for name in names),
-        Column("dead time (fit)", "number"),
-    )  # fmt: skip
     rows = tuple(
         Row(
             (
                 words_of(group), str(group.count), f"{group.moved}, {group.settled}",
-                *(_cell(group.estimates[name], DEFINITIONS[name].unit) for name in names),
+                *(_cell(group.estimates[name], DEFINITIONS[name].unit) for name in _SHOWN),
                 _cell(group.fitted_dead_time, "s"),
             )
         )
         for group in result.groups
     )  # fmt: skip
-    return Table("Step size and direction", rows, columns, note="95 % intervals in brackets.")
+    return headed("sizes", rows, **DEFINITIONS)
 
 
 def _cell(found: Any, unit: str) -> str:
@@ -173,13 +161,6 @@ def _missing_tables(result: ValveReport) -> list[Table]:
 
 
 def _step_table(result: ValveReport) -> Table:
-    names = ("dead_time", "t63", "t86", "t98", "overshoot", "gain")
-    columns = (
-        Column("record", "name"), Column("time [s]", "number"), Column("command", "number"),
-        Column("moved"), Column("settled"),
-        *(Column(f"{DEFINITIONS[name].name} [{DEFINITIONS[name].unit}]", "number")
-          for name in names),
-    )  # fmt: skip
     rows = tuple(
         Row(
             (
@@ -187,18 +168,16 @@ def _step_table(result: ValveReport) -> Table:
                 f"{one.before:.4g} to {one.after:.4g}", "yes" if one.moved else "no",
                 "yes" if one.settled else "no",
                 *(f"{one.values[name]:.4g}" if np.isfinite(one.values[name]) else ""
-                  for name in names),
+                  for name in _SHOWN),
             )
         )
         for one in result.steps
     )  # fmt: skip
-    return Table("Every step", rows, columns, folded=True)
+    return headed("steps", rows, **DEFINITIONS)
 
 
 def _definition_table() -> Table:
-    columns = (Column("metric"), Column("definition"), Column("source, as far as it was read"),
-               Column("test that it needs"))  # fmt: skip
     rows = tuple(
         Row((one.name, one.sentence, one.source, one.needs)) for one in DEFINITIONS.values()
     )
-    return Table("Definitions", rows, columns, folded=True)
+    return headed("definitions", rows)
