@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import sys
 
+from .._facts import facts
 from ..errors import ModelWarning, UnsuitableSystemError, warn_caller
 
 HARMLESS = 20
@@ -27,7 +28,7 @@ SLOW = 500
 POLYNOMIALS = "_convert_to_transfer_function"
 JOINS = "feedback", "append", "lft"
 SIMULATES = "forced_response"
-ENDS = "_ideal_tfinal_and_dt"
+_WORDS = facts("delayed/advice.toml")["readers"]
 
 
 def warn_of_the_reader(registers: int, states: int) -> None:
@@ -53,47 +54,18 @@ def warn_of_the_reader(registers: int, states: int) -> None:
     if not frame.f_globals.get("__name__", "").startswith("control."):
         return
     reader = frame.f_code.co_name
-    if reader == POLYNOMIALS:
-        words = (
-            f"python-control forms polynomials with {registers} delay registers here; from about "
-            "50 on these are numerically meaningless, and so are the results. Instead of a root "
-            "locus use cr.design.root_locus(sys) or cr.design.margins(sys), instead of ct.tf(sys) "
-            "use sys.to_tf() where the delay is not in a loop, and with a transfer function "
-            "sys * tf, sys + tf, ct.ss(tf) * sys and "
-            "ct.feedback(cr.DelaySystem(ct.ss(tf)), sys)"
-        )
-        if registers >= MEANINGLESS:
+    if reader in JOINS:
+        warn_of_lost_delays(states)
+    elif reader in _WORDS and (reader != SIMULATES or states > SLOW):
+        words = _WORDS[reader].format(registers=registers, states=states)
+        if reader == POLYNOMIALS and registers >= MEANINGLESS:
             raise UnsuitableSystemError(words)
         warn_caller(words, ModelWarning)
-    elif reader == ENDS:
-        warn_caller(
-            f"python-control chooses the end of the response without the dead time of {registers} "
-            "samples: it may end before it begins. Use sys.step_info() and sys.step_response(), "
-            "or give the times",
-            ModelWarning,
-        )
-    elif reader in JOINS:
-        warn_of_lost_delays(states)
-    elif reader == SIMULATES and states > SLOW:
-        warn_caller(
-            f"python-control multiplies matrices of {states} states at every sample here. "
-            "sys.step_response, sys.impulse_response, sys.initial_response and "
-            "sys.forced_response give the same without matrices, a thousand times faster; so does "
-            "sys.step_info()",
-            ModelWarning,
-        )
 
 
 def warn_of_lost_delays(states: int) -> None:
     """Warn that an interconnection has become a plain system."""
-    warn_caller(
-        f"python-control makes a plain system of {states} states and more here: it is correct, but "
-        "its responses take the longer the more states it has. To keep the delays, put the "
-        "delayed system first, use cr.DelaySystem(ct.ss(K)) instead of a controller K, "
-        "(1 + L) ** -1 instead of ct.feedback(1, L), cr.interconnect instead of ct.interconnect, "
-        "and cr.design.gang_of_four instead of ct.gangof4",
-        ModelWarning,
-    )
+    warn_caller(_WORDS["lost_delays"].format(states=states), ModelWarning)
 
 
 def warn_of_an_interconnection(registers: int, states: int) -> None:

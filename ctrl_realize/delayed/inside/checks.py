@@ -9,6 +9,7 @@ import control as ct
 import numpy as np
 
 from ..._checks import check_type
+from ..._facts import facts
 from ...errors import DelayRangeError, UnsuitableSystemError
 from ...numerics.internal_delays.form import DelayForm, without_zero_delays
 from ..deferred import DeferredMatrices
@@ -16,34 +17,8 @@ from ..operands import plain, whole_samples
 from ..operators import algebraic
 from ..parts import MAX_DELAY, check_entries
 
-TIMES = "sys.step_response(t), sys.impulse_response(t) and sys.forced_response(t, u)"
-LOCUS = "Use cr.design.root_locus(sys), cr.design.margins(sys) and sys.step_response(t)"
-FOUR = "Use cr.design.gang_of_four(P, C), and ct.bode_plot(..., plot_phase=False) of it"
-MARGIN = "Use ct.margin(1 * P) or cr.design.margins(P)"
-ADVICE = {
-    "step_response": f"Use {TIMES}",
-    "impulse_response": f"Use {TIMES}",
-    "initial_response": f"Use {TIMES}",
-    "forced_response": f"Use {TIMES}",
-    "step_info": "Use sys.step_info(t)",
-    "root_locus_map": LOCUS,
-    "root_locus_plot": LOCUS,
-    "sisotool": LOCUS,
-    "gangof4_response": FOUR,
-    "gangof4_plot": FOUR,
-    "margin": MARGIN,
-    "stability_margins": MARGIN,
-    "disk_margins": "Use cr.design.margins(sys), whose modulus margin is the disk margin of S",
-    "interconnect": "Use cr.interconnect, with the same arguments",
-}
+_INSTEAD = facts("delayed/advice.toml")["instead"]
 """What to call instead, by the function of python-control that was called."""
-
-ORDER = (
-    "If a transfer function or plain system comes first, write P * C, P + C, ct.ss(C) * P, "
-    "cr.DelaySystem(ct.ss(C)) instead of C, cr.interconnect, or (1 + L) ** -1 for "
-    f"ct.feedback(1, L). For time responses use {TIMES}, for a rational approximation "
-    "sys.pade(order), for a sampled model sys.to_discrete(dt)"
-)
 
 
 def not_rational(what: str) -> UnsuitableSystemError:
@@ -56,7 +31,7 @@ def not_rational(what: str) -> UnsuitableSystemError:
     asks = f"{name} of python-control" if name else "this"
     return UnsuitableSystemError(
         f"{asks} needs {what}, which do not exist for a dead time in continuous time. "
-        f"{ADVICE.get(name, ORDER)}"
+        f"{_INSTEAD.get(name, _INSTEAD['others'])}"
     )
 
 
