@@ -22,9 +22,7 @@ def run_compare(
     *,
     compared: Mapping[str, Any],
     response_file: Mapping[str, Any],
-    no_report: bool,
     run: Run,
-    typed: str,
 ) -> int:
     """Compare, write the results if a folder is given, and return the exit code."""
     system = load_model(model)
@@ -36,7 +34,7 @@ def run_compare(
         return 0
     write = partial(
         write_comparison, system=system, frf=measured, comparison=comparison, files=[model, frf],
-        calls=[("In a terminal", typed)],
+        calls=[("In a terminal", run.typed)],
     )  # fmt: skip
     tables = {"frf_comparison.csv": (comparison.table(), False)}
-    return write_results(folder, run, tables, None if no_report else write, "the comparison")
+    return write_results(folder, run, tables, write, "the comparison")

@@ -21,7 +21,7 @@ _COLUMNS = ("time", "input", "output", "quality", "by", "frequency", "magnitude"
             "imag")  # fmt: skip
 
 
-_NO_RESULT = ("folder", "jobs", "no_report")
+_NO_RESULT = ("folder", "jobs")
 
 
 def typed_call(command: str, words: Sequence[str]) -> str:
@@ -47,8 +47,8 @@ def command(module: str, function: str) -> Callable[[Callable[..., None]], Calla
     """Make a command of a signature: a function of a module runs it with the same arguments.
 
     Groups among the arguments become options; the function receives them as the arguments of
-    Python that were given. Files must exist. In place of `overwrite` it receives the `run`, and as
-    `typed` the command line that can be typed again.
+    Python that were given. Files must exist. In place of `overwrite` and `no_report` it receives
+    the `run`.
     """
 
     def complete(declared: Callable[..., None]) -> Callable[..., int]:
@@ -58,6 +58,7 @@ def command(module: str, function: str) -> Callable[[Callable[..., None]], Calla
                 options = {name: values.pop(name) for name in GROUPS[group]}
                 values[group] = given(**options)
             folder, overwrite = values["folder"], values.pop("overwrite")
+            report = not values.pop("no_report")
             named = [value for name, value in values.items() if name != "folder"]
             several = [value if isinstance(value, list) else [value] for value in named]
             paths = [path for each in several for path in each if isinstance(path, Path)]
@@ -67,9 +68,9 @@ def command(module: str, function: str) -> Callable[[Callable[..., None]], Calla
                 from .manifest import Run
 
                 call = getattr(import_module(module, __package__), function)
-            again = Run(typed_call(declared.__name__, words), tuple(paths), overwrite)
             whole = [*words, *([] if folder is None else ["--output", str(folder)])]
-            code: int = call(**values, run=again, typed=typed_call(declared.__name__, whole))
+            command, typed = (typed_call(declared.__name__, one) for one in (words, whole))
+            code: int = call(**values, run=Run(command, tuple(paths), overwrite, typed, report))
             return code
 
         hints = get_type_hints(declared, include_extras=True)

@@ -43,9 +43,7 @@ def run_identify(
     record: Mapping[str, Any],
     response: Mapping[str, Any],
     jobs: int | None,
-    no_report: bool,
     run: Run,
-    typed: str,
 ) -> int:
     """Identify, write the results, and return the exit code."""
     joint = joint or "gains" in chosen
@@ -56,16 +54,16 @@ def run_identify(
     settings = Settings(chosen, joint)
     how = Reading(record, tests)
     measured = None if frf is None else read_frf(frf, **response)
-    calls = calls_again(files, settings, how, typed, None if frf is None else (frf, response))
-    sources, task = how.sources(files), _Task(settings, measured, run, not no_report)
+    calls = calls_again(files, settings, how, run.typed, None if frf is None else (frf, response))
+    sources, task = how.sources(files), _Task(settings, measured, run)
     if separate and len(sources) > 1:
-        return _each_alone(task, sources, folder, how, typed)
+        return _each_alone(task, sources, folder, how)
     refuse_other_results(folder, run)
     if len(sources) > 1 and not joint:
         return _many(task, sources, folder, calls, jobs)
     with appearing(folder, run) as staged:
         written = _one(task, sources, staged, calls)
-    _say_what_is_written(folder, ["model.json"], task.report and written)
+    _say_what_is_written(folder, ["model.json"], run.report and written)
     return 0 if written else 1
 
 
@@ -76,7 +74,6 @@ class _Task:
     settings: Settings
     frf: MeasuredFRF | None
     run: Run
-    report: bool
 
 
 def _one(task: _Task, sources: list[Source], folder: Path, calls: list[tuple[str, str]]) -> bool:
@@ -91,7 +88,7 @@ def _one(task: _Task, sources: list[Source], folder: Path, calls: list[tuple[str
         say(printable(f"{source.file}: {record!r}"))
     _say_model(system, comparison)
     files = [source.file for source in sources]
-    provenance = Provenance(files, frf, comparison, settings.given, calls, task.report)
+    provenance = Provenance(files, frf, comparison, settings.given, calls, task.run.report)
     return write_record_files(folder, system, records[0], provenance)
 
 
@@ -127,10 +124,10 @@ def _many(
         _say_model(campaign.system, comparison)
         with appearing(output, task.run) as folder:
             files = [source.file for source in sources]
-            provenance = Provenance(files, frf, comparison, settings.given, calls, task.report)
+            provenance = Provenance(files, frf, comparison, settings.given, calls, task.run.report)
             written = write_campaign_files(folder, campaign, provenance)
     names = ["model.json", "records.csv", "models/"]
-    _say_what_is_written(output, names, task.report and written)
+    _say_what_is_written(output, names, task.run.report and written)
     return 1 if campaign.failed or not written else 0
 
 
@@ -146,7 +143,7 @@ def _refuse_useless(campaign: Campaign) -> None:
         raise DataError(f"{error}; --separate identifies each record on its own") from error
 
 
-def _each_alone(task: _Task, sources: list[Source], output: Path, how: Reading, typed: str) -> int:
+def _each_alone(task: _Task, sources: list[Source], output: Path, how: Reading) -> int:
     """Identify each record into its own folder; failures do not stop the rest."""
     refuse_a_file(output)
     failed = 0
@@ -163,6 +160,7 @@ def _each_alone(task: _Task, sources: list[Source], output: Path, how: Reading, 
             # each folder appears as soon as it is finished, so that an interruption loses no other
             with appearing(output / name, task.run) as folder:
                 test = position(source)
+                typed = task.run.typed
                 calls = calls_again([source.file], task.settings, how, typed, None, test)
                 failed += not _one(task, [source], folder, calls)
         except (CtrlRealizeError, OSError) as error:

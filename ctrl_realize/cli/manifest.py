@@ -27,11 +27,16 @@ _RESULTS = (
 
 @dataclass(frozen=True)
 class Run:
-    """A run of a command: its arguments, without the folder, and the input files."""
+    """A run of a command.
+
+    `command` has its arguments without the folder, `typed` with it, and `inputs` the files.
+    """
 
     command: str
     inputs: tuple[Path, ...] = ()
     overwrite: bool = False
+    typed: str = ""
+    report: bool = True
 
 
 def refuse_other_results(folder: Path, run: Run) -> None:

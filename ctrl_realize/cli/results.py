@@ -78,23 +78,23 @@ def write_results(
     output: Path,
     run: Run,
     tables: Mapping[str, tuple[pd.DataFrame, bool]],
-    write: Callable[..., Path] | None,
+    write: Callable[..., Path],
     result: str,
 ) -> int:
-    """Write tables, by name and with or without their index, and a report; return the exit code.
+    """Write tables, by name and with or without their index, and a report, if one is wanted.
 
-    `result` names what is written even if the report fails.
+    Returns the exit code; `result` names what is written even if the report fails.
     """
     written: list[str] = []
     with appearing(output, run) as folder:
         for name, (table, index) in tables.items():
             write_csv(folder / name, table, index=index)
-        if write is not None:
+        if run.report:
             with told_if_it_fails(folder, result) as written:
                 write(folder / "report.html", figures=folder / "figures")
                 written.append("report.html, figures/")
     say(f"\nwritten to {printable(str(output))}: {', '.join([*tables, *written])}")
-    return 0 if written or write is None else 1
+    return 0 if written or not run.report else 1
 
 
 @contextmanager

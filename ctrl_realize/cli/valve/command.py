@@ -24,9 +24,7 @@ def run_valve(
     limit: Sequence[str] | None,
     tests: Mapping[str, Any],
     valve_test: Mapping[str, Any],
-    no_report: bool,
     run: Run,
-    typed: str,
 ) -> int:
     """Measure, write the results, and return the exit code."""
     how = Reading(valve_test, tests)
@@ -41,7 +39,7 @@ def run_valve(
     say(result.report())
     lines, name = reading_in_python(files, how)
     lines.append(f"report = cr.valves.valve_report({name}{python_keywords(options)})")
-    calls = [("In a terminal", typed), ("In Python", "\n".join(lines))]
+    calls = [("In a terminal", run.typed), ("In Python", "\n".join(lines))]
     tables = {
         "metrics.csv": (result.metric_table(), True),
         "sizes.csv": (result.table(), False),
@@ -51,7 +49,7 @@ def run_valve(
         write_valve_report, result=result, files=list(dict.fromkeys(files)), settings=options,
         calls=calls,
     )  # fmt: skip
-    return write_results(folder, run, tables, None if no_report else write, "the table of metrics")
+    return write_results(folder, run, tables, write, "the table of metrics")
 
 
 def _limits(given: Sequence[str]) -> dict[str, Any]:

@@ -25,9 +25,7 @@ def run_loop(
     diagnosed: Mapping[str, Any],
     set_point: str | None,
     trend: Mapping[str, Any],
-    no_report: bool,
     run: Run,
-    typed: str,
 ) -> int:
     """Diagnose, write the results, and return the exit code."""
     if len(files) != 1:
@@ -43,18 +41,14 @@ def run_loop(
         result = diagnose_loop(record.input, value, wanted, record.dt, **diagnosed)
     say(printable(f"{files[0]}: {record!r}"))
     say(result.report())
-    calls = [("In a terminal", typed)]
+    calls = [("In a terminal", run.typed)]
     if set_point is None:
         lines, name = reading_in_python(files, Reading(reading, {}))
         lines.append(f"print(cr.valves.diagnose_loop({name}{python_keywords(diagnosed)}).report())")
         calls.append(("In Python", "\n".join(lines)))
-    shown: dict[str, Any] = {
-        "diagnosis": result,
-        "files": files,
-        "settings": diagnosed,
-        "calls": calls,
-    }
-    write = None if no_report else partial(write_loop_report, **shown)
+    write = partial(
+        write_loop_report, diagnosis=result, files=files, settings=diagnosed, calls=calls
+    )
     tables = {"methods.csv": (result.table(), True)}
     return write_results(folder, run, tables, write, "the table of methods")
 
