@@ -98,6 +98,14 @@ def named(table: Table, names: Iterable[str], taken: Iterable[int] = ()) -> list
     ]
 
 
+def ambiguous(table: Table, found: Sequence[int], what: str, argument: str) -> OptionError:
+    """Error for several columns of which one is needed."""
+    return OptionError(
+        f"{table.path} has {len(found)} columns that could be {what}; give {argument}=name or "
+        f"number; it has {table.listing()}"
+    )
+
+
 def holds_numbers(table: Table, index: int) -> bool:
     """Whether a column contains numbers, even if some cells are bad."""
     cells = table.columns[index].first(100)

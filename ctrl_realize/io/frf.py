@@ -15,7 +15,7 @@ from ..data import MeasuredFRF
 from ..errors import DataError, OptionError
 from ..numerics.arrays import ComplexArray, FloatArray
 from .checks import MAX_BYTES
-from .columns import check_lengths, find_column, has_header, named, plain_name
+from .columns import ambiguous, check_lengths, find_column, has_header, named, plain_name
 from .read import read_table
 from .tables import Table
 from .text_options import TextOptions
@@ -177,10 +177,7 @@ def _columns(table: Table, asked: dict[str, str | int | None]) -> dict[str, int]
     for part, names in _NAMES.items():
         found = named(table, names, columns.values()) if part not in given else []
         if len(found) > 1:
-            raise OptionError(
-                f"{table.path} has {len(found)} columns that could be {part}; give "
-                f"{part}=name or number; it has {table.listing()}"
-            )
+            raise ambiguous(table, found, part, part)
         if found:
             columns[part] = found[0]
     forms = [("response",), ("real", "imag"), ("magnitude", "phase")]

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import numpy as np
 from numpy.typing import ArrayLike
 
 from ..._checks import integer
 from ...data import ImpulseResponse
 from ...delayed import DelayedStateSpace, fit_of
-from ...errors import OrderError
 from ...numerics.arrays import read_only
 from ...numerics.blas_threads import single_threaded
 from .delay_scan_result import Candidates, DelayScan
@@ -110,13 +108,6 @@ def best_of(surface: Surface, order: int) -> DelayedStateSpace:
     iae, rounding = surface.row(order), surface.rounding
     delay = best_delay(iae, rounding)
     models = surface.models
-    rank = int(np.count_nonzero(models.singular_values[delay, :order]))
-    if rank < order:
-        raise OrderError(
-            f"order={order}, but at the best delay of {delay} samples the numerical rank of "
-            f"the data is {rank}; "
-            + (f"use an order of at most {rank}" if rank else "the data are zero: a pure gain")
-        )
     system = realize(
         surface.impulse,
         order,

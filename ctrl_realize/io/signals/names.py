@@ -13,6 +13,7 @@ from ..._facts import facts
 from ...errors import DataError, OptionError
 from ..columns import (
     Selector,
+    ambiguous,
     family,
     find_column,
     find_columns,
@@ -101,10 +102,7 @@ def _signals(table: Table, kind: str, taken: Sequence[int]) -> list[int]:
     families = {family(table.columns[k].name) for k in found}
     # channels have one name with numbers; two different names of a loop are two candidates
     if len(families) > 1 and families & (NAMES["input_tag"] | NAMES["output_tag"]):
-        raise OptionError(
-            f"{table.path} has {len(found)} columns that could be the {kind}; give {kind}=name or "
-            f"number; it has {table.listing()}"
-        )
+        raise ambiguous(table, found, f"the {kind}", kind)
     return found
 
 
@@ -136,10 +134,7 @@ def _guessed_clock(table: Table, taken: Sequence[int]) -> tuple[int | None, floa
     if len(clocks) == 1:
         return clocks[0], None
     if len(clocks) > 1:
-        raise OptionError(
-            f"{table.path} has {len(clocks)} columns that could be time; give time=name or "
-            f"number; it has {table.listing()}"
-        )
+        raise ambiguous(table, clocks, "time", "time")
     for key, value in table.constants.items():
         plain = key.rpartition(".")[2].replace("_", " ").lower()
         unit = sample_time_unit(key)
