@@ -78,7 +78,7 @@ ERRORS = {
         (lambda: realize(np.zeros(50)), "rank of the data after 0 samples is 0; .*pure gain"),
         (lambda: realize(np.eye(60)[5], 6), "rank of the data after 0 samples is 5"),
         (lambda: scan(600), "order=600"),
-        (lambda: scan(2), "rank of the data is 1"),
+        (lambda: scan(2), "rank of the data after 0 samples is 1"),
         (lambda: cr.scan_orders(PULSE, [1, 700], max_delay=50, dt=TS), "order=700"),
         (lambda: ProcessStructure("P4D"), "0 to 3 lags"),
         (lambda: ProcessStructure("P1DU"), "at least 2 with U"),
