@@ -1,13 +1,15 @@
-"""Numbers as text: times with a suitable unit, and with a sensible number of digits."""
+"""Numbers as text: times in a suitable unit, a sensible number of digits; and words of choices."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
+from functools import cache
 
 import numpy as np
 
+from ._facts import facts
 from .numerics.arrays import FloatArray
 
 UNITS = {"s": 1.0, "ms": 1e3, "µs": 1e6, "min": 1 / 60, "h": 1 / 3600, "day": 1 / 86400}
@@ -289,3 +291,28 @@ def named(kind: str, name: str) -> str:
     ("record 'valve_16mA'", 'the record')
     """
     return f"{kind} {name!r}" if name else f"the {kind}"
+
+
+@cache
+def _reasons() -> dict[str, dict[str, str]]:
+    return facts("choices.toml")
+
+
+def chosen(key: str, /, **values: object) -> str:
+    """Say what was chosen automatically, and why, in the words of the table.
+
+    Parameters
+    ----------
+    key : str
+        ``"topic.choice"``.
+    **values
+        What stands in braces in the words.
+
+    Examples
+    --------
+    >>> from ctrl_realize._wording import chosen
+    >>> chosen("structure.only", kind="order 1, relative degree 1")
+    'order 1, relative degree 1: the only structure that was tried'
+    """
+    topic, _, choice = key.partition(".")
+    return _reasons()[topic][choice].format(**values)

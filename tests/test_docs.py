@@ -222,6 +222,21 @@ def test_every_flag_is_raised_with_the_values_that_its_words_ask_for():
     assert raised == {(c, case) for c, row in table.items() for case in row if case != "marks"}
 
 
+def test_every_choice_is_told_with_the_values_that_its_words_ask_for():
+    keys = extension("flag_table").keys
+    words = tomllib.loads((Path(cr.__file__).parent / "choices.toml").read_text(encoding="utf-8"))
+    told = set()
+    for tree in parsed().values():
+        for call in ast.walk(tree):
+            if isinstance(call, ast.Call) and getattr(call.func, "id", "") == "chosen":
+                given = {value.arg for value in call.keywords}
+                for topic, _, choice in (key.partition(".") for key in keys(call)):
+                    parts = Formatter().parse(words[topic][choice])
+                    assert {name for _, name, _, _ in parts if name} <= given, (topic, choice)
+                    told.add((topic, choice))
+    assert told == {(topic, choice) for topic, row in words.items() for choice in row}
+
+
 def test_docstrings_of_everything_public_are_those_of_numpydoc(reference):
     validate = pytest.importorskip("numpydoc.validate", reason="numpydoc checks them").validate
     rules = extension("docstring_rules")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from itertools import compress
 from typing import Literal
@@ -10,7 +10,7 @@ from typing import Literal
 import control as ct
 import numpy as np
 
-from ..._wording import in_time
+from ..._wording import chosen, in_time
 from ...data import Record
 from ...data.given import as_records
 from ...data.shown_units import in_shown_units
@@ -36,6 +36,7 @@ from ..output_error.fit import fit_output_error
 from ..output_error.repeat_flags import BY_CHANCE
 from ..output_error.result import OutputErrorFit
 from ..output_error.summary import fitted_core, fitted_model
+from ..output_error.words import order_words
 from ..process_structures import Structures, plain_pairs
 from .flags import joint_flags
 from .result import JointFit
@@ -173,7 +174,7 @@ def fit_joint(
         record_fit=first,
         frf_fit=other,
         agreement=agreed,
-        choices=_choices(estimate, first, other, spread),
+        choices=tuple(_choices(estimate, first, other, spread)),
     )
     result = replace(result, flags=joint_flags(result, latest))
     return fitted_model(fitted_core(estimate, result.poles), result)
@@ -219,29 +220,18 @@ def _choices(
     first: OutputErrorFit,
     other: FRFFit,
     spread: Sequence[tuple[Effect, float]],
-) -> tuple[str, ...]:
-    s, count = estimate.structure, len(estimate.structures)
-    kind = f"order {s.order}, relative degree {s.relative_degree}"
-    reasons = [
-        f"{kind}: lowest information criterion of {count} structures on both together"
-        if count > 1
-        else f"{kind}: the only structure that was tried",
-        f"noise of the records: {first.residual:.3g}, {first.correlation:.3g} samples count as one",
-        "noise of the frequency response: its standard deviation"
-        if other.noise_known
-        else "noise of the frequency response: the scatter about its own fit",
-    ]
-    said = {
-        "gain": lambda std: f"gains ({100 * std:.2g} %)",
-        "dead_time": lambda std: f"dead times ({in_time(std)})",
-        "lags": lambda std: f"time constants ({100 * std:.2g} %)",
-    }
+) -> Iterator[str]:
+    kind, count = order_words(estimate.structure), len(estimate.structures)
+    yield chosen("structure.joint" if count > 1 else "structure.only", kind=kind, count=count)
+    yield chosen("joint.records", noise=first.residual, samples=first.correlation)
+    yield chosen("joint.stated" if other.noise_known else "joint.scatter")
     if spread:
-        reasons.append(
-            "differences between the records enter with the standard error of their mean: "
-            + ", ".join(said[key](std) for key, std in spread)
-        )
-    return tuple(reasons)
+        said = {
+            "gain": lambda std: f"gains ({100 * std:.2g} %)",
+            "dead_time": lambda std: f"dead times ({in_time(std)})",
+            "lags": lambda std: f"time constants ({100 * std:.2g} %)",
+        }
+        yield chosen("joint.spread", what=", ".join(said[key](std) for key, std in spread))
 
 
 def _points(fit: FRFFit, latest: float) -> tuple[FRFData, float]:

@@ -9,7 +9,7 @@ from itertools import compress
 import numpy as np
 
 from ..._flags import Flag, flagged
-from ..._wording import named
+from ..._wording import chosen, named
 from ...data import Record
 from ...errors import DataError
 from ...numerics.arrays import FloatArray
@@ -152,17 +152,15 @@ def _summary(
     joined = bare_data(output, signal, data.dt, noise, span, data.every)
     fit = replace(fit, fitted=np.concatenate(found.fitted))
     sums = found.condensed
-    reasons: tuple[str, ...] = ()
+    reasons = []
     if data.every > 1:
-        reasons = (
-            f"the plant is slow: {'means of' if data.width > 1 else 'one of'} {data.every} samples "
-            "each were fitted, and are what time, measured and fitted show",
-        )
+        what = "means of" if data.width > 1 else "one of"
+        reasons.append(chosen("samples.blocks", what=what, every=data.every))
     if sums is not None:
-        reasons = (
-            f"all {sums.samples} samples, condensed to {sums.data.size} sums of products over "
-            f"{sums.drive.factor.shape[1]} lags (prewhitened with a noise model of "
-            f"{sums.noise_lags} lags); time, measured and fitted show a part of them",
+        count, order = sums.samples, sums.noise_lags
+        size, lags = sums.drive.factor.shape
+        reasons.append(
+            chosen("samples.condensed", samples=count, sums=size, lags=lags, noise_lags=order)
         )
     choices = (*reasons, *choices_of(fit))
     return OutputErrorFit(fit, joined, time, records, repeats, choices=choices, flags=tuple(flags))

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..._flags import Flag, flagged
-from ..._wording import in_time
+from ..._wording import chosen, in_time
 from ...data import Record
 from ...numerics.arrays import FloatArray, IntArray
 from ...numerics.constants import Z_95
@@ -66,8 +66,9 @@ def checked(fit: OutputErrorFit, *, alone: bool = True) -> OutputErrorFit:
     stepped = bool(np.isfinite(fit.onset))
     # Regressions on past samples need all of them.
     complete = tuple(record for record in fit.records if not record.n_missing)
-    loop = () if stepped or not complete else feedback_flags(complete, fit.delay_interval[1])
-    flags += loop
+    if complete and not stepped:
+        flags += feedback_flags(complete, fit.delay_interval[1])
+    in_loop = bool(flags)
     if complete and not fit.at_noise_level:  # else an unstable plant is excluded
         flags += unstable_flags(complete, fit.delay_interval[1])
     if len(fit.records) == 1:
@@ -90,7 +91,7 @@ def checked(fit: OutputErrorFit, *, alone: bool = True) -> OutputErrorFit:
             low = max(min(low, step.dead_time - Z_95 * step.dead_time_error), 0.0)
             high = max(high, step.dead_time + Z_95 * step.dead_time_error)
         # Parts of one step are not several responses.
-        if not loop and not (stepped and _moves(shown.drive) < 2):
+        if not in_loop and not (stepped and _moves(shown.drive) < 2):
             changes, notes = against_one_model(shown, fit.delay)
             flags += changes
             if complete and not stepped and all(flag.code != "not_linear" for flag in flags):
@@ -212,11 +213,7 @@ def _small_changes(change: ParameterChange | None) -> list[str]:
     if change is None or change.chance >= RARE:
         return []
     gain, shift = 50 * np.ptp(change.gains), np.ptp(change.shifts) / 2
-    return [
-        "small but significant differences between the thirds of the record (gain "
-        f"+-{gain:.1g} %, delay +-{shift:.1g} samples, p = {change.chance:.1g}): harmless for "
-        "tuning; often the input moved between two samples"
-    ]
+    return [chosen("records.thirds", gain=gain, shift=shift, chance=change.chance)]
 
 
 def _earlier_input(fit: OutputErrorFit, codes: set[str]) -> Iterator[Flag]:

@@ -29,26 +29,28 @@ _LEAST_PAST, _MOST_PAST = 30, 150  # past inputs in them; time grows with the sq
 _OFF = 0.2  # relative difference of gains or total delays that is worth a flag: presentation
 
 
-def feedback_flags(records: tuple[Record, ...], delay: float) -> tuple[Flag, ...]:
+def feedback_flags(records: tuple[Record, ...], delay: float) -> Iterator[Flag]:
     """Test whether the input depends on the output; `delay` in samples is an upper bound."""
     chances = [
         feedback_chance(y[0], u[0], past_inputs(y[0].size, delay)) for y, u in _stretches(records)
     ]
-    if min(chances) >= RARE / len(chances):
-        return ()
-    return (flagged("feedback", chance=min(chances)),)
+    if _rare(chances):
+        yield flagged("feedback", chance=min(chances))
 
 
-def unstable_flags(records: tuple[Record, ...], delay: float) -> tuple[Flag, ...]:
+def unstable_flags(records: tuple[Record, ...], delay: float) -> Iterator[Flag]:
     """Test whether a plant of any channels is unstable; `delay` in samples is an upper bound."""
     chances = [
         unstable_chance(own, u, past_inputs(own.size // len(u), delay))
         for y, u in _stretches(records)
         for own in y
     ]
-    if min(chances) >= RARE / len(chances):
-        return ()
-    return (flagged("unstable", chance=min(chances)),)
+    if _rare(chances):
+        yield flagged("unstable", chance=min(chances))
+
+
+def _rare(chances: list[float]) -> bool:
+    return min(chances) < RARE / len(chances)
 
 
 def _stretches(records: tuple[Record, ...]) -> list[tuple[FloatArray, FloatArray]]:
@@ -73,9 +75,8 @@ def generalised_step(
     """One step of generalised least squares, from a fit with coloured residual."""
     if not np.all(fit.poles) or not fit.gain:
         return None
-    lead = fit.gain * float(np.real(np.prod(-fit.poles) / np.prod(-fit.zeros)))
-    numerator = lead * np.atleast_1d(np.real(np.poly(fit.zeros)))[::-1]
-    return _step(fit, UnweightedModel(fit.dead_time, fit.poles, numerator), output, drive)
+    model = UnweightedModel(fit.dead_time, fit.poles, fit.estimate.numerator)
+    return _step(fit, model, output, drive)
 
 
 def _step(

@@ -24,6 +24,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..._flags import flagged
+from ..._wording import chosen
 from ...data import Record
 from ...numerics.arrays import FloatArray
 from ...numerics.constants import Z_95
@@ -32,9 +33,7 @@ from .averaging import middle_gain
 from .record_gains import (
     ONE_POINT,
     RecordGains,
-    levels_of_input,
-    levels_of_output,
-    middle_of_input,
+    operating_point,
 )
 from .repeatability import RESPONDS, Repeatability
 from .result import OutputErrorFit
@@ -98,7 +97,7 @@ def fit_own_gains(
                 schedule=gains.in_words(),
             )
         )
-    reason = f"gain of the model: the median of {int(used.sum())} records, each with its own"
+    reason = chosen("records.own_gains", count=int(used.sum()))
     return replace(
         result,
         gains=gains,
@@ -139,8 +138,7 @@ def _gains(
     size = np.abs(gains)
     low, high = result.estimate.gain_ends
     test = homogeneity((gains / common)[used], (own * size / abs(common))[used])
-    inputs = np.array([levels_of_input(record) for record in records])
-    points = np.array([middle_of_input(record) for record in records])
+    points, inputs, outputs = map(np.array, zip(*map(operating_point, records), strict=True))
     alike = np.ptp(points) <= ONE_POINT * np.ptp(inputs)
     if alike:
         points = np.abs(np.diff(inputs)[:, 0])
@@ -149,7 +147,7 @@ def _gains(
         scheduled_over="step height" if alike else "input level",
         operating_points=points,
         input_levels=inputs,
-        output_levels=np.array([levels_of_output(record) for record in records]),
+        output_levels=outputs,
         gains=gains,
         errors=size * np.hypot(result.gain_std_given_structure / common, beyond),
         low=gains - size * np.hypot((common - low) / common, Z_95 * beyond),

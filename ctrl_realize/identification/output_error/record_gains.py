@@ -10,11 +10,10 @@ from numpy.typing import NDArray
 
 from ..._checks import real
 from ..._wording import in_numbers
-from ...data import Record, StepEdge
-from ...errors import NoStepError
+from ...data import Record
 from ...numerics.arrays import FloatArray, locked
 from ...results import Result
-from ..step.steps import detect_step
+from ..step.steps import found_edges
 from .repeat_flags import BY_CHANCE, SAME
 from .words import gain_in_words
 
@@ -153,8 +152,8 @@ class RecordGains(Result):
             that of the model.
         """
         if isinstance(point, Record):
-            height = self.scheduled_over == "step height"
-            point = abs(np.ptp(levels_of_input(point))) if height else middle_of_input(point)
+            middle, levels, _ = operating_point(point)
+            point = float(np.ptp(levels)) if self.scheduled_over == "step height" else middle
         return float(np.interp(real(point, "point", self.scheduled_over), *self.breakpoints))
 
     def ratio(self, point: float | Record) -> float:
@@ -232,34 +231,18 @@ class RecordGains(Result):
         return f"gain {in_numbers(gains)} at {self.scheduled_over} {in_numbers(points)}"
 
 
-def middle_of_input(record: Record) -> float:
-    """Middle between the input levels of a step record, mean of any other input."""
-    edge = _only_edge(record)
-    return float(np.mean(record.input)) if edge is None else edge.baseline + edge.amplitude / 2
+def operating_point(record: Record) -> tuple[float, tuple[float, float], tuple[float, float]]:
+    """Middle between the input levels of a step record, these levels, and those of the output.
 
-
-def levels_of_input(record: Record) -> tuple[float, float]:
-    """Input before and after the step; smallest and largest value of any other input."""
-    edge = _only_edge(record)
-    if edge is None:
-        return float(np.min(record.input)), float(np.max(record.input))
-    return edge.baseline, edge.baseline + edge.amplitude
-
-
-def levels_of_output(record: Record) -> tuple[float, float]:
-    """Output before the step and at its end; smallest and largest value for any other input."""
-    y, edge = np.ravel(record.output), _only_edge(record)
-    if edge is None:
-        return float(y.min()), float(y.max())
+    For any other input its mean, and the smallest and largest values of input and output.
+    """
+    u, y = np.ravel(record.input), np.ravel(record.output)
+    edges = found_edges(record, most=1)
+    if not edges:
+        return float(np.mean(u)), (float(u.min()), float(u.max())), (float(y.min()), float(y.max()))
+    edge = edges[0]
+    inputs = edge.baseline, edge.baseline + edge.amplitude
     rest = y[edge.start : edge.index] if edge.index > edge.start else y[:1]
     last = max((edge.stop - edge.index) // _LAST, 1)
-    return float(np.mean(rest)), float(np.mean(y[edge.stop - last : edge.stop]))
-
-
-def _only_edge(record: Record) -> StepEdge | None:
-    """Edge of a record with one step; None for any other input."""
-    try:
-        edge = detect_step(record)
-    except NoStepError:
-        return None
-    return edge if len(edge.edges) == 1 else None
+    outputs = float(np.mean(rest)), float(np.mean(y[edge.stop - last : edge.stop]))
+    return edge.baseline + edge.amplitude / 2, inputs, outputs

@@ -28,7 +28,14 @@ from .actuated.result import ActuatorFit
 from .record_gains import RecordGains
 from .repeat_flags import BY_CHANCE
 from .repeatability import Repeatability
-from .words import ESTIMATE_WORDS, gain_in_words, gain_scatter, structure_words, total_in_words
+from .words import (
+    ESTIMATE_WORDS,
+    gain_in_words,
+    gain_scatter,
+    order_words,
+    structure_words,
+    total_in_words,
+)
 
 FOLLOWED_LESS = 0.5
 """Per cent of a response by which two fits differ, from which on the difference is stated."""
@@ -340,8 +347,7 @@ class OutputErrorFit(FractionalDelayFit):
         level = "noise" if self.at_noise_level else f"{plainly(self.normalized_rms, 2)} x noise"
         return (
             f"<{type(self).__name__} {self.dead_time:.4g} s in {low:.4g}...{high:.4g} s, "
-            f"order {self.order}, "
-            f"relative degree {self.relative_degree}, residual {level}>"
+            f"{order_words(self.estimate.structure)}, residual {level}>"
         )
 
     def _other_orders(self) -> list[tuple[str, str]]:

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import control as ct
 import numpy as np
 
-from ..._wording import interval_in_time
+from ..._wording import chosen, interval_in_time
 from ...delayed import DelayedStateSpace, delayed_ss
 from ...numerics.arrays import ComplexArray
 from ...numerics.output_error.result import OutputErrorEstimate
@@ -50,83 +50,46 @@ def choices_of(fit: OutputErrorEstimate) -> Iterator[str]:
     kind = model_words(chain) if chain else order_words(fit.structure)
     count = len(fit.structures)
     if fit.process.form is not None:
-        yield f"{form_words(fit.process.form)}: as requested"
+        yield chosen("structure.requested", form=form_words(fit.process.form))
     elif fit.distributed.follows_flow:
-        yield (
-            "dead time: that of an axial-dispersion model, which fits clearly better than all "
-            f"{count} structures; {kind}: approximates it with the fewest parameters"
-        )
+        yield chosen("structure.flow", kind=kind, count=count)
     elif count == 1:
-        yield f"{kind}: the only structure that was tried"
+        yield chosen("structure.only", kind=kind)
     else:
         simple = " with up to three poles" if fit.robust and fit.structure.order <= 3 else ""
-        yield (
-            f"{kind}: lowest information criterion of {count} structures{simple}, with a penalty "
-            "on zeros and on a fourth pole"
+        yield chosen("structure.lowest", kind=kind, count=count, simple=simple)
+    complete, _, other, closest = fit.followed
+    if other != fit.structure and closest - complete >= FOLLOWED_LESS:
+        yield chosen(
+            "structure.closest_in_noise" if fit.adequate else "structure.closest",
+            other=order_words(other),
+            closest=closest,
+            complete=complete,
         )
-    yield from _closest(fit)
     residual = fit.residual
     if residual.rounded is not None and not fit.delay_estimates:
-        yield (
-            "dead time and model: maximum likelihood of the rounded samples, with noise of "
-            f"{residual.rounded:.3g} before rounding"
-        )
+        yield chosen("dead_time.rounded", noise=residual.rounded)
     if fit.delay_estimates:
-        why = (
-            "no model fits down to the noise level"
-            if fit.robust
-            else "the likelihood is flat down to the earliest dead time and has its maximum there, "
-            "and most of the estimates agree on a later one"
-        )
-        yield f"dead time: median of five delay estimates, since {why}"
+        yield chosen("dead_time.robust" if fit.robust else "dead_time.flat")
     if not fit.robust:
         yield _interval_of(fit)
     if fit.load is not None and not fit.load.early:
-        yield "a step of a load is part of the model: the output tells it beyond doubt"
+        yield chosen("load.step")
     if fit.open_start:
-        yield (
-            "interval widened towards the visible onset: with a zero in the model, the onset of "
-            "the response is not identifiable"
-        )
+        yield chosen("interval.open_start")
     if residual.whitened:
-        yield (
-            "the noise before the step is coloured: generalised least squares with an "
-            f"autoregressive noise model, instead of counting {residual.correlation:.3g} samples "
-            "as one"
-        )
+        yield chosen("noise.whitened", samples=residual.correlation)
     elif residual.noise_lags:
-        yield (
-            "the residual is coloured: generalised least squares with an autoregressive noise "
-            f"model of order {residual.noise_lags}"
-        )
+        yield chosen("noise.autoregressive", order=residual.noise_lags)
     elif residual.correlation > 1:
-        yield (
-            f"the residual is correlated: {residual.correlation:.3g} samples count as one "
-            "independent sample"
-        )
-
-
-def _closest(fit: OutputErrorEstimate) -> Iterator[str]:
-    """Name a structure that follows the record more closely, and is not the model."""
-    followed = fit.followed
-    other = followed.closest
-    if other != fit.structure and followed.by_closest - followed.complete >= FOLLOWED_LESS:
-        why = (
-            "not more than additional parameters follow noise (information criterion)"
-            if fit.adequate
-            else "no structure reaches the noise, and simpler ones are more reliable then"
-        )
-        yield (
-            f"{order_words(other)} follows the record more closely (fit "
-            f"{followed.by_closest:.1f} % instead of {followed.complete:.1f} %), but {why}"
-        )
+        yield chosen("noise.correlated", samples=residual.correlation)
 
 
 def _interval_of(fit: OutputErrorEstimate) -> str:
     """Describe the interval: structures, and other models that extend it."""
     ends = [line.interval for line in fit.structures if line.interval is not None]
     if fit.process.form is not None:
-        return "interval: profile likelihood of the process models that the data cannot rule out"
+        return chosen("interval.forms")
     parts = [f"{len(ends)} structure(s)"] if ends else []
     low = min((end[0] for end in ends), default=np.inf)
     high = max((end[1] for end in ends), default=-np.inf)
@@ -135,4 +98,4 @@ def _interval_of(fit: OutputErrorEstimate) -> str:
         for model, first, last in fit.distributed.not_ruled_out
         if first < low or last > high
     ]
-    return f"interval: profile likelihood of {', '.join(parts)} that the data cannot rule out"
+    return chosen("interval.structures", models=", ".join(parts))

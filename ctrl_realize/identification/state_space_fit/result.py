@@ -181,7 +181,7 @@ def fitted_system(
     loop: tuple[Flag, ...] = ()
     neighbours = max((float(c.autocorrelation[:, 1].max()) for c in checks), default=0.0)
     if neighbours > COLOURED:
-        loop = unstable_flags(tuple(complete), max(best.inputs) + max(best.outputs))
+        loop = tuple(unstable_flags(tuple(complete), max(best.inputs) + max(best.outputs)))
         longest = max(r.n_samples for r in group)
         slow = longest * (1 - float(np.abs(core.poles()).max(initial=0.0))) < INTEGRATES
         advice = "compare with a lower order on other data"

@@ -117,6 +117,15 @@ def found_step(
     return replace(main, edges=edges)
 
 
+def found_edges(record: Record, most: int) -> tuple[StepEdge, ...]:
+    """Edges of an input that has at least one, and at most `most`; none for any other input."""
+    try:
+        edges = found_step(record, most=most).edges
+    except NoStepError:
+        return ()
+    return edges if len(edges) <= most else ()
+
+
 def unit_step(
     record: Record, edge: StepEdge | None = None, *, remove_drift: bool | None = None
 ) -> StepResponse:

@@ -46,8 +46,11 @@ class HeldInput(Protocol):
     """An input that is constant between its changes."""
 
     def pieces(self) -> Sequence[HeldInput]:
-        """Inputs whose concatenated responses are the response to this one."""
-        ...
+        """Inputs whose concatenated responses are the response to this one.
+
+        The complete input, as for a recursion, which needs all of it.
+        """
+        return [self]
 
     def modes(self, tau: FloatArray, poles: ComplexArray) -> Modes:
         """Evaluate H, E and T for dead times (B,) and poles (B, J)."""
@@ -268,15 +271,11 @@ def _geometric_mean(x: Any, count: IntArray) -> tuple[Any, Any]:
 
 
 @dataclass(frozen=True, eq=False)
-class SampledInput:
+class SampledInput(HeldInput):
     """A sampled, held input (N,) without its baseline; the response is needed at each sample."""
 
     signal: FloatArray
     dt: float
-
-    def pieces(self) -> list[SampledInput]:
-        """The complete input: a recursion needs all of it."""
-        return [self]
 
     def modes(self, tau: FloatArray, poles: ComplexArray) -> Modes:
         """Evaluate H, E and T at every sample; see `HeldInput`."""
@@ -312,7 +311,7 @@ class SampledInput:
 
 
 @dataclass(frozen=True, eq=False)
-class SeveralInputs:
+class SeveralInputs(HeldInput):
     """Inputs of several parts of the data, one below the other.
 
     Attributes
@@ -324,10 +323,6 @@ class SeveralInputs:
 
     parts: tuple[HeldInput, ...]
     rows: tuple[IntArray | slice, ...] | None = None
-
-    def pieces(self) -> list[SeveralInputs]:
-        """The complete input: a recursion needs all of it."""
-        return [self]
 
     def modes(self, tau: FloatArray, poles: ComplexArray) -> Modes:
         """Evaluate H, E and T at every row wanted; see `HeldInput`."""

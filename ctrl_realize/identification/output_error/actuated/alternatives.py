@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Literal, NamedTuple
+from functools import cache
+from typing import Literal
 
 import numpy as np
 
+from ...._facts import facts
 from ...._parameters import Parameter
-from ...._wording import plainly
+from ...._wording import chosen, plainly
 from ....actuators import (
     Actuator,
     Backlash,
@@ -27,99 +29,58 @@ Asked = Literal[
 Told = Callable[[Sequence[ActuatedRecord]], bool]
 
 
-class Alternative(NamedTuple):
-    """What can be asked for: kinds, what a command must be to tell each, and a test that does."""
-
-    words: str
-    kinds: dict[Kind, Told]
-    expected: str
-    test: str
-
-    def wanted(self, parts: Sequence[ActuatedRecord]) -> list[tuple[Kind, Place]]:
-        """Kinds that the commands can identify, with the places that are tried."""
-        told = [kind for kind, identifiable in self.kinds.items() if identifiable(parts)]
-        return [(kind, place) for kind in told for place in KINDS[kind].places]
-
-
-_TURNS = "a command that moves on in one direction and turns"
-_LEVELS = "a command at three levels or more"
-
-ALTERNATIVES: dict[str, Alternative] = {
-    "slew_rate": Alternative(
-        "a slew-rate limit",
-        {"slew_rate": commands.moves, "slew_rates": commands.opens_and_closes},
-        "a command that moves",
-        "a larger step",
-    ),
-    "dead_band": Alternative(
-        "a dead band",
-        {"dead_band": commands.reverses},
-        _TURNS,
-        "a staircase up and down",
-    ),
-    "stiction": Alternative(
-        "stiction",
-        {"resolution": commands.reverses, "stiction": commands.reverses},
-        _TURNS,
-        "a staircase up and down, in small steps,",
-    ),
-    "resolution": Alternative(
-        "a resolution",
-        {"resolution": commands.moves_on},
-        "a command with four moves or more",
-        "a staircase of small steps",
-    ),
-    "saturation": Alternative(
-        "an end of the travel",
-        {"saturation": commands.has_levels},
-        _LEVELS,
-        "a staircase through the travel, to its ends,",
-    ),
-    "characteristic": Alternative(
-        "a characteristic",
-        {"characteristic": commands.compares_levels},
-        _LEVELS,
-        "a staircase through the travel, or records at several positions that share some,",
-    ),
+ALTERNATIVES: dict[str, dict[Kind, Told]] = {
+    "slew_rate": {"slew_rate": commands.moves, "slew_rates": commands.opens_and_closes},
+    "dead_band": {"dead_band": commands.reverses},
+    "stiction": {"resolution": commands.reverses, "stiction": commands.reverses},
+    "resolution": {"resolution": commands.moves_on},
+    "saturation": {"saturation": commands.has_levels},
+    "characteristic": {"characteristic": commands.compares_levels},
 }
+"""Kinds that are tried for what is asked for, and whether commands can tell each."""
 ASKED: tuple[str, ...] = ("auto", *ALTERNATIVES)
 
 
-def alternative_of(kind: Kind) -> Alternative:
-    """Last entry that has a kind."""
-    return [one for one in ALTERNATIVES.values() if kind in one.kinds][-1]
+@cache
+def _words() -> dict[str, dict[str, str]]:
+    return facts("identification/output_error/actuated/alternatives.toml")
+
+
+def wanted(name: str, parts: Sequence[ActuatedRecord]) -> list[tuple[Kind, Place]]:
+    """Kinds that the commands can identify, with the places that are tried."""
+    told = [kind for kind, identifiable in ALTERNATIVES[name].items() if identifiable(parts)]
+    return [(kind, place) for kind in told for place in KINDS[kind].places]
 
 
 def missing_tests(names: Sequence[str]) -> str:
     """Say which tests would identify what the command cannot."""
-    every = [ALTERNATIVES[name] for name in names]
-    tests = "; ".join(f"{one.words} ({one.test.rstrip(',')})" for one in every)
-    return f"not tried, since the command cannot identify them (with a test that can): {tests}"
+    every = [_words()[name] for name in names]
+    tests = "; ".join(f"{one['words']} ({one['test'].rstrip(',')})" for one in every)
+    return chosen("actuator.skipped", tests=tests)
 
 
 def cannot_tell(name: str) -> str:
     """Say why an actuator that was requested is not fitted."""
-    one = ALTERNATIVES[name]
+    words, expected, test = _words()[name].values()
     return (
-        f"actuator={name!r}: expected {one.expected}, got records that cannot distinguish "
-        f"{one.words} from gain and dead time; try {one.test} or actuator='auto'"
+        f"actuator={name!r}: expected {expected}, got records that cannot distinguish {words} "
+        f"from gain and dead time; try {test} or actuator='auto'"
     )
 
 
 def not_needed(names: Sequence[str], evidence: float) -> str:
     """Say that a linear model is enough."""
-    tried = " or ".join(ALTERNATIVES[name].words for name in names)
-    return (
-        f"linear: the evidence for {tried} is not very strong (information criterion "
-        f"{plainly(abs(evidence), 3)} {'lower' if evidence > 0 else 'higher'} with it)"
-    )
+    tried = " or ".join(_words()[name]["words"] for name in names)
+    side, size = "lower" if evidence > 0 else "higher", plainly(abs(evidence), 3)
+    return chosen("actuator.linear", tried=tried, evidence=size, side=side)
 
 
-def unresolved(parameter: Parameter, test: str) -> str:
+def unresolved(parameter: Parameter, kind: Kind) -> str:
     """Say that the records determine a parameter badly, and which test would help."""
+    name = [name for name, kinds in ALTERNATIVES.items() if kind in kinds][-1]
     return (
         f"{parameter.label} lies between {parameter.low:.3g} and {parameter.high:.3g}, and the "
-        f"records do not determine it more closely; {test} would"
+        f"records do not determine it more closely; {_words()[name]['test']} would"
     )
 
 

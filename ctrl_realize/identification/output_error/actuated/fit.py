@@ -10,8 +10,7 @@ import numpy as np
 from ...._flags import flagged, marked
 from ...._parameters import Parameter
 from ...._wording import plainly
-from ....data import Record
-from ....errors import DataError, NoStepError
+from ....errors import DataError
 from ....numerics.actuated.choice import ActuatedFit, fit_actuated
 from ....numerics.actuated.intervals import propagated
 from ....numerics.actuated.motions import at_parts
@@ -32,17 +31,17 @@ from ....numerics.output_error.step_data import bare_data, own_regressors
 from ....numerics.output_error.step_fit import ADEQUATE
 from ....numerics.signals.correlation import fit_percent
 from ....numerics.signals.noise import mad_sigma
-from ...step.steps import found_step
+from ...step.steps import found_edges
 from ..flags import model_flags
 from ..result import OutputErrorFit
 from .alternatives import (
     ALTERNATIVES,
-    alternative_of,
     cannot_tell,
     missing_tests,
     model_of,
     not_needed,
     unresolved,
+    wanted,
 )
 from .result import ActuatorFit
 
@@ -69,16 +68,16 @@ def with_actuator(
         free = replace(result, data=replace(result.data, load=None))
     parts = _parts(free)
     names = tuple(ALTERNATIVES) if asked == "auto" else (asked,)
-    tried = {name: ALTERNATIVES[name].wanted(parts) for name in names}
+    tried = {name: wanted(name, parts) for name in names}
     identifiable = [name for name in names if tried[name]]
     if asked != "auto" and not identifiable:
         raise DataError(cannot_tell(asked))
     not_identifiable = [name for name in names if name not in identifiable]
     skipped = (missing_tests(not_identifiable),) if not_identifiable else ()
     # A kind may belong to two of those that were asked for.
-    wanted = list(dict.fromkeys(one for name in identifiable for one in tried[name]))
+    kinds = list(dict.fromkeys(one for name in identifiable for one in tried[name]))
     scales = _scales(result)
-    found = fit_actuated(parts, scales, wanted, structures)
+    found = fit_actuated(parts, scales, kinds, structures)
     if found is None:
         return replace(result, choices=result.choices + skipped)
     if not found.chosen:
@@ -103,7 +102,7 @@ def _parts(result: OutputErrorFit) -> list[ActuatedRecord]:
     found = []
     for record in result.records:
         output, command = np.ravel(record.output), np.ravel(record.input)
-        edges = _edges(record)
+        edges = [(edge.index, edge.samples) for edge in found_edges(record, _MOST_EDGES)]
         terms = None if edges else _free_motion(result, output.size)
         found.append(actuated_record(output, command, record.dt, edges=edges, regressors=terms))
     return found
@@ -138,14 +137,6 @@ def _free_motion(result: OutputErrorFit, size: int) -> FloatArray:
     fixed = np.stack([np.ones(size), np.linspace(0, 1, size)], axis=1)
     stretch = Segments(np.array([0, size]), clock, fixed)
     return np.asarray(local_columns(stretch, result.estimate.poles[None])[0])
-
-
-def _edges(record: Record) -> list[tuple[int, int]]:
-    try:
-        edges = found_step(record, most=_MOST_EDGES).edges
-    except NoStepError:
-        return []
-    return [(edge.index, edge.samples) for edge in edges] if len(edges) <= _MOST_EDGES else []
 
 
 def _scales(result: OutputErrorFit) -> Scales:
@@ -260,7 +251,7 @@ def _actuator_fit(result: OutputErrorFit, found: ActuatedFit) -> ActuatorFit:
         # Parts of the range are measured by it, anything else by itself.
         size = (ends.low + ends.high) / 2 if family.properties.logged else 1 / 2
         if not ends.high - ends.low <= 2 * _WELL * size:
-            vague.append(unresolved(parameters[-1], alternative_of(family.kind).test))
+            vague.append(unresolved(parameters[-1], family.kind))
     return ActuatorFit(
         model=model_of(motion, float(member.starts[0]) if member.starts.size else 0.0),
         actuator_at=family.place,

@@ -27,14 +27,14 @@ from scipy.interpolate import BarycentricInterpolator
 from scipy.signal import lfilter
 
 from ...arrays import ComplexArray, FloatArray
-from ...engine.responses import TOGETHER, Modes
+from ...engine.responses import TOGETHER, HeldInput, Modes
 
 _NODES = 16
 _MOST_KEPT = 2**23  # numbers of all sums that are kept, to limit the memory
 
 
 @dataclass(frozen=True, eq=False)
-class AveragedInput:
+class AveragedInput(HeldInput):
     """A sampled, held input (N,) without its baseline; the response is needed as means.
 
     Attributes
@@ -52,10 +52,6 @@ class AveragedInput:
     dt: float
     every: int
     width: int
-
-    def pieces(self) -> list[AveragedInput]:
-        """The complete input: a recursion needs all of it."""
-        return [self]
 
     def modes(self, tau: FloatArray, poles: ComplexArray) -> Modes:
         """Evaluate H, E and T for every block; see `HeldInput`."""

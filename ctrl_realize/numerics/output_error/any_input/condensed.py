@@ -37,7 +37,7 @@ from scipy.signal import fftconvolve, lfilter
 
 from ...arrays import ComplexArray, FloatArray
 from ...constants import HUBER
-from ...engine.responses import Modes, SampledInput
+from ...engine.responses import HeldInput, Modes, SampledInput
 from ...regression.normal_equations import NormalEquations, normal_equations
 from ...signals.excitation import lively_start
 from ...signals.noise import mad_sigma
@@ -55,15 +55,11 @@ _TURNS = 5  # of Huber's steps at most, the first from least squares
 
 
 @dataclass(frozen=True, eq=False)
-class CondensedInput:
+class CondensedInput(HeldInput):
     """Factor (m, L) of the sums of products of an input at L lags."""
 
     factor: FloatArray
     dt: float
-
-    def pieces(self) -> list[CondensedInput]:
-        """All of it."""
-        return [self]
 
     def modes(self, tau: FloatArray, poles: ComplexArray) -> Modes:
         """Evaluate H, E and T for a unit pulse, times the factor; see `HeldInput`."""

@@ -228,8 +228,6 @@ def cut(
 
 def _means(values: FloatArray, every: int, width: int) -> FloatArray:
     """Mean of the first `width` of `every` samples."""
-    if every == 1:
-        return values
     count = values.size // every
     blocks = values[: count * every].reshape(count, every)
     return np.asarray(blocks[:, :width].mean(axis=1))
@@ -237,8 +235,6 @@ def _means(values: FloatArray, every: int, width: int) -> FloatArray:
 
 def _filtered(noise: FloatArray, values: FloatArray, every: int) -> FloatArray:
     """Filter with a polynomial in the delay by `every` samples."""
-    if every == 1:
-        return np.asarray(lfilter(noise, [1.0], values))
     whole: FloatArray = noise[0] * values
     for lag, weight in enumerate(noise[1:], start=1):
         whole[lag * every :] += weight * values[: -lag * every]

@@ -127,13 +127,12 @@ def fit_sampled(
     slow parameters.
     """
     structures, tried = requested.structures, requested
-    every, done = samples_in_a_block(outputs, inputs, dt, requested)
-    if done is None or structures is not None:
+    every, part = samples_in_a_block(outputs, inputs, dt, requested)
+    if part is None or structures is not None:
         if structures is not None:
             tried = replace(requested, whiten=False)
         data = cut(outputs, inputs, dt, every, requested.known)
-        done = fit_stretch(data, structures or ORDERS, tried)
-    part, unweighted = done
+        part = fit_stretch(data, structures or ORDERS, tried)
     data, stretch = part.data, part.fit
     fits, sums = stretch, None
     long = any(y.size > every * kept.size for y, kept in zip(outputs, data.outputs, strict=True))
@@ -170,7 +169,7 @@ def fit_sampled(
     if sums is not None:
         fit = _of_measured(part, fit, 0)
     elif part.noise.size > 1:
-        fit = replace(_of_measured(part, fit, part.noise.size - 1), unweighted=unweighted)
+        fit = replace(_of_measured(part, fit, part.noise.size - 1), unweighted=part.unweighted)
     elif fit.distributed.chain:
         left = correlation_time(fits.window.output - fit.fitted)
         fit = replace(fit, residual=fit.residual._replace(correlation=left), adequate=left <= WHITE)

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import TypeAlias
 
 import numpy as np
 
@@ -17,7 +16,6 @@ from ...engine.problem import Structure
 from ...engine.structures import Candidate
 from ...engine.window_fit import WindowFit
 from ..other_structures import Requested
-from ..result import UnweightedModel
 from .condensed import MOST_LAGS
 from .data import BEYOND, SampledData, cut
 from .window import ORDERS, SampledWindow, fit_windows, in_coloured_noise
@@ -39,19 +37,16 @@ _MOST_AVERAGED = 4e6  # samples of which means are formed if fewer show the plan
 _WORTHWHILE = 1.2  # length of a record over that of a part of it that is taken for all
 _NEARLY = 0.8  # of a record, from which on all of it is taken
 
-Stretch: TypeAlias = tuple[SampledWindow, UnweightedModel | None]
-"""Fit of a part of the records, and the model before the filter if its noise is coloured."""
-
 
 def fit_stretch(
     data: SampledData, structures: Sequence[Structure], requested: Requested
-) -> Stretch:
+) -> SampledWindow:
     """Fit structures to a part of the records, by default dead times up to a quarter of it."""
     limit = data.quarter if requested.latest is None else requested.latest
     part = fit_windows(data, structures, limit, requested.huber, np.ones(1))
     if not (part.fit.correlation > WHITE and requested.whiten and data.complete):
-        return part, None
-    return in_coloured_noise(part), part.model
+        return part
+    return replace(in_coloured_noise(part), unweighted=part.model)
 
 
 def samples_in_a_block(
@@ -59,7 +54,7 @@ def samples_in_a_block(
     inputs: Sequence[FloatArray],
     dt: float,
     requested: Requested,
-) -> tuple[int, Stretch | None]:
+) -> tuple[int, SampledWindow | None]:
     """Samples of which the mean is fitted, so that a slow plant is seen for long enough.
 
     That is, `_SEEN` of its slowest time constants if the record is as long, and more while blocks
@@ -75,12 +70,12 @@ def samples_in_a_block(
         rows = max(y.size for y in data.outputs)
         if longest < _WORTHWHILE * every * rows:
             return every, None
-        fit = fit_stretch(data, _SIMPLE, plain)[0].fit
+        fit = fit_stretch(data, _SIMPLE, plain).fit
         if every == 1 and _seen_to_end(fit, dt):
             return 1, None
         if every == 1 and fit.correlation > WHITE and requested.whiten and data.complete:
             done = fit_stretch(data, ORDERS, requested)
-            fit = done[0].fit
+            fit = done.fit
             if _seen_to_end(fit, dt):
                 return 1, done
         wanted = min(longest / rows, max(min(sizes) / _FEWEST, 1.0))

@@ -52,7 +52,8 @@ _UNLIKE = 1.3  # ratio of noise levels from which weights shorten errors by more
 class SampledWindow:
     """Fit of all structures to records that were filtered by a polynomial `noise`, 1 for none.
 
-    `data` are the records before the filter, without the samples that depend on the unknown past.
+    `data` are the records before the filter, without the samples that depend on the unknown past;
+    `unweighted` is the model before it.
     """
 
     data: SampledData
@@ -60,6 +61,7 @@ class SampledWindow:
     scales: Scales
     fit: WindowFit
     huber: bool
+    unweighted: UnweightedModel | None = None
 
     @property
     def model(self) -> UnweightedModel:
