@@ -49,25 +49,19 @@ def known_factor(known: Any) -> KnownFactor:
             f"known has {known.ninputs} inputs, {known.noutputs} outputs and dt={known.dt}; "
             "expected a continuous system with one of each (a sensor or a filter)"
         )
-    zeros, poles, gain = _zeros_poles_gain(known)
-    if zeros.size > poles.size:
+    system = known if isinstance(known, ct.TransferFunction) else ct.ss2tf(known)
+    num, den = np.trim_zeros(system.num[0][0], "f"), system.den[0][0]
+    if num.size == 0:
+        raise UnsuitableSystemError("known is zero")
+    if num.size > den.size:
         raise UnsuitableSystemError("known has more zeros than poles; expected a proper system")
+    poles = np.roots(den).astype(np.complex128)
     if poles.size and np.max(poles.real) >= 0:
         raise UnsuitableSystemError(
             f"known has a pole at {complex(poles[np.argmax(poles.real)]):.3g} rad/s; expected "
             "a stable system (count integrators to the plant)"
         )
-    numerator = np.atleast_1d(np.real(np.poly(zeros))) * gain
-    return KnownFactor(_apart(poles), numerator.astype(np.float64))
-
-
-def _zeros_poles_gain(known: Any) -> tuple[Any, Any, float]:
-    if isinstance(known, ct.TransferFunction):
-        num, den = np.trim_zeros(known.num[0][0], "f"), known.den[0][0]
-        if num.size == 0:
-            raise UnsuitableSystemError("known is zero")
-        return np.roots(num), np.roots(den).astype(np.complex128), float(num[0] / den[0])
-    return _zeros_poles_gain(ct.ss2tf(known))
+    return KnownFactor(_apart(poles), np.asarray(num / den[0], dtype=np.float64))
 
 
 def _apart(poles: Any) -> Any:

@@ -138,7 +138,7 @@ def own_responses(
     steps: tuple[StepResponse, ...], data: StepData, fit: OutputErrorEstimate
 ) -> list[OwnResponse]:
     """Compare every record with the model of their mean, shifted and scaled."""
-    beside = own_regressors(data, fit.poles if data.relaxing else None)
+    beside = own_regressors(data, fit.poles)
     edge = data.edge
     found = []
     for step in steps:

@@ -18,7 +18,7 @@ from ..._wording import (
 from ...numerics.arrays import ComplexArray, FloatArray
 from ...numerics.engine.poles import lag_sum
 from ...numerics.engine.profile_ends import profile_limits
-from ...numerics.engine.static_gain import INTEGRATOR, StaticGain
+from ...numerics.engine.static_gain import INTEGRATOR
 from ...numerics.output_error.margins import CLOSE, DecisionKey
 from ...numerics.output_error.result import OutputErrorEstimate, StructureFit
 from ...numerics.output_error.step_data import StepData
@@ -131,11 +131,11 @@ def _dispersed_flow(fit: OutputErrorEstimate) -> Iterator[Flag]:
     flow = min(fit.distributed.flows, key=lambda flow: flow.delta_bic, default=None)
     if flow is None or (flow.delta_bic >= 0 and not fit.distributed.follows_flow):
         return
-    behind = f" and a lag of {in_time(flow.lag)}" if flow.lag else ""
     yield flagged(
         "dispersed_flow.chosen" if fit.distributed.follows_flow else "dispersed_flow",
-        flow=f"an axial-dispersion model (mean residence time {in_time(flow.mean)}, Peclet number "
-        f"{flow.peclet:.2g}{behind})",
+        mean=in_time(flow.mean),
+        peclet=flow.peclet,
+        behind=f" and a lag of {in_time(flow.lag)}" if flow.lag else "",
         dead_time=in_time(flow.dead_time),
     )
 
@@ -173,8 +173,17 @@ def _unresolved_gain(fit: OutputErrorEstimate, length: float) -> Iterator[Flag]:
     The sign is determined if the interval of the gain does not contain zero (`sign_is_told`).
     """
     if fit.static is not None and not sign_is_told(fit.gain_ends):
-        why = _no_sign(fit, fit.static, length)
-        yield flagged("gain_not_resolved.sign", gain=fit.static.gain, why=why)
+        gain, (low, high) = fit.static.gain, fit.gain_ends
+        if fit.load is not None and fit.load.early:
+            yield flagged("gain_not_resolved.load", gain=gain)
+        elif fit.static.resolved:
+            yield flagged("gain_not_resolved.sign", gain=gain, low=low, high=high)
+        else:
+            slowest = in_time(float(1 / np.abs(fit.poles).min()))
+            error, whole = fit.static.gain_std, in_time(length)
+            yield flagged(
+                "gain_not_resolved.slow", gain=gain, slowest=slowest, length=whole, error=error
+            )
         return
     kept = [line for line in fit.structures if line.delta_bic <= _AS_GOOD]
     gain = float(np.real(fit.numerator[0] / np.prod(-fit.poles)))
@@ -184,19 +193,6 @@ def _unresolved_gain(fit: OutputErrorEstimate, length: float) -> Iterator[Flag]:
     if not fit.robust and (_apart(gains) or _apart(totals)):
         between = interval_in_time(totals.min(), totals.max())
         yield flagged("gain_not_resolved", low=gains.min(), high=gains.max(), totals=between)
-
-
-def _no_sign(fit: OutputErrorEstimate, static: StaticGain, length: float) -> str:
-    if fit.load is not None and fit.load.early:
-        return "a load moved the output soon after the step, and may have any part of the response"
-    if static.resolved:
-        low, high = fit.gain_ends
-        return f"its 95 % interval is {low:.3g} to {high:.3g}"
-    return (
-        "longer time constants than its slowest one "
-        f"({in_time(float(1 / np.abs(fit.poles).min()))} in a record of {in_time(length)}) are "
-        f"not ruled out: the standard error of the gain is {static.gain_std:.3g}"
-    )
 
 
 def _apart(values: FloatArray) -> bool:
@@ -249,12 +245,8 @@ def _record_flags(data: StepData, fit: OutputErrorEstimate, start: float) -> Ite
     """List the flags of the record: what the model does not explain, and what disturbed it."""
     if not fit.adequate:
         yield flagged(
-            "structured_misfit",
+            "structured_misfit" if fit.delay_estimates else "structured_misfit.stated",
             ratio=plainly(fit.residual.normalized_rms, 2),
-            interval="the dead time is the median of five delay estimates and the interval is "
-            "their range"
-            if fit.delay_estimates
-            else "the interval is valid only if a given structure is that of the plant",
         )
     if fit.load is not None:
         yield flagged(

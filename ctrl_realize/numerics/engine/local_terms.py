@@ -60,6 +60,13 @@ class Segments:
     regressors: FloatArray
     bins: StepSequence | None = None
 
+    @classmethod
+    def single(
+        cls, clock: FloatArray, regressors: FloatArray, bins: StepSequence | None = None
+    ) -> Segments:
+        """All rows in one segment."""
+        return cls(np.array([0, clock.size]), clock, regressors, bins)
+
     @property
     def rows(self) -> list[slice]:
         """Number of rows of every segment."""

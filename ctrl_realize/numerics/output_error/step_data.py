@@ -248,34 +248,23 @@ def window(data: StepData, stop: int, known: KnownFactor) -> Window:
     drive = StepSequence(times[bins.first], bins.width, data.dt, moves, size)
     if rows.size < end:
         drive = replace(drive, samples=times)
-    own: tuple[Segments | None, Segments | None] = None, None
+    means, on_bins, own = bins.average(columns), None, None
     if data.relaxing:
-        own = _free_response(data, bins, drive, columns)
-        columns = columns[:, :0]
+        on_bins, own = Segments.single(drive.first, means, drive), Segments.single(times, columns)
+        columns, means = columns[:, :0], means[:, :0]
     problem = Problem(
         bins.average(data.output[:stop]),
         np.sqrt(_weights(data, bins)),
         drive,
-        bins.average(columns),
+        means,
         known,
-        own[0],
+        on_bins,
     )
     single = np.broadcast_to(np.int64(1), stop)  # no memory for ones
     drive = StepSequence(times, single, data.dt, moves, size)
     spacing = float(rows[-1] - rows[0]) / max(rows.size - 1, 1)
     return Window(
-        data.edge, data.output[:stop], problem, drive, columns, bins, own[1], spacing=spacing
-    )
-
-
-def _free_response(
-    data: StepData, bins: Bins, drive: StepSequence, columns: FloatArray
-) -> tuple[Segments, Segments]:
-    """Local terms of the record, on bins and at every sample: regressors and free response."""
-    every = _at(data.rows[: len(columns)], data.dt)
-    return (
-        Segments(np.array([0, drive.first.size]), drive.first, bins.average(columns), drive),
-        Segments(np.array([0, every.size]), every, columns),
+        data.edge, data.output[:stop], problem, drive, columns, bins, own, spacing=spacing
     )
 
 
@@ -315,17 +304,15 @@ def fixed_regressors(data: StepData) -> FloatArray:
     return np.concatenate(columns, axis=1)
 
 
-def own_regressors(data: StepData, poles: ComplexArray | None) -> FloatArray:
+def own_regressors(data: StepData, poles: ComplexArray) -> FloatArray:
     """Local terms of the record at every sample, shape (N, q).
 
-    The fixed regressors, and the free response of a plant with poles (n,) if they are given.
+    The fixed regressors, and the free response of a plant with poles (n,) if there is one.
     """
     fixed = fixed_regressors(data)
-    if poles is None:
+    if not data.relaxing:
         return fixed
-    clock = _at(data.rows, data.dt)
-    stretch = Segments(np.array([0, clock.size]), clock, fixed)
-    return np.asarray(local_columns(stretch, poles[None])[0])
+    return np.asarray(local_columns(Segments.single(data.clock, fixed), poles[None])[0])
 
 
 def _weights(data: StepData, bins: Bins) -> FloatArray:

@@ -113,7 +113,7 @@ def _only_part(result: OutputErrorFit) -> ActuatedRecord:
     output, command = np.ravel(record.output).copy(), np.ravel(record.input)
     if np.isfinite(result.onset):
         every = replace(data, rows=np.arange(command.size), output=np.zeros(command.size))
-        terms = own_regressors(every, result.estimate.poles if result.data.relaxing else None)
+        terms = own_regressors(every, result.estimate.poles)
         return actuated_record(output, command, record.dt, edges=data.edges, regressors=terms)
     rows = _rows(result)
     output[: rows[0]] = np.nan
@@ -135,8 +135,8 @@ def _free_motion(result: OutputErrorFit, size: int) -> FloatArray:
     """Level, drift, and free response of the lags of the linear model, (N, q)."""
     clock = result.dt * np.arange(size, dtype=np.float64)
     fixed = np.stack([np.ones(size), np.linspace(0, 1, size)], axis=1)
-    stretch = Segments(np.array([0, size]), clock, fixed)
-    return np.asarray(local_columns(stretch, result.estimate.poles[None])[0])
+    segment = Segments.single(clock, fixed)
+    return np.asarray(local_columns(segment, result.estimate.poles[None])[0])
 
 
 def _scales(result: OutputErrorFit) -> Scales:
