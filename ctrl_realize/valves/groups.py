@@ -179,7 +179,9 @@ def _fitted_dead_time(steps: list[StepMetrics], records: Sequence[Record]) -> In
         return Interval()
     cut = [cut_out(records[one.record], one) for one in settled]
     found = linear_fit(cut)
-    if found is not None and not _is_right(found[0]):
+    better = found and found[0].better
+    # zeros that fit better imitate a limited rate
+    if better and (better.order, better.relative_degree) in STRUCTURES_OF_MORE_LAGS:
         found = linear_fit(cut, STRUCTURES_OF_MORE_LAGS)
     # no linear model fits a response at a limited rate: it has no dead time to report
     return found[1] if found is not None and _is_right(found[0]) else Interval()
