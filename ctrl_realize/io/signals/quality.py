@@ -24,6 +24,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable
 from dataclasses import dataclass
+from functools import lru_cache
 from numbers import Real
 from typing import Any
 
@@ -40,6 +41,8 @@ from .names import NAMES
 _GOOD, _FORCED, _UNCERTAIN = 192, 216, 64
 _SYSTEM_STATES = 220  # of PI, those that are no good code of OPC DA
 Rows = np.ndarray[Any, np.dtype[np.intp]]
+_QUALITY = re.compile(rf"(?:^| )({'|'.join(map(re.escape, NAMES['quality']))})$")
+"""At the end of a name; of several words the longest, which begins first."""
 _FLAGS = {"true": False, "false": True}
 
 
@@ -102,9 +105,11 @@ class Rules:
     def _marked(self, table: Table, index: int) -> BoolArray:
         """Rows in which the quality of a column is bad."""
         out = np.zeros(table.columns[index].cells.size, dtype=bool)
+        if not (qualities := self.columns(table)):
+            return out
         own, tags = _tags(table.columns[index].name), _qualities(table)
         everyone = {tag for one in table.columns for tag in _tags(one.name)}
-        for column in self.columns(table):
+        for column in qualities:
             tag = "" if self.quality != "auto" else tags[column]
             # TIC101.quality is that of TIC101.PV where there is no TIC101 itself
             if tag and tag not in own and (tag in everyone or not own[0].startswith(f"{tag} ")):
@@ -162,6 +167,7 @@ def rules_of(keep: bool, na_values: object, quality: str | int | None, good: obj
     return Rules(keep, _words(na_values, "na_values"), quality, _words(good, "good"))
 
 
+@lru_cache(maxsize=4096)  # each column of a file asks for the names of all others
 def _plain(name: str) -> str:
     """Reduce a tag for comparison: all of its parts, without marks between them."""
     return " ".join(re.sub(r"[^\w%°]|_", " ", name.lower()).split())
@@ -177,9 +183,8 @@ def _qualities(table: Table) -> dict[int, str]:
     found: dict[int, str] = {}
     for k, column in enumerate(table.columns):
         name = _plain(column.name)
-        for word in sorted(NAMES["quality"], key=len):
-            if name == word or name.endswith(f" {word}"):
-                found[k] = name.removesuffix(word).strip()
+        if (ending := _QUALITY.search(name)) is not None:
+            found[k] = name[: ending.start()].strip()
     bare = [k for k, tag in found.items() if not tag]
     if len(bare) > 1:
         # each stands at the right of its signal
