@@ -222,9 +222,9 @@ def passed(output: FloatArray, model: FloatArray, held: BoolArray) -> BoolArray:
 
 def ends(output: FloatArray, held: BoolArray) -> list[tuple[BoolArray, int, float]]:
     """Held samples at the upper and the lower end, the sign of the end, and its level times it."""
-    high = held & (output > np.nanmedian(output[~held]))
-    parts = ((high, 1), (held & ~high, -1))
-    return [(part, s, float(np.nanmedian(s * output[part]))) for part, s in parts if part.any()]
+    middle = np.nanmedian(output[~held])
+    parts = ((held & (output > middle), 1), (held & (output <= middle), -1))
+    return [(part, s, float(np.median(s * output[part]))) for part, s in parts if part.any()]
 
 
 def _joined(index: IntArray, gap: int) -> list[tuple[int, int]]:
