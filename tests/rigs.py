@@ -103,8 +103,8 @@ def step_record(
     amplitude: float = 16.0,
     rest_input: float = 4.0,
     baseline: float = 0.3,
-    before: int = 3840,
-    after: int = 2600,
+    before: int = 600,
+    after: int = 1500,
     dt: float = TS,
 ) -> cr.Record:
     """Record a step after a rest; `delay` in samples, `noise` as a part of the step."""

@@ -38,20 +38,20 @@ def random_levels(seed, n=600, held=5):
 # --- one step record: deviation, interval, structure
 
 
-def test_intervals_and_deviations_are_those_of_forty_records():
-    forty = [cr.fit_output_error(lag_record(seed), **ONE).fit for seed in range(40)]
-    # forty values tell a deviation to 11 %; a third is three of them
+def test_intervals_and_deviations_are_those_of_twenty_records():
+    twenty = [cr.fit_output_error(lag_record(seed), **ONE).fit for seed in range(20)]
+    # twenty values tell a deviation to 16 %; a third is two of them
     claims = {"dead_time": "std_given_structure", "gain": "gain_std_given_structure"}
     for name, std in claims.items():
-        scatter = np.std([getattr(fit, name) for fit in forty], ddof=1)
-        claimed = np.mean([getattr(fit, std) for fit in forty])
+        scatter = np.std([getattr(fit, name) for fit in twenty], ddof=1)
+        claimed = np.mean([getattr(fit, std) for fit in twenty])
         assert claimed == pytest.approx(scatter, rel=0.33)
-    # fewer than 35 of forty intervals of 95 % hold with a chance of 5 in 1000
-    truths = {"": (0.73, 35), "gain_": (3.0, 34), "total_delay_": (1.73, 34)}
-    for name, (truth, least) in truths.items():
-        ends = [getattr(fit, f"{name}interval") for fit in forty]
-        assert sum(low <= truth <= high for low, high in ends) >= least
-    widths = [np.diff(fit.interval)[0] / fit.std_given_structure for fit in forty]
+    # fewer than 16 of twenty intervals of 95 % hold with a chance of 3 in 1000
+    truths = {"": 0.73, "gain_": 3.0, "total_delay_": 1.73}
+    for name, truth in truths.items():
+        ends = [getattr(fit, f"{name}interval") for fit in twenty]
+        assert sum(low <= truth <= high for low, high in ends) >= 16
+    widths = [np.diff(fit.interval)[0] / fit.std_given_structure for fit in twenty]
     assert np.mean(widths) == pytest.approx(2 * 1.96, rel=0.05)
 
 
@@ -68,7 +68,7 @@ def test_zeros_and_lags_that_are_not_there_are_not_chosen():
 
 def test_a_short_record_does_not_lose_its_interval_to_models_that_know_no_delay():
     widths = []
-    for seed in range(3):
+    for seed in range(2):
         record = rigs.step_record(
             rigs.R1, noise=0.02, seed=seed, before=30, after=40, dt=1e-2, delay=8
         )
@@ -105,7 +105,7 @@ def test_where_no_model_leaves_noise_the_delay_is_the_median_of_five_views():
 
 
 def test_slow_noise_at_rest_is_no_drift():
-    for seed in range(6):
+    for seed in range(4):
         rng = np.random.default_rng(seed)
         slow = lfilter([0.05], [1.0, -0.8], rng.standard_normal(1000))[200:]
         clean = lag_record(noise=0.0, n=800, edge=300)
@@ -244,7 +244,7 @@ def test_an_input_that_does_not_hold_its_level_is_any_input():
 
 def test_wild_samples_move_least_squares_more_than_the_usual_loss():
     errors = {"huber": [], "least_squares": []}
-    for seed in range(5):
+    for seed in range(3):
         rng = np.random.default_rng(seed)
         record = lag_record(seed)
         wild = np.where(rng.random(120) < 0.05, 1.5 * rng.standard_normal(120), 0.0)

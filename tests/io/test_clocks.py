@@ -216,8 +216,8 @@ def test_a_zone_that_does_not_fit_is_refused(tmp_path, capsys):
 def motor(bits=12):
     """A motor, 900 counts/s behind 6 ms and a lag of 80 ms, with a counter, in binary noise."""
     rng = np.random.default_rng(7)
-    t = 2e-3 * np.arange(4000)
-    u = np.repeat(rng.choice([-1.0, 1.0], 80), 50) + 1.5
+    t = 2e-3 * np.arange(1500)
+    u = np.repeat(rng.choice([-1.0, 1.0], 30), 50) + 1.5
     late = np.r_[np.full(3, u[0]), u[:-3]]
     pole = np.exp(-2e-3 / 0.08)
     speed = np.zeros(t.size)

@@ -125,14 +125,14 @@ def flows(plug):
     return {f"flow_at_{u}": (part, 0.03) for u, part in zip(range(30, 90, 10), parts, strict=True)}
 
 
-CURVED = (Characteristic("equal-percentage", rangeability=30), Characteristic("quick-opening"))
+CURVED = Characteristic("equal-percentage", rangeability=30)
 OTHERS = [
     ("slew_rate", SlewRateLimit(12.0, 20.0), staircase(30, -30, 20, -30, hold=90),
      {"slew_rate_opening": (12.0, 1.2), "slew_rate_closing": (20.0, 2.0)}),
     ("saturation", Saturation(27.0, 84.0), LEVELS,
      {"travel_low": (27.0, 0.5), "travel_high": (84.0, 0.5)}),
     ("saturation", Saturation(-100.0, 76.0), LEVELS, {"travel_high": (76.0, 0.5)}),
-    *(("characteristic", plug, LEVELS, flows(plug)) for plug in CURVED),
+    ("characteristic", CURVED, LEVELS, flows(CURVED)),
     ("stiction", KanoStiction(1.7, 1.7), SMALL, {"resolution": (1.7, 0.6)}),
 ]  # fmt: skip
 

@@ -142,7 +142,7 @@ def test_of_a_slow_plant_all_of_a_long_record_counts():
 
 def test_the_dead_time_of_means_is_as_exact_as_the_data_allow():
     # Levels are held for longer than the blocks, so that means lose nothing.
-    record, u = slow_record(30_000, held=60)
+    record, u = slow_record(15_000, held=60)
     fit = cr.fit_output_error(record, structures=[(1, 1)]).fit
     limit = DT * joint_bound([np.append(np.zeros(SKIP), u)], [0.05], SLOW)
     assert limit * 0.9 < fit.std_given_structure < 1.25 * limit
@@ -151,10 +151,10 @@ def test_the_dead_time_of_means_is_as_exact_as_the_data_allow():
 
 @pytest.mark.parametrize("scattered", [True, False])
 def test_a_long_record_of_a_slow_plant_may_have_gaps(scattered):
-    record, u = slow_record(40_000, held=50)
+    record, u = slow_record(15_000, held=50)
     y = np.array(np.ravel(record.output))
     rng = np.random.default_rng(5)
-    y[rng.random(y.size) < 0.2 if scattered else slice(9000, 12_000)] = np.nan
+    y[rng.random(y.size) < 0.2 if scattered else slice(6000, 8000)] = np.nan
     part = cr.Record(record.time, u, y, missing="keep")
     fit = cr.fit_output_error(part, structures=[(1, 1)]).fit
     assert fit.gain_interval[0] <= SLOW[1] <= fit.gain_interval[1]
@@ -173,7 +173,7 @@ def test_a_dead_time_longer_than_the_first_part_of_a_record_is_found():
 
 def test_a_part_of_a_long_record_says_so():
     plant = lag(0.1) * lag(4.0)  # a fast lag beside a slow one: the blocks are short
-    u = np.repeat(np.random.default_rng(0).choice([-1.0, 1.0], 300), 60)
+    u = np.repeat(np.random.default_rng(0).choice([-1.0, 1.0], 150), 60)
     y = cr.delayed_ss(plant, dead_time=DELAY * DT, dt=DT).simulate(u)
     y += 0.01 * np.random.default_rng(1).standard_normal(u.size)
     fit = cr.fit_output_error(cr.Record(DT * np.arange(u.size), u, y), structures=[(2, 2)]).fit
@@ -182,7 +182,7 @@ def test_a_part_of_a_long_record_says_so():
 
 
 def test_records_of_a_slow_plant_that_differ_in_length_are_fitted_together():
-    long, _ = slow_record(30_000, held=60)
+    long, _ = slow_record(15_000, held=60)
     short, _ = slow_record(3000, held=60, seed=7)
     fit = cr.fit_output_error([long, short], structures=[(1, 1)]).fit
     assert fit.gain_interval[0] <= SLOW[1] <= fit.gain_interval[1]
@@ -231,8 +231,8 @@ def test_a_sine_beside_the_response_is_named_and_does_not_move_the_dead_time():
 
 
 def test_an_input_that_rests_for_longer_than_is_fitted_is_fitted_where_it_moves():
-    rng, rest = np.random.default_rng(0), 20_000
-    u = np.concatenate([np.zeros(rest), np.repeat(rng.choice([-1.0, 1.0], 250), 10)])
+    rng, rest = np.random.default_rng(0), 12_000
+    u = np.concatenate([np.zeros(rest), np.repeat(rng.choice([-1.0, 1.0], 120), 10)])
     y = cr.delayed_ss(R1, dead_time=DELAY * DT, dt=DT).simulate(u)
     y += 0.02 * np.ptp(y) * rng.standard_normal(y.size)
     fit = cr.fit_output_error(cr.Record(DT * np.arange(u.size), 4 + u, y), structures=[(1, 1)]).fit

@@ -15,21 +15,17 @@ from tests import measured
 # give or take, and have 128 samples a second.
 BANDS = {
     "wis_canal/20210202_step_gate1_2_s100": (147.2, 185.6),
-    "wis_canal/20210202_step_gate2_3_s255": (51.2, 108.8),
     "wis_canal/20210302_step_gate1_2_s25_slow": (160.0, 236.8),
     "wis_canal/20210302_step_gate2_3_s100_slow": (64.0, 160.0),
-    **{f"heating_system/edge{i}": (0.5, 2.2) for i in (0, 2)},
+    "heating_system/edge0": (0.5, 2.2),
     "air_duct/45": (10, 13),
-    "air_duct/90": (10, 13),
     "dc_motor_tacho/up": (31, 42),
     "rlc_zero_delay/up": (-1, 1),
 }
 SHORT = {  # dead times of a few samples; no rule was made with the last three plants
     "two_cart_drive/v1_5_0": (0.9, 3.4),
-    "two_cart_drive/v2_3": (0.9, 3.4),
     "sbhs_heater/step1": (1, 4.5),
     "hdd_arm/edge0": (0.8, 3.2),
-    "tclab/apm_1": (0, 5),
     "tclab/kantor_step50": (0, 5),
 }
 
@@ -45,7 +41,7 @@ def test_dead_times_are_in_their_bands_and_intervals_meet_them(fits):
         assert fit.delay_interval[0] <= limits[name][1], name
         assert fit.delay_interval[1] >= limits[name][0], name
     outside = {n for n, fit in fits.items() if not limits[n][0] <= fit.delay <= limits[n][1]}
-    assert len(outside) <= 2
+    assert len(outside) <= 1
     assert outside <= set(SHORT)
 
 

@@ -180,12 +180,12 @@ def test_coloured_noise_leaves_a_delay_and_structures_disagree_only_where_it_mat
 def test_a_code_for_missing_samples_is_told_by_its_value():
     record = rigs.step_record(noise=0.005)
     y = record.output.copy()
-    y[[700, 2300]] = -9999.0
+    y[[700, 1900]] = -9999.0
     fit = cr.fit_output_error(cr.Record(record.time, record.input, y), **THREE).fit
     message = next(str(flag) for flag in fit.flags if flag.code == "outliers")
     assert "2 sample(s), the first at index 700, are -9999" in message
     # One wild sample of each kind is no code.
-    y[2300] = 8888.0
+    y[1900] = 8888.0
     fit = cr.fit_output_error(cr.Record(record.time, record.input, y), **THREE).fit
     assert not any("missing value" in str(flag) for flag in fit.flags)
 
