@@ -193,10 +193,8 @@ def step_data(
     span = float(np.ptp(output))
     sigma = max(sigma, 1e-4 * span)
     motion = first_motion(quiet, edge, sigma, quantum, drift, gaps)
-    data = StepData(
-        output, signal, dt, edges, rows, sigma, quantum, drift, colour, hum, motion, quiet, relaxing
-    )
-    return replace(data, bend=bend)
+    seen = sigma, quantum, drift, colour, hum, motion, quiet, relaxing
+    return StepData(output, signal, dt, edges, rows, *seen, bend=bend)
 
 
 def bare_data(
@@ -204,8 +202,8 @@ def bare_data(
 ) -> StepData:
     """Data of records without a step, with a duration `span` in s: there is no baseline."""
     rows = np.arange(output.size)
-    bare = StepData(output, signal, dt, [(0, 1)], rows, sigma, 0.0, 0.0, 1.0, [], None, output)
-    return replace(bare, span=span, every=every)
+    seen = sigma, 0.0, 0.0, 1.0, list[float](), None, output
+    return StepData(output, signal, dt, [(0, 1)], rows, *seen, span=span, every=every)
 
 
 def stop_at(data: StepData, part: float) -> int:

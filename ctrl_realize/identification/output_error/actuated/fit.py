@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -15,7 +14,7 @@ from ....numerics.actuated.choice import ActuatedFit, fit_actuated
 from ....numerics.actuated.intervals import propagated
 from ....numerics.actuated.motions import at_parts
 from ....numerics.actuated.records import FEW_MOVES, ActuatedRecord, actuated_record
-from ....numerics.arrays import FloatArray, IntArray
+from ....numerics.arrays import FloatArray
 from ....numerics.constants import CHI2_95, VERY_STRONG, Z_95
 from ....numerics.engine.local_terms import Segments, local_columns
 from ....numerics.engine.problem import Structure
@@ -83,7 +82,7 @@ def with_actuator(
     if not found.chosen:
         said = (*skipped, not_needed(identifiable, found.evidence))
         return replace(_both(result, found), choices=result.choices + said)
-    return _replaced(free, parts, scales, found, skipped)
+    return _replaced(free, scales, found, skipped)
 
 
 def _both(result: OutputErrorFit, found: ActuatedFit) -> OutputErrorFit:
@@ -115,7 +114,7 @@ def _only_part(result: OutputErrorFit) -> ActuatedRecord:
         every = replace(data, rows=np.arange(command.size), output=np.zeros(command.size))
         terms = own_regressors(every, result.estimate.poles)
         return actuated_record(output, command, record.dt, edges=data.edges, regressors=terms)
-    rows = _rows(result)
+    rows = np.round((result.time - record.time[0]) / result.dt).astype(np.int64)
     output[: rows[0]] = np.nan
     part = slice(0, int(rows[-1]) + 1)
     if rows[-1] - rows[0] + 1 < output.size // 2:
@@ -124,11 +123,6 @@ def _only_part(result: OutputErrorFit) -> ActuatedRecord:
     few = np.count_nonzero(np.diff(command[part])) <= FEW_MOVES  # a test, which begins at rest
     free = None if few else _free_motion(result, output[part].size)
     return actuated_record(output[part], command[part], record.dt, regressors=free)
-
-
-def _rows(result: OutputErrorFit) -> IntArray:
-    start = result.records[0].time[0]
-    return np.asarray(np.round((result.time - start) / result.dt), dtype=np.int64)
 
 
 def _free_motion(result: OutputErrorFit, size: int) -> FloatArray:
@@ -154,31 +148,17 @@ def _scales(result: OutputErrorFit) -> Scales:
 
 
 def _replaced(
-    result: OutputErrorFit,
-    parts: Sequence[ActuatedRecord],
-    scales: Scales,
-    found: ActuatedFit,
-    skipped: tuple[str, ...],
+    result: OutputErrorFit, scales: Scales, found: ActuatedFit, skipped: tuple[str, ...]
 ) -> OutputErrorFit:
-    measured = np.concatenate([part.measured[part.rows] for part in parts])
+    parts, measured = found.records.parts, found.records.output
     data, time = result.data, result.time
     if len(parts) > 1 or measured.size != result.measured.size:
         command = np.concatenate([part.command[part.rows] for part in parts])
         sigma, span = float(np.std(found.residual)), measured.size * result.dt
         data = bare_data(measured, command, result.dt, sigma, span)
         time = result.dt * np.arange(measured.size, dtype=np.float64)
-    estimate = _estimate(result, scales, found, measured)
+    estimate = _estimate(result, scales, found)
     actuator = _actuator_fit(result, found)
-    replaced = replace(
-        result,
-        estimate=estimate,
-        data=data,
-        time=time,
-        repeatability=None,
-        choices=skipped,
-        flags=(),
-        actuator=actuator,
-    )
     staying = marked("stays_with_actuator")
     if result.data.load is not None:
         staying |= {"load_disturbance"}
@@ -187,17 +167,25 @@ def _replaced(
     if actuator.unresolved:
         flags.append(flagged("actuator_not_resolved", parameters="; ".join(actuator.unresolved)))
     if not estimate.adequate:
-        ratio = plainly(replaced.normalized_rms, 3)
+        ratio = plainly(estimate.residual.normalized_rms, 3)
         flags.append(flagged("structured_misfit.actuator", ratio=ratio))
-    return replace(replaced, flags=tuple(flags))
+    return replace(
+        result,
+        estimate=estimate,
+        data=data,
+        time=time,
+        repeatability=None,
+        choices=skipped,
+        flags=tuple(flags),
+        actuator=actuator,
+    )
 
 
-def _estimate(
-    result: OutputErrorFit, scales: Scales, found: ActuatedFit, measured: FloatArray
-) -> OutputErrorEstimate:
+def _estimate(result: OutputErrorFit, scales: Scales, found: ActuatedFit) -> OutputErrorEstimate:
     member, structure = found.member, found.member.family.structure
     static, parameters = propagated(member, found.variance, scales.length)
-    fitted = found.records.output - found.residual
+    measured = found.records.output
+    fitted = measured - found.residual
     low, high = found.ends[0]
     dead_time = float(member.x[0])
     low, high = min(low, dead_time), max(high, dead_time)

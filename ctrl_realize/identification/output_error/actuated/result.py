@@ -4,15 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 
 from ...._parameters import Parameter
 from ....actuators import Actuator, SlewRateLimit
+from ....numerics.actuated.motions import Place
 from ....numerics.arrays import FloatArray
 
-Place = Literal["input", "stem"]
 _PLACES: dict[Place, str] = {"input": "before the lags", "stem": "behind the lags"}
 
 
