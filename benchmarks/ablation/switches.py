@@ -322,7 +322,10 @@ SWITCHES = (
         "noise of a rest that is constant",
         {f"{FITS}.step_data:rest_noise": _constant_rest},
     ),
-    Switch("drift", {f"{PUBLIC}.averaging:step_data": _without_drift}),
+    Switch(
+        "drift",
+        {f"{PUBLIC}.{name}:step_data": _without_drift for name in ("arguments", "averaging")},
+    ),
     Switch("load during the test", {f"{STEP}:load_of": giving(None)}),
     Switch("hum", {f"{FITS}.step_data:hum_frequencies": giving([])}),
     Switch("hum against slow noise", {f"{NUMERICS}.signals.noise:_is_line": giving(True)}),

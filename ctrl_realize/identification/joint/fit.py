@@ -28,10 +28,10 @@ from ...numerics.joint.effects import Effect, with_random_effects
 from ...numerics.joint.fit import joint_fit
 from ...numerics.output_error.any_input.data import cut
 from ...numerics.output_error.result import OutputErrorEstimate
-from ...numerics.output_error.step_data import StepData, bare_data
+from ...numerics.output_error.step_data import StepData
 from ...numerics.rational.frf_data import FRFData
 from ...numerics.rational.search import points_as_one
-from ..output_error.any_input import joined_signals
+from ..output_error.any_input import joined
 from ..output_error.fit import fit_output_error
 from ..output_error.repeat_flags import BY_CHANCE
 from ..output_error.result import OutputErrorFit
@@ -190,11 +190,7 @@ def _records(
     used = first.records if repeats is None else list(compress(first.records, repeats.kept))
     outputs, inputs = ([np.ravel(getattr(r, k)) for r in used] for k in ("output", "input"))
     data = cut(outputs, inputs, first.dt, first.data.every, KnownFactor()).after(first.dead_time)
-    time, signal = joined_signals(used, data)
-    window, scales = sampled_part(data, first.estimate, latest)
-    span = sum(data.lengths) * data.step
-    shown = bare_data(window.output, signal, data.dt, first.residual, span, data.every)
-    return window, scales, shown, time
+    return *sampled_part(data, first.estimate, latest), *joined(used, data, first.residual)
 
 
 def _spread(first: OutputErrorFit) -> list[tuple[Effect, float]]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
 from itertools import compress
 
 import numpy as np
@@ -19,7 +18,7 @@ from ...numerics.output_error.any_input.fit import SampledFit, fit_sampled
 from ...numerics.output_error.any_input.stretch import FOLLOWS
 from ...numerics.output_error.other_structures import Requested
 from ...numerics.output_error.result import OutputErrorEstimate
-from ...numerics.output_error.step_data import bare_data
+from ...numerics.output_error.step_data import StepData, bare_data
 from ...numerics.signals.counters import counter_period
 from ...numerics.validation.own_response import OwnResponse
 from .averaging import common_sample_time
@@ -142,15 +141,10 @@ def _summary(
     """Concatenate what was fitted on one time axis."""
     data = found.data
     used = records if repeats is None else tuple(compress(records, repeats.kept))
-    time, signal = joined_signals(used, data)
-    length = max(y.size for y in data.outputs) * data.step
-    flags = [*sampled_flags(fit, data.dt, length, latest), *_cut(used, found)]
+    shown, time = joined(used, data, fit.residual.std)
+    flags = [*sampled_flags(fit, data.dt, data.longest, latest), *_cut(used, found)]
     if repeats is not None:
         flags += repeat_flags(repeats, fit.dead_time, data.dt)
-    span = sum(data.lengths) * data.step
-    output, noise = np.concatenate(data.measured), fit.residual.std
-    joined = bare_data(output, signal, data.dt, noise, span, data.every)
-    fit = replace(fit, fitted=np.concatenate(found.fitted))
     sums = found.condensed
     reasons = []
     if data.every > 1:
@@ -163,18 +157,21 @@ def _summary(
             chosen("samples.condensed", samples=count, sums=size, lags=lags, noise_lags=order)
         )
     choices = (*reasons, *choices_of(fit))
-    return OutputErrorFit(fit, joined, time, records, repeats, choices=choices, flags=tuple(flags))
+    return OutputErrorFit(fit, shown, time, records, repeats, choices=choices, flags=tuple(flags))
 
 
-def joined_signals(records: Sequence[Record], data: SampledData) -> tuple[FloatArray, FloatArray]:
-    """Times of the samples that are fitted, record after record, and the input there."""
+def joined(
+    records: Sequence[Record], data: SampledData, noise: float
+) -> tuple[StepData, FloatArray]:
+    """What is fitted, record after record, and its times."""
     times: list[FloatArray] = []
     middle = data.dt * (data.width - 1) / 2
     for record, offset, rows in zip(records, data.offsets, data.rows, strict=True):
         time = record.time[offset + data.every * rows] + middle
         times.append(time if not times else time - time[0] + times[-1][-1] + data.step)
-    signals = [u[rows] for u, rows in zip(data.held, data.rows, strict=True)]
-    return np.concatenate(times), np.concatenate(signals)
+    signal = np.concatenate([u[rows] for u, rows in zip(data.held, data.rows, strict=True)])
+    output, span = np.concatenate(data.measured), sum(data.lengths) * data.step
+    return bare_data(output, signal, data.dt, noise, span, data.every), np.concatenate(times)
 
 
 def _cut(records: Sequence[Record], found: SampledFit) -> Iterator[Flag]:

@@ -139,6 +139,6 @@ def sampled_part(
         max(lag, 2 * data.step),
         max(data.lengths) * data.step,
         data.step,
-        data.quarter if latest is None else latest,
+        0.25 * data.longest if latest is None else latest,
     )
     return replace(part, problem=problem, samples=error.size / correlation), scales

@@ -136,9 +136,9 @@ class SampledData:
         return replace(self, starts=tuple(min(late, y.size // 2) for y in self.outputs))
 
     @property
-    def quarter(self) -> float:
-        """A quarter of the longest record in s: no dead time is longer by default."""
-        return 0.25 * max(y.size for y in self.outputs) * self.step
+    def longest(self) -> float:
+        """Duration of the longest record, in s."""
+        return max(y.size for y in self.outputs) * self.step
 
     @property
     def edges(self) -> IntArray:

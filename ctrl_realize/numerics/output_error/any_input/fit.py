@@ -59,7 +59,7 @@ _CLEARLY = 4.0  # standard deviations of a chi-square: 3e-5 by chance
 class SampledFit:
     """Fit of records with any input.
 
-    `fitted` has one entry for each record, from its start on. `explained` is the decrease of the
+    `explained` is the decrease of the
     sum of squares due to the input, divided by the residual variance: a chi-square. If the records
     are longer than `data`, `condensed` contains the data that were fitted. `noise` is the
     polynomial that makes the noise white, 1 for white noise.
@@ -67,7 +67,6 @@ class SampledFit:
 
     fit: OutputErrorEstimate
     data: SampledData
-    fitted: tuple[FloatArray, ...]
     explained: float
     noise: FloatArray
     condensed: Condensed | None
@@ -177,16 +176,9 @@ def fit_sampled(
     # There is no baseline for the noise; correlation is estimated from means over bins.
     residual = fit.residual._replace(normalized_rms=float(np.sqrt(correlation)))
     close = fit.close + close_to("adequate", correlation, WHITE)
-    fit = replace(fit, residual=residual, close=close)
-    parts = np.split(fit.fitted, data.edges[1:-1])
-    return SampledFit(
-        fit,
-        data,
-        tuple(values * scale for values, scale in zip(parts, data.scales, strict=True)),
-        explained(stretch),
-        part.noise,
-        sums,
-    )
+    fitted = fit.fitted * np.repeat(data.scales, data.counts)
+    fit = replace(fit, residual=residual, close=close, fitted=fitted)
+    return SampledFit(fit, data, explained(stretch), part.noise, sums)
 
 
 def _of_measured(

@@ -42,7 +42,7 @@ def fit_stretch(
     data: SampledData, structures: Sequence[Structure], requested: Requested
 ) -> SampledWindow:
     """Fit structures to a part of the records, by default dead times up to a quarter of it."""
-    limit = data.quarter if requested.latest is None else requested.latest
+    limit = 0.25 * data.longest if requested.latest is None else requested.latest
     part = fit_windows(data, structures, limit, requested.huber, np.ones(1))
     if not (part.fit.correlation > WHITE and requested.whiten and data.complete):
         return part
