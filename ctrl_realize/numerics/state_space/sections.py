@@ -175,17 +175,18 @@ class Motion:
 def motion(model: Sections, v: FloatArray) -> Motion:
     """Filter the inputs (m, T) through every section."""
     T = v.shape[1]
-    pulse = np.zeros(T + 1)
-    pulse[0] = 1.0
+    # An initial state is a pulse one sample before the record.
+    inputs = np.zeros((v.shape[0] + 1, T + 1))
+    inputs[:-1, 1:], inputs[-1, 0] = v, 1.0
     driven, states, bent, free = [], [], [], []
     for (a1, a2), B in zip(model.a, model.B, strict=True):
-        mine = _resolvent(a1, a2, v)
+        moved = _resolvent(a1, a2, inputs)[..., 1:]
+        mine = moved[:, :, :-1]
         x = np.einsum("srjt,rj->st", mine, B)
         driven.append(mine)
         states.append(x)
         bent.append(_bent(a1, a2, x))
-        # An initial state is a pulse one sample before the record.
-        free.append(_resolvent(a1, a2, pulse)[:, :, 1:])
+        free.append(moved[:, :, -1])
     shape = (0, 2, 2)
     return Motion(
         np.array(states).reshape(-1, 2, T),
@@ -204,6 +205,8 @@ def _bent(a1: float, a2: float, states: FloatArray) -> FloatArray:
 def _resolvent(a1: float, a2: float, signal: FloatArray) -> FloatArray:
     """Signals (..., T) behind ``(z I - A_i)^-1``, shape (2, 2, ..., T): state, entry."""
     late = np.asarray(lfilter([0.0, 1.0], [1.0, a1, a2], signal, axis=-1))
-    later = np.zeros_like(late)
+    found = np.zeros((2, 2, *late.shape))
+    (own, later), (other, same) = found
     later[..., 1:] = late[..., :-1]
-    return np.stack([np.stack([late + a1 * later, later]), np.stack([-a2 * later, late])])
+    own[:], other[:], same[:] = late + a1 * later, -a2 * later, late
+    return found
