@@ -131,7 +131,7 @@ def gain_plot(
                 axes.plot([x, x], [low, high], linewidth=1.6, **thin)
             if gains.scheduled_over == "input level":
                 axes.plot(span, [g, g], linewidth=0.8, **thin)
-        used = np.array([name not in gains.outlying for name in gains.names])
+        used = gains.kept
         lines = axes.plot(gains.operating_points[used], gains.gains[used], label="records", **looks)
         if not used.all():
             crosses = {**looks, "marker": "x", "label": "outlying"}

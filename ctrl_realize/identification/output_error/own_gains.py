@@ -114,8 +114,8 @@ def at_model_gain(fit: OutputErrorFit) -> tuple[Record, ...]:
         return fit.records
     return tuple(
         Record(record.time, ratio * record.input, record.output, name=record.name)
-        for record, name, ratio in zip(fit.records, gains.names, gains.ratios, strict=True)
-        if name not in gains.outlying
+        for record, kept, ratio in zip(fit.records, gains.kept, gains.ratios, strict=True)
+        if kept
     )
 
 

@@ -6,12 +6,11 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..._checks import real
 from ..._wording import in_numbers
 from ...data import Record
-from ...numerics.arrays import FloatArray, locked
+from ...numerics.arrays import BoolArray, FloatArray, locked
 from ...results import Result
 from ..step.steps import found_edges
 from .repeat_flags import BY_CHANCE, SAME
@@ -112,14 +111,14 @@ class RecordGains(Result):
         return locked(self.gains / self.reference)
 
     @property
-    def _used(self) -> NDArray[np.bool_]:
-        """Whether each record is in the fit."""
+    def kept(self) -> BoolArray:
+        """Whether each record is in the fit, shape (R,)."""
         return np.array([name not in self.outlying for name in self.names])
 
     @property
     def differ(self) -> bool:
         """Whether the gains differ by more than their noise explains, and by more than 3 %."""
-        apart = float(np.max(np.abs(self.ratios[self._used] - 1), initial=0.0))
+        apart = float(np.max(np.abs(self.ratios[self.kept] - 1), initial=0.0))
         return self.p_value < BY_CHANCE and apart > SAME
 
     @property
@@ -128,7 +127,7 @@ class RecordGains(Result):
 
         Of records at one operating point (within 1 % of the range of all inputs) the median.
         """
-        points, gains = self.operating_points[self._used], self.gains[self._used]
+        points, gains = self.operating_points[self.kept], self.gains[self.kept]
         if not self.differ:
             return np.array([float(np.median(points))]), np.array([self.reference])
         order = np.argsort(points, kind="stable")
@@ -189,7 +188,7 @@ class RecordGains(Result):
                 "gain_std": self.errors,
                 "low": self.low,
                 "high": self.high,
-                "outlying": [name in self.outlying for name in self.names],
+                "outlying": ~self.kept,
             }
         )
         return table.set_index(pd.Index(self.names, name="record"))
