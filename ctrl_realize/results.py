@@ -282,6 +282,11 @@ class ModelFit(Result):
         return ()
 
     @property
+    def verdicts(self) -> tuple[Any, ...]:
+        """Whether dead time and gain are known, and the model fits tuning; empty if not judged."""
+        return ()
+
+    @property
     def integrators(self) -> int:
         """Number of poles at zero."""
         return 0

@@ -81,6 +81,10 @@ TABLES = {
     "accuracy": ("docs/tables/accuracy_table.md", "python -m benchmarks.accuracy"),
     "honesty": ("docs/tables/honesty_table.md", "python -m benchmarks.honesty"),
     "worlds": ("docs/tables/worlds_table.md", "python -m benchmarks.worlds"),
+    "verdicts": (
+        "docs/tables/verdicts_table.md",
+        "python -m benchmarks.verdicts --table docs/tables/verdicts_table.md",
+    ),
     "kernels": ("docs/tables/kernels_table.md", "python -m benchmarks.kernels"),
     "ablation": ("docs/tables/ablation_table.md", "python -m benchmarks.ablation"),
     "ablation_worlds": (

@@ -17,6 +17,7 @@ FLAGS = set(tomllib.loads(WORDS.read_text(encoding="utf-8")))
 
 def test_every_flag_of_the_package_has_a_world_in_which_it_is_due():
     elsewhere = {
+        "may_be_at_limit",  # tests/identification/output_error/test_limits.py
         "actuator_not_resolved",  # tests/identification/output_error/test_actuated.py
         "sensitive",  # tests/design/test_loop_check.py
         "sensitive_within_interval",  # tests/design/test_loop_check.py

@@ -20,7 +20,7 @@ from ..numerics.families.physical import process_parameters
 FACTS = frozenset(
     {
         "fit", "residual", "gains of the records", "visible onset", "total delay",
-        "total delay at DC",
+        "total delay at DC", "verdict: dead time", "verdict: gain", "verdict: tuning",
     }
 )  # fmt: skip
 """Rows of a fit that stand at the top of a report."""

@@ -102,6 +102,15 @@ def _verdict(
         codes.discard(_GAIN_OPEN)
     level: Level = "caution" if flags else "good"
     judgement = _JUDGEMENTS[level]
+    answers = () if system.fit is None else system.fit.verdicts
+    if answers:
+        said = {one.question: one.level for one in answers}
+        others = codes - {_code(flag) for flag in _flags_of(system)}
+        level = "caution" if others or set(said.values()) != {"good"} else "good"
+        if "no" in (said["dead time"], said["tuning"]):
+            level = "poor"
+        judgement = " ".join(f"{key[:1].upper()}{key[1:]}: {value}." for key, value in said.items())
+        codes -= marked("wrong_dead_time")
     if codes & marked("wrong_model"):
         level, judgement = "poor", _CONTRADICTION if _CONTRADICTED in codes else _WRONG_MODEL
     elif codes & marked("wrong_dead_time"):

@@ -17,7 +17,7 @@ from ..._wording import (
 )
 from ...numerics.arrays import ComplexArray, FloatArray
 from ...numerics.engine.poles import lag_sum
-from ...numerics.engine.profile_ends import profile_limits
+from ...numerics.engine.profile import profile_limits
 from ...numerics.engine.static_gain import INTEGRATOR
 from ...numerics.output_error.margins import CLOSE, DecisionKey
 from ...numerics.output_error.result import OutputErrorEstimate, StructureFit

@@ -17,6 +17,7 @@ from ..._wording import (
 )
 from ...data import Record
 from ...numerics.arrays import ComplexArray, FloatArray, locked
+from ...numerics.engine.plausible_models import PlausibleModel
 from ...numerics.engine.poles import lag_sum
 from ...numerics.engine.static_gain import INTEGRATOR
 from ...numerics.output_error.result import OutputErrorEstimate, StructureFit
@@ -24,6 +25,7 @@ from ...numerics.output_error.step_data import StepData
 from ...numerics.signals.correlation import fit_percent
 from ...results import Flag, FractionalDelayFit, IntervalKind
 from ..process_parameters import jump, not_seen_in_words, told, with_intervals
+from ..verdicts import Verdict, in_doubt, verdicts
 from .actuated.result import ActuatorFit
 from .record_gains import RecordGains
 from .repeat_flags import BY_CHANCE
@@ -342,6 +344,19 @@ class OutputErrorFit(FractionalDelayFit):
         """Order and relative degree."""
         return self.order, self.relative_degree
 
+    def _choices(self) -> list[str]:
+        notes = [f"note: {flag}" for flag in self.flags if not in_doubt(flag)]
+        return [*super()._choices(), *notes]
+
+    def _notes(self) -> list[str]:
+        return [str(flag) for flag in self.flags if in_doubt(flag)]
+
+    @property
+    def verdicts(self) -> tuple[Verdict, ...]:
+        """Whether dead time and gain are known, and whether the model is fit for tuning."""
+        own = PlausibleModel(self.dead_time, self._plain_poles, self.estimate.numerator)
+        return verdicts(self, own, self.estimate.plausible)
+
     def __repr__(self) -> str:
         low, high = self.interval
         level = "noise" if self.at_noise_level else f"{plainly(self.normalized_rms, 2)} x noise"
@@ -402,6 +417,7 @@ class OutputErrorFit(FractionalDelayFit):
         rows = [
             ("transfer function", self.formula),
             *([("not seen", not_seen_in_words(left_out))] if left_out else []),
+            *((f"verdict: {v.question}", f"{v.level}: {v.sentence}") for v in self.verdicts),
             (self._kind(), "".join(self._dead_time_in_words())),
             (self.interval_label, interval_in_time(low, high)),
             *self._other_orders(),

@@ -21,7 +21,7 @@ import numpy as np
 from ..arrays import FloatArray
 from ..constants import CHI2_95
 from ..engine.poles import lag_sum, poles_from_parameters
-from ..engine.profile_ends import bracket_ends, profile_limits, root_of
+from ..engine.profile import bracket_ends, profile_limits, root_of
 from ..engine.static_gain import LocalErrors, StaticGain
 from ..families.physical import ProcessParameter, process_parameters
 from .family import Member

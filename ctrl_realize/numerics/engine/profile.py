@@ -14,6 +14,7 @@ References
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import TypeAlias
 
@@ -25,7 +26,6 @@ from .descend import descend
 from .eliminate import evaluate
 from .newton import solve_level
 from .problem import Bounds, Problem
-from .profile_ends import bracket_ends, root_of
 from .structures import Candidate, Scales, parameter_bounds
 
 _EDGE = float(np.sqrt(CHI2_95))
@@ -239,3 +239,36 @@ def dead_time_error(problem: Problem, candidate: Candidate, variance: float) -> 
     triangle = np.linalg.qr(columns[:, ::-1])[1]
     corner = float(np.abs(triangle[-1, -1])) * float(size[0])
     return float(np.sqrt(variance)) / corner if corner > _NOTHING * free else float("inf")
+
+
+def bracket_ends(excess: Mapping[float, float]) -> list[tuple[float, float]]:
+    """Pairs of neighbours, inside and outside, at the lower and upper end, if there are any."""
+    dead_times = sorted(excess)
+    inside = [i for i, at in enumerate(dead_times) if excess[at] <= CHI2_95]
+    first, last = inside[0], inside[-1]
+    found = [(dead_times[first], dead_times[first - 1])] if first > 0 else []
+    return found + (
+        [(dead_times[last], dead_times[last + 1])] if last < len(dead_times) - 1 else []
+    )
+
+
+def root_of(excess: float) -> float:
+    """Square root of an excess that may be negative by rounding."""
+    return float(np.sqrt(max(excess, 0.0)))
+
+
+def profile_limits(
+    dead_time: FloatArray, excess: FloatArray, threshold: float = CHI2_95
+) -> tuple[float, float]:
+    """Ends of the set of dead times with an excess below the threshold (default: 95 %)."""
+    inside = np.flatnonzero(excess <= threshold)
+    first, last = int(inside[0]), int(inside[-1])
+    root = np.sqrt(np.maximum(excess, 0.0))
+    edge = float(np.sqrt(threshold))
+    low = float(dead_time[0])
+    if first > 0:
+        low = float(np.interp(edge, root[[first, first - 1]], dead_time[[first, first - 1]]))
+    high = float(dead_time[-1])
+    if last < dead_time.size - 1:
+        high = float(np.interp(edge, root[[last, last + 1]], dead_time[[last, last + 1]]))
+    return low, high

@@ -142,6 +142,19 @@ class LocalErrors:
     own: FloatArray
     tangent: FloatArray | None = None
 
+    def covariance(self) -> FloatArray:
+        """Covariance (p, p) of dead time, pole parameters, numerator, for noise of variance 1."""
+        columns = np.concatenate([self.slopes, self.own], axis=1)
+        size = np.linalg.norm(columns, axis=0)
+        size[size == 0] = 1.0
+        _, singular, turned = np.linalg.svd(columns / size, full_matrices=False)
+        singular = np.maximum(singular, max(_NOTHING * singular[0], SMALLEST))
+        count = self.slopes.shape[1]
+        root = (turned / singular[:, None])[:, :count] / size[:count]
+        if self.tangent is not None:
+            root = root @ self.tangent.T
+        return np.asarray(root.T @ root)
+
     def std(self, gradient: FloatArray, variance: float) -> FloatArray:
         """Standard errors (k,) of functions with these gradients (k, p), by the delta method.
 

@@ -28,7 +28,7 @@ from scipy.optimize import brentq
 from ..arrays import FloatArray
 from ..constants import CHI2_95, Z_95
 from ..engine.problem import Bounds, Problem
-from ..engine.profile_ends import root_of
+from ..engine.profile import root_of
 from ..engine.structures import Candidate, Scales
 from .form_fit import FormFamily, form_family
 from .physical import ProcessParameter

@@ -26,7 +26,7 @@ import numpy as np
 from ..constants import VERY_STRONG
 from ..engine.descend import descend
 from ..engine.problem import Structure
-from ..engine.profile_ends import profile_limits
+from ..engine.profile import profile_limits
 from ..engine.structures import LEAST_CHARGE, Candidate, parameter_bounds
 from ..engine.window_fit import WindowFit
 

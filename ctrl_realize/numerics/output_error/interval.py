@@ -23,8 +23,7 @@ from dataclasses import dataclass, replace
 
 from ..constants import VERY_STRONG, Z_95
 from ..engine.problem import Structure
-from ..engine.profile import Points
-from ..engine.profile_ends import profile_limits
+from ..engine.profile import Points, profile_limits
 from ..engine.structures import LEAST_CHARGE, Scales, charged, plausible
 from ..engine.window_fit import WindowFit
 from ..families.equal_lags import (

@@ -16,7 +16,7 @@ from dataclasses import dataclass, field, replace
 from ..constants import VERY_STRONG
 from ..engine.compared_fits import SLACK, converged, on_new_data, settled
 from ..engine.problem import KnownFactor, Structure
-from ..engine.profile_ends import profile_limits
+from ..engine.profile import profile_limits
 from ..engine.structures import (
     ALL_STRUCTURES,
     LEAST_CHARGE,

@@ -19,8 +19,15 @@ import numpy as np
 from ..arrays import FloatArray
 from ..engine.compared_fits import settled
 from ..engine.problem import Structure
-from ..engine.profile import Points, dead_time_profile, profile_curve, profile_points, with_ends
-from ..engine.profile_ends import bracket_ends, profile_limits
+from ..engine.profile import (
+    Points,
+    bracket_ends,
+    dead_time_profile,
+    profile_curve,
+    profile_limits,
+    profile_points,
+    with_ends,
+)
 from ..engine.structures import Candidate
 from ..engine.window_fit import WindowFit
 

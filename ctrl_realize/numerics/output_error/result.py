@@ -18,9 +18,10 @@ import numpy as np
 from ..arrays import ComplexArray, FloatArray
 from ..engine.eliminate import eliminate, evaluate
 from ..engine.modal import respond
+from ..engine.plausible_models import PlausibleModel, plausible_models
 from ..engine.poles import lag_sum
 from ..engine.problem import Structure
-from ..engine.profile_ends import profile_limits
+from ..engine.profile import profile_limits
 from ..engine.static_gain import StaticGain, averaged_ends
 from ..engine.structures import Candidate, Scales, needless_parameters
 from ..engine.window_fit import WindowFit
@@ -208,7 +209,8 @@ class OutputErrorEstimate:
     each with its evidence over the model's. `others` is None if no structures were requested;
     `close` are decisions that rounding errors may reverse. `unweighted` is the model of
     plain least squares, if the residual was whitened. `load` is a step of a load; it is part
-    of the model unless it is early.
+    of the model unless it is early. `plausible` are models that the data do not rule out, all
+    equally likely.
     """
 
     dead_time: float
@@ -235,6 +237,7 @@ class OutputErrorEstimate:
     close: tuple[CloseDecision, ...] = ()
     unweighted: UnweightedModel | None = None
     load: LoadStep | None = None
+    plausible: tuple[PlausibleModel, ...] = ()
 
     @property
     def robust(self) -> bool:
@@ -326,9 +329,10 @@ def assembled(
     static = static or fits.static(chosen)
     charged = {s: fits.criterion[s] + needless_parameters(s) for s in profiles}
     least = charged.get(chosen.structure, np.inf)
+    evidence = {s: float(np.exp(-max(value - least, 0.0) / 2)) for s, value in charged.items()}
     alike = [
-        (fits.static(fits.candidates[s]), float(np.exp(-max(value - least, 0.0) / 2)))
-        for s, value in charged.items()
+        (fits.static(fits.candidates[s]), weight)
+        for s, weight in evidence.items()
         if s != chosen.structure
     ]
     return OutputErrorEstimate(
@@ -352,4 +356,5 @@ def assembled(
         static=static,
         alike=tuple((other, weight) for other, weight in alike if other.resolved),
         process=process,
+        plausible=plausible_models(fits, evidence, fits.candidates | {chosen.structure: chosen}),
     )

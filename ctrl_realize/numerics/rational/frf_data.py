@@ -29,8 +29,7 @@ from ..engine.eliminate import evaluate
 from ..engine.modal import partial_fractions
 from ..engine.poles import poles_from_parameters
 from ..engine.problem import Bounds, Evaluation, KnownFactor, Problem, Structure
-from ..engine.profile import Points, profile_curve, with_ends
-from ..engine.profile_ends import bracket_ends, profile_limits
+from ..engine.profile import Points, bracket_ends, profile_curve, profile_limits, with_ends
 from ..engine.structures import Candidate, Scales, parameter_bounds
 from ..signals.sines import Sines, stacked_parts
 

@@ -13,8 +13,7 @@ from ctrl_realize.numerics.engine.eliminate import evaluate
 from ctrl_realize.numerics.engine.newton import settle, solve_level
 from ctrl_realize.numerics.engine.poles import parameters_from_poles
 from ctrl_realize.numerics.engine.problem import KnownFactor, Structure
-from ctrl_realize.numerics.engine.profile import dead_time_error, dead_time_profile
-from ctrl_realize.numerics.engine.profile_ends import profile_limits
+from ctrl_realize.numerics.engine.profile import dead_time_error, dead_time_profile, profile_limits
 from ctrl_realize.numerics.engine.structures import Candidate, parameter_bounds, search
 from ctrl_realize.numerics.output_error.step_data import step_data, step_scales, window
 

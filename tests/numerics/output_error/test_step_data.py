@@ -7,7 +7,7 @@ from scipy.signal import lfilter
 
 from ctrl_realize.numerics.engine.local_terms import local_columns
 from ctrl_realize.numerics.engine.problem import KnownFactor
-from ctrl_realize.numerics.engine.profile_ends import profile_limits
+from ctrl_realize.numerics.engine.profile import profile_limits
 from ctrl_realize.numerics.engine.responses import SampledInput
 from ctrl_realize.numerics.output_error.any_input.condensed import MOST_LAGS, condensed
 from ctrl_realize.numerics.output_error.step_data import (

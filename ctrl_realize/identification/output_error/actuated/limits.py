@@ -70,15 +70,23 @@ def fit_within_limits(record: Record, fit: Fit, *, may_clip: bool = True) -> Out
         flags = tuple(_at_limit(*end, left_out=False) for end in at_limit(np.ravel(record.output)))
     if flags or not may_clip:
         return replace(found, flags=found.flags + flags)
-    return _without_plateaus(record, found, fit) or found
+    return _without_plateaus(record, found, fit)
 
 
-def _without_plateaus(record: Record, linear: OutputErrorFit, fit: Fit) -> OutputErrorFit | None:
-    """Fit a record without plateaus, if that and a limit explain it better than a linear plant."""
+def _without_plateaus(record: Record, linear: OutputErrorFit, fit: Fit) -> OutputErrorFit:
+    """Fit a record without plateaus, if that and a limit explain it better than a linear plant.
+
+    If they do not, a plateau is told all the same: in noise a response that a limit ends looks like
+    one that settles.
+    """
     output = np.ravel(record.output)
     held = plateaus(output, [edge for edge, _ in linear.data.edges])
-    if np.count_nonzero(record.seen & ~held) < FEWEST_SAMPLES or not held.any():
-        return None
+    if not held.any():
+        return linear
+    doubt = flagged("may_be_at_limit", limits=_levels(output, held))
+    linear = replace(linear, flags=(*linear.flags, doubt))
+    if np.count_nonzero(record.seen & ~held) < FEWEST_SAMPLES:
+        return linear
     rows = np.round((linear.time - record.time[0]) / record.dt).astype(np.int64)
     try:
         found = fit(_without(record, held))
@@ -89,9 +97,9 @@ def _without_plateaus(record: Record, linear: OutputErrorFit, fit: Fit) -> Outpu
             found = fit(_without(record, held))
             beyond = _simulated(found)
     except (DataError, UnsuitableSystemError):
-        return None
+        return linear
     if not clips(output[rows], linear.fitted, beyond[rows], held[rows]):
-        return None
+        return linear
     count, levels = np.count_nonzero(held), _levels(output, held)
     flag = flagged("output_at_limit.plateau", count=count, limits=levels)
     return replace(found, flags=(*found.flags, flag))

@@ -1,0 +1,1 @@
+"""How often each verdict of a fit is right, on simulated plants whose truth is known."""

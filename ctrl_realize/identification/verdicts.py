@@ -1,0 +1,153 @@
+"""One verdict for each question: is the dead time known, the gain, and is the model fit for tuning?
+
+What a verdict looks at are widths of intervals, the sensitivity of a loop over all models that the
+data do not rule out, and the flags that go with wrong answers. How often each is right is measured
+in `benchmarks.verdicts`, on other records than those by which the limits were chosen.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import Literal, TypeAlias
+
+import numpy as np
+
+from .._flags import Flag, marked
+from .._wording import in_time, interval_in_time, plainly
+from ..numerics.engine.plausible_models import PlausibleModel
+from ..numerics.loops.reference import (
+    controller_response,
+    grid,
+    largest_sensitivity,
+    model_response,
+    robust_pi,
+)
+from ..results import FractionalDelayFit
+
+Level: TypeAlias = Literal["good", "with care", "no"]
+Question: TypeAlias = Literal["dead time", "gain", "tuning"]
+LEVELS: tuple[Level, ...] = ("good", "with care", "no")
+
+_NARROW, _FEW, _OF_TOTAL = 0.4, 2.0, 0.1
+"""Width of the interval of a dead time that is well known: parts of the visible onset, samples, or
+parts of the total delay, beside which it does not matter."""
+_CLOSE, _ROUGH = 0.05, 0.25
+"""Half width of the interval of a gain that is well known, and of one that is, in parts of it."""
+_ROBUST, _TOO_MUCH = 2.0, 4.0
+"""Ms up to which a loop is robust (gain margin 2, phase margin 29 deg), and up to which it works
+at all (1.3 and 14 deg)."""
+_MARKS = ("dead_time", "gain", "tuning")
+"""Questions in the marks of flags."""
+_SELDOM = 1
+"""Of the 39 models, those that may be worse: one of twenty (2 / 40) is at least as bad."""
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """Answer to one question about a model.
+
+    Attributes
+    ----------
+    question : {"dead time", "gain", "tuning"}
+    level : {"good", "with care", "no"}
+    sentence : str
+        The reason, with its number.
+    number : float
+        Width of the dead time's interval in s; half width of the gain's in parts of the gain;
+        largest sensitivity Ms of a PI over the plausible models.
+
+    Examples
+    --------
+    >>> import ctrl_realize as cr
+    >>> fit = cr.identify(cr.bench.valve().step_record(16, rng=5)).fit
+    >>> for verdict in fit.verdicts:
+    ...     print(verdict)
+    dead time: good (known to 12.6 ms, 24.8 to 37.4 ms)
+    gain: good (known to 0.0058 %)
+    tuning: good (a PI has Ms 1.49 on the model, at most 1.49 on models that fit as well)
+    """
+
+    question: Question
+    level: Level
+    sentence: str
+    number: float
+
+    def __str__(self) -> str:
+        return f"{self.question}: {self.level} ({self.sentence})"
+
+
+def verdicts(
+    fit: FractionalDelayFit, model: PlausibleModel, others: Sequence[PlausibleModel]
+) -> tuple[Verdict, ...]:
+    """Judge dead time, gain and fitness for tuning of a fit.
+
+    Parameters
+    ----------
+    fit : FractionalDelayFit
+        With interval, gain, total delay and flags.
+    model : PlausibleModel
+        Its model; integrators have poles of exactly 0.
+    others : sequence of PlausibleModel
+        Models that the data do not rule out.
+    """
+    return _dead_time(fit), _gain(fit), _tuning(fit, model, others)
+
+
+def in_doubt(flag: Flag) -> bool:
+    """Whether a flag goes with wrong answers to any of the questions; otherwise it is a note."""
+    return any(flag.code in marked(f"{how}_{what}") for how in ("doubts", "no") for what in _MARKS)
+
+
+def _level(flags: Iterable[Flag], question: str, good: bool, some: bool) -> tuple[Level, str]:
+    """Lower what the numbers say where a flag goes with wrong answers; name the first that does."""
+    level: Level = "good" if good else "with care" if some else "no"
+    for mark, worst in ((f"no_{question}", "no"), (f"doubts_{question}", "with care")):
+        for flag in flags:
+            if flag.code in marked(mark):
+                lowered: Level = "no" if worst == "no" else "with care"
+                return max(level, lowered, key=LEVELS.index), flag.code.replace("_", " ")
+    return level, ""
+
+
+def _dead_time(fit: FractionalDelayFit) -> Verdict:
+    low, high = fit.interval
+    width, least = high - low, _FEW * fit.dt
+    if fit.onset is not None and np.isfinite(fit.onset):
+        least = max(least, _NARROW * fit.onset)
+    if fit.total_delay is not None and np.isfinite(fit.total_delay_interval or np.inf).all():
+        least = max(least, _OF_TOTAL * fit.total_delay)
+    level, why = _level(fit.flags, "dead_time", width <= least, some=True)
+    said = f"known to {in_time(width)}, {interval_in_time(low, high)}"
+    if low == 0 and width > least:
+        said = f"{interval_in_time(low, high)}, dead time or short lags: the record cannot tell"
+    return Verdict("dead time", level, _because(said, why), width)
+
+
+def _gain(fit: FractionalDelayFit) -> Verdict:
+    gain, (low, high) = fit.gain, fit.gain_interval or (-np.inf, np.inf)
+    half = max(high - gain, gain - low) / abs(gain) if gain else np.inf
+    some = half <= _ROUGH and (low > 0 or high < 0)
+    level, why = _level(fit.flags, "gain", half <= _CLOSE, some)
+    said = f"known to {plainly(100 * half, 2)} %" if np.isfinite(half) else "not determined"
+    return Verdict("gain", level, _because(said, why), float(half))
+
+
+def _tuning(
+    fit: FractionalDelayFit, model: PlausibleModel, others: Sequence[PlausibleModel]
+) -> Verdict:
+    if np.sum(model.poles == 0) > 1 or not fit.gain:
+        return Verdict("tuning", "no", "no rule for such a plant", float("inf"))
+    omega = grid(model, fit.dt)
+    controller = controller_response(*robust_pi(model, fit.dt), omega, fit.dt)
+    responses = np.stack([model_response(one, omega) for one in (model, *others)])
+    own, *found = largest_sensitivity(controller * responses)
+    worst = float(np.sort(found)[-1 - _SELDOM])
+    level, why = _level(fit.flags, "tuning", worst <= _ROBUST, worst <= _TOO_MUCH)
+    there = f"at most {worst:.3g}" if np.isfinite(worst) else "is unstable"
+    said = f"a PI has Ms {own:.3g} on the model, {there} on models that fit as well"
+    return Verdict("tuning", level, _because(said, why), worst)
+
+
+def _because(said: str, why: str) -> str:
+    return f"{said}; {why}" if why else said

@@ -1,0 +1,177 @@
+"""Draw models that the data do not rule out: of every such structure, and about its best fit.
+
+A structure is drawn with its evidence [1]_. Dead time and poles about its best fit are drawn from
+the normal distribution of their errors and resampled by their likelihood (sampling importance
+resampling [2]_), or moved by it where few of them are likely [3]_, so that they follow a curved
+valley of the misfit; the numerator is then drawn given these.
+
+References
+----------
+.. [1] K. P. Burnham and D. R. Anderson, Model Selection and Multimodel Inference, 2nd ed., Springer
+   2002, chapter 4 (Multimodel inference), doi:10.1007/b97636.
+.. [2] D. B. Rubin, Using the SIR algorithm to simulate posterior distributions, in: Bayesian
+   Statistics 3, Oxford University Press 1988, 395-402.
+.. [3] J. Goodman and J. Weare, Ensemble samplers with affine invariance, Comm. Appl. Math. Comp.
+   Sci. 5 (2010) 65-80, doi:10.2140/camcos.2010.5.65.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import NamedTuple
+
+import numpy as np
+
+from ..arrays import ComplexArray, FloatArray
+from ..constants import SMALLEST
+from .eliminate import eliminate
+from .poles import poles_from_parameters
+from .problem import Bounds, Family, Structure
+from .static_gain import LocalErrors, local_errors
+from .structures import Candidate, parameter_bounds
+from .window_fit import WindowFit
+
+COUNT = 39
+"""Models that are drawn: a further one lies between the extremes of 39 with 95 % (2 / 40 on both
+sides together)."""
+_TEMPERED = 0.5
+"""Power of the evidence with which a structure is drawn: the criterion says too surely which one of
+two is right (five lags: a further one is seldom seen). Measured as below."""
+_CALIBRATED = 1.5
+"""Variance of the models over that of the errors at a given structure, so that their envelope holds
+the true response as often as it says. Measured: `benchmarks.verdicts`, seeds below 100."""
+_WIDER = 1.5  # standard deviations of the proposals, over those of the errors: tails are seen
+_PROPOSED = 16  # for each model that is drawn
+_EFFECTIVE = 0.7  # independent proposals for each, in effect, below which they are moved instead
+_SWEEPS = 25  # of these moves
+_WIDEST = (
+    1.5  # of the logarithm of a pole, as a standard deviation: a factor of twenty on each side
+)
+
+
+class PlausibleModel(NamedTuple):
+    """Model exp(-L s) b(s) / a(s): dead time L in s, poles (n,), numerator, lowest power first."""
+
+    dead_time: float
+    poles: ComplexArray
+    numerator: FloatArray
+
+
+def plausible_models(
+    fits: WindowFit, evidence: Mapping[Structure, float], best: Mapping[Structure, Candidate]
+) -> tuple[PlausibleModel, ...]:
+    """Draw `COUNT` equally likely models; the same for the same data.
+
+    Parameters
+    ----------
+    fits : WindowFit
+    evidence : mapping of Structure to float
+        Of the structures that are not ruled out, on any scale.
+    best : mapping of Structure to Candidate
+        The fit of each.
+    """
+    rng = np.random.default_rng(COUNT)
+    weights = np.array(list(evidence.values())) ** _TEMPERED
+    counts = _counts(weights / weights.sum(), COUNT)
+    models: list[PlausibleModel] = []
+    for structure, count in zip(evidence, counts, strict=True):
+        if count:
+            models += _about(fits, best[structure], int(count), rng)
+    return tuple(models)
+
+
+def _counts(shares: FloatArray, count: int) -> FloatArray:
+    """Draws of each, by systematic resampling: within one of what is expected."""
+    ends = np.round(np.cumsum(shares) * count - 1e-9)
+    return np.diff(ends, prepend=0.0)
+
+
+def _about(
+    fits: WindowFit, candidate: Candidate, count: int, rng: np.random.Generator
+) -> list[PlausibleModel]:
+    """Draw models of the structure of a fit."""
+    problem, scales = fits.problem, fits.scales
+    structure, theta = candidate.structure, candidate.theta
+    numerator = eliminate(problem, structure, candidate.parameters[None]).numerator[0]
+    errors = local_errors(problem, candidate, numerator, scales.length)
+    variance = max(_CALIBRATED * fits.error_variance, SMALLEST)
+    covariance = variance * errors.covariance()
+    n, free = theta.size, numerator.size
+    if isinstance(structure, Family):
+        drawn = _normal(covariance, np.full(n + free, np.inf), count, rng) + np.r_[theta, numerator]
+        drawn[:, 0] = np.clip(drawn[:, 0], scales.earliest, scales.latest)
+        return [_model(row[:n], row[n:]) for row in drawn]
+    bounds = parameter_bounds(structure, scales)
+    widest = np.full(n, _WIDEST)
+    widest[0] = 0.5 * (scales.latest - scales.earliest)
+    rows = _WIDER * _directions(covariance[:n, :n], widest)
+
+    def likelihood(at: FloatArray) -> FloatArray:
+        cost = eliminate(problem, structure, at).cost
+        return np.asarray(-0.5 * (cost - candidate.cost) / variance)
+
+    moves = rng.standard_normal((_PROPOSED * count, n))
+    tried = np.clip(theta + moves @ rows, bounds.low, bounds.high)
+    value = likelihood(tried)
+    weight = value + 0.5 * np.sum(moves**2, axis=1)
+    weight = np.exp(weight - weight.max())
+    if np.sum(weight) ** 2 < _EFFECTIVE * count * np.sum(weight**2):
+        first = np.argsort(value)[-max(count, 2 * n + 2) :]
+        drawn = _stretched(likelihood, bounds, tried[first], value[first], rng)[-count:]
+    else:
+        places = (np.arange(count) + rng.random()) / count * weight.sum()
+        drawn = tried[np.searchsorted(np.cumsum(weight), places).clip(0, len(tried) - 1)]
+    there = eliminate(problem, structure, drawn).numerator
+    # The error of the numerator beside given poles, in gain: it grows with their product.
+    given = variance * LocalErrors(errors.slopes[:, n:], errors.own).covariance()
+    beside = _normal(given, np.full(free, np.inf), count, rng)
+    own = np.prod(np.abs(candidate.poles))
+    scale = np.prod(np.abs(poles_from_parameters(drawn[:, 1:])[0]), axis=1) / own
+    return [_model(*pair) for pair in zip(drawn, there + scale[:, None] * beside, strict=True)]
+
+
+def _stretched(
+    likelihood: Callable[[FloatArray], FloatArray],
+    bounds: Bounds,
+    walkers: FloatArray,
+    value: FloatArray,
+    rng: np.random.Generator,
+) -> FloatArray:
+    """Move walkers (B, n) by stretches along lines through others [3]_, whatever their shape."""
+    half, n = len(walkers) // 2, walkers.shape[1]
+    for turn in range(2 * _SWEEPS):
+        moved, others = slice(0, half), walkers[half:]
+        if turn % 2:
+            moved, others = slice(half, None), walkers[:half]
+        count = len(walkers[moved])
+        # The density of [3]_, 1 / sqrt(z) between 1 / a and a, with a = 2.
+        z = (1 + rng.random(count)) ** 2 / 2
+        centre = others[rng.integers(len(others), size=count)]
+        tried = centre + z[:, None] * (walkers[moved] - centre)
+        inside = np.all((tried >= bounds.low) & (tried <= bounds.high), axis=1)
+        there = np.where(inside, likelihood(np.clip(tried, bounds.low, bounds.high)), -np.inf)
+        taken = np.log(rng.random(count)) < (n - 1) * np.log(z) + there - value[moved]
+        walkers[moved] = np.where(taken[:, None], tried, walkers[moved])
+        value[moved] = np.where(taken, there, value[moved])
+    return walkers
+
+
+def _model(theta: FloatArray, numerator: FloatArray) -> PlausibleModel:
+    return PlausibleModel(float(theta[0]), poles_from_parameters(theta[None, 1:])[0][0], numerator)
+
+
+def _directions(covariance: FloatArray, widest: FloatArray) -> FloatArray:
+    """Rows (p, p) whose squares are a covariance, none longer than the widest deviations."""
+    scale = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+    scale[scale == 0] = 1.0
+    values, vectors = np.linalg.eigh(covariance / scale / scale[:, None])
+    rows = np.sqrt(np.maximum(values, 0.0))[:, None] * vectors.T * scale
+    longest = np.max(np.abs(rows) / widest, axis=1)
+    return np.asarray(rows / np.maximum(longest, 1.0)[:, None])
+
+
+def _normal(
+    covariance: FloatArray, widest: FloatArray, count: int, rng: np.random.Generator
+) -> FloatArray:
+    rows = _directions(covariance, widest)
+    return np.asarray(rng.standard_normal((count, len(rows))) @ rows)

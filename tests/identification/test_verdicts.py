@@ -1,0 +1,63 @@
+"""Verdicts on dead time, gain and tuning: right where the truth is known, and said everywhere."""
+
+import numpy as np
+import pytest
+
+import ctrl_realize as cr
+from tests import rigs
+
+
+def levels(fit):
+    return {verdict.question: verdict.level for verdict in fit.verdicts}
+
+
+@pytest.fixture(scope="module")
+def well():
+    record = rigs.step_record(rigs.R1, before=300, after=900, dt=0.02, delay=20, noise=0.01, seed=1)
+    return cr.fit_output_error(record)
+
+
+def test_a_record_that_tells_all_is_good_in_all(well):
+    assert set(levels(well.fit).values()) == {"good"}
+
+
+def test_the_numbers_of_verdicts_are_those_of_the_fit(well):
+    dead_time, gain, tuning = well.fit.verdicts
+    low, high = well.fit.interval
+    assert dead_time.number == pytest.approx(high - low)
+    low, high = np.array(well.fit.gain_interval) / well.fit.gain
+    assert gain.number == pytest.approx(max(1 - low, high - 1))
+    assert 1 < tuning.number <= 2
+
+
+def test_the_card_says_the_verdicts(well):
+    for verdict in well.fit.verdicts:
+        assert f"{verdict.level}: {verdict.sentence}" in well.fit.report()
+
+
+def test_a_record_that_ends_in_the_rise_does_not_tell_the_gain():
+    # 40 % of the response of a lag of 0.8 s
+    rng = np.random.default_rng(4)
+    t = 0.02 * np.arange(345)
+    y = np.where(t < 6.4, 0.0, -np.expm1(-(t - 6.4) / 0.8)) + 0.02 * rng.standard_normal(t.size)
+    fit = cr.fit_output_error(cr.Record(t, (t >= 6.0) * 1.0, y)).fit
+    assert levels(fit)["gain"] != "good"
+
+
+def test_what_two_lags_leave_open_is_no_matter_for_a_controller():
+    # the dead time may be lag: each is open, and every split has a robust loop
+    record = rigs.step_record(rigs.R2, before=300, after=900, dt=0.02, delay=5, noise=0.03, seed=2)
+    fit = cr.fit_output_error(record).fit
+    assert levels(fit)["dead time"] == "with care"
+    assert levels(fit)["tuning"] == "good"
+
+
+def test_flags_that_do_not_go_with_wrong_answers_are_notes():
+    rng = np.random.default_rng(4)
+    t = 0.02 * np.arange(900)
+    y = np.where(t < 6.4, 0.0, -np.expm1(-(t - 6.4) / 0.8)) + 0.004 * rng.standard_normal(t.size)
+    y[[120, 500, 730]] += 0.4
+    fit = cr.fit_output_error(cr.Record(t, (t >= 6.0) * 1.0, y)).fit
+    assert "outliers" in {flag.code for flag in fit.flags}
+    assert "  - note: " in fit.report()
+    assert "  ! " not in fit.report()

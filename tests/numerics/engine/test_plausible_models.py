@@ -1,0 +1,48 @@
+"""Models that the data do not rule out: as far apart as their errors, and as likely as they say."""
+
+import numpy as np
+import pytest
+
+import ctrl_realize as cr
+from ctrl_realize.numerics.engine.plausible_models import COUNT
+from tests import rigs
+
+DT = 0.02
+
+
+def fit_of(plant, **options):
+    record = rigs.step_record(plant, before=300, after=900, dt=DT, delay=20.3, noise=0.01, seed=3)
+    return cr.fit_output_error(record, **options).fit
+
+
+def gain(one):
+    return float(np.real(one.numerator[0] / np.prod(-one.poles)))
+
+
+def test_models_of_one_structure_scatter_by_its_standard_errors():
+    fit = fit_of(rigs.R1, structures=[(1, 1)])
+    models = fit.estimate.plausible
+    assert len(models) == COUNT
+    # the variance is calibrated to 1.5 times that of the errors; the standard deviation of 39
+    # values has a standard error of 11 %
+    for values, std in (
+        ([one.dead_time for one in models], fit.std_given_structure),
+        ([gain(one) for one in models], fit.gain_std_given_structure),
+    ):
+        assert np.std(values) == pytest.approx(np.sqrt(1.5) * std, rel=0.35)
+    assert np.mean([gain(one) for one in models]) == pytest.approx(fit.gain, rel=0.01)
+
+
+def test_models_follow_a_curved_valley_of_the_misfit():
+    # dead time and a fast lag replace one another: their sum is known far better than each
+    fit = fit_of(rigs.R2, structures=[(2, 2), (3, 3)])
+    models = fit.estimate.plausible
+    total = [one.dead_time + float(np.sum(-1 / one.poles).real) for one in models]
+    assert np.std(total) < 0.5 * np.std([one.dead_time for one in models])
+    inside = [fit.interval[0] <= one.dead_time <= fit.interval[1] for one in models]
+    assert np.mean(inside) >= 0.8
+
+
+def test_the_same_data_give_the_same_models():
+    first, again = (fit_of(rigs.R1, structures=[(1, 1)]).estimate.plausible for _ in range(2))
+    assert [one.dead_time for one in first] == [one.dead_time for one in again]
