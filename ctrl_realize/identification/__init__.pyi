@@ -11,6 +11,7 @@ from .output_error.actuated.result import ActuatorFit as ActuatorFit
 from .output_error.fit import fit_output_error as fit_output_error
 from .output_error.record_gains import RecordGains as RecordGains
 from .output_error.result import OutputErrorFit as OutputErrorFit
+from .plausible import PlausibleModels as PlausibleModels
 from .process_structures import ProcessStructure as ProcessStructure
 from .realization.delay_scan import estimate_delay as estimate_delay
 from .realization.delay_scan_result import DelayScan as DelayScan

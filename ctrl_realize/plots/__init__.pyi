@@ -28,6 +28,7 @@ from .responses import impulse_plot as impulse_plot
 from .responses import mimo_realization_plot as mimo_realization_plot
 from .responses import system_plot as system_plot
 from .robustness import delay_robustness_plot as delay_robustness_plot
+from .robustness import plausible_plot as plausible_plot
 from .robustness import robustness_plot as robustness_plot
 from .robustness import uncertainty_plot as uncertainty_plot
 from .scans import delay_plot as delay_plot

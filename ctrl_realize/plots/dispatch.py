@@ -25,7 +25,7 @@ from .loops import margins_plot
 from .records import record_plot, step_plot
 from .residuals import model_comparison_plot, prediction_plot, residual_plot, state_space_fit_plot
 from .responses import impulse_estimate_plot, impulse_plot, mimo_realization_plot, system_plot
-from .robustness import delay_robustness_plot, robustness_plot, uncertainty_plot
+from .robustness import delay_robustness_plot, plausible_plot, robustness_plot, uncertainty_plot
 from .scans import delay_plot, order_plot, singular_value_plot
 from .shared_docs import documented
 from .tuning import hankel_plot, pid_comparison_plot, process_model_plot
@@ -97,6 +97,7 @@ for _plot in (
     model_comparison_plot,
     order_plot,
     pid_comparison_plot,
+    plausible_plot,
     prediction_plot,
     process_model_plot,
     record_plot,

@@ -11,10 +11,15 @@ from matplotlib.lines import Line2D
 
 from ..design.loops.delay_robustness_result import DelayRobustness
 from ..design.loops.robust_stability import RobustnessCheck, UncertaintyBound
+from ..identification.plausible import PlausibleModels
 from ..numerics.arrays import FloatArray
+from ..numerics.constants import SMALLEST
 from . import style
 from .shared_docs import documented
-from .style import HERTZ, axis_time_unit
+from .style import HERTZ, axis_time_unit, decibel, frequency_axis
+
+_LAGS_SHOWN = 6.0  # longest lags that are shown of a step response
+_FEWEST_SHOWN, _MOST_SHOWN = 50, 2000  # samples
 
 
 @documented()
@@ -54,6 +59,54 @@ def delay_robustness_plot(
         axes.set(xlabel=f"dead time of the plant [{unit}]", ylabel="modulus margin")
         axes.set_ylim(bottom=0)
         return style.finished([axes], [lines], loc="lower right")
+
+
+@documented("sequence of three Axes")
+def plausible_plot(
+    models: PlausibleModels, *, ax: style.AxesLike = None, title: str | None = None
+) -> ct.ControlPlot:
+    """Draw the band of models that the data do not rule out: step response, gain and phase.
+
+    Parameters
+    ----------
+    models : PlausibleModels
+
+    Examples
+    --------
+    >>> import ctrl_realize as cr
+    >>> models = cr.identify(cr.bench.valve().step_record(16, rng=5)).fit.plausible_models
+    >>> cplt = cr.plots.plausible_plot(models)
+    >>> [axes.get_ylabel() for axes in cplt.figure.axes]
+    ['step response', 'gain [dB]', 'phase [deg]']
+    """
+    longest = max(
+        one.dead_time + _LAGS_SHOWN * float(np.max(1 / np.maximum(-one.poles.real, SMALLEST)))
+        for one in models.models[:1]
+    )
+    count = int(np.clip(longest / models.dt, _FEWEST_SHOWN, _MOST_SHOWN))
+    steps = np.stack([system.step(count) for system in models.systems])
+    omega = np.geomspace(0.05 / longest, np.pi / models.dt, 400)
+    responses = models.frequency_response(omega)
+    rows = (steps, decibel(np.abs(responses)), np.degrees(np.unwrap(np.angle(responses))))
+    with style.canvas(
+        ax, 3, title=title, default_title="Models that the data do not rule out", size=(8.0, 8.0),
+        sharex=False,
+    ) as axes:  # fmt: skip
+        factor, unit = axis_time_unit(longest, axes[0])
+        across = (factor * models.dt * np.arange(count), *[omega / (2 * np.pi)] * 2)
+        lines = []
+        for one, x, values in zip(axes, across, rows, strict=True):
+            one.fill_between(
+                x, values.min(axis=0), values.max(axis=0), color=style.BAND, alpha=0.35
+            )
+            middle = np.median(values, axis=0)
+            lines.append(one.plot(x, middle, color=style.MODEL, label="median and extremes"))
+        axes[0].set(xlabel=f"time [{unit}]", ylabel="step response")
+        axes[1].set_ylabel("gain [dB]")
+        axes[2].set_ylabel("phase [deg]")
+        for one in axes[1:]:
+            frequency_axis(one)
+        return style.finished(axes, lines, loc="lower right")
 
 
 @documented()

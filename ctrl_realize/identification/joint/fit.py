@@ -35,8 +35,9 @@ from ..output_error.any_input import joined
 from ..output_error.fit import fit_output_error
 from ..output_error.repeat_flags import BY_CHANCE
 from ..output_error.result import OutputErrorFit
-from ..output_error.summary import fitted_core, fitted_model
+from ..output_error.summary import fitted_model
 from ..output_error.words import order_words
+from ..plausible import continuous_core
 from ..process_structures import Structures, plain_pairs
 from .flags import joint_flags
 from .result import JointFit
@@ -177,7 +178,7 @@ def fit_joint(
         choices=tuple(_choices(estimate, first, other, spread)),
     )
     result = replace(result, flags=joint_flags(result, latest))
-    return fitted_model(fitted_core(estimate, result.poles), result)
+    return fitted_model(continuous_core(estimate.numerator, result.poles), result)
 
 
 def _records(

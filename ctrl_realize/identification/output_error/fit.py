@@ -24,6 +24,7 @@ from ...numerics.output_error.step_data import StepData
 from ...numerics.output_error.step_fit import fit_step_record
 from ...numerics.validation.own_response import OwnResponse
 from ...results import Flag
+from ..plausible import continuous_core
 from ..process_structures import Structures, requested
 from .actuated.alternatives import ASKED, Asked
 from .actuated.fit import with_actuator
@@ -44,7 +45,7 @@ from .own_gains import fit_own_gains
 from .repeat_flags import repeat_flags, same_record_flags
 from .repeatability import delay_outliers, fit_alike, unlike_records
 from .result import OutputErrorFit
-from .summary import choices_of, fitted_core, fitted_model
+from .summary import choices_of, fitted_model
 
 Loss = Literal["huber", "least_squares"]
 Noise = Literal["auto", "white"]
@@ -243,7 +244,7 @@ def fit_output_error(
         result = with_actuator(result, actuator, tried.structures)
         if result.actuator is None:
             raise
-    core = fitted_core(result.estimate, result.poles)
+    core = continuous_core(result.estimate.numerator, result.poles)
     if include_known and known is not None:
         core = ct.ss(known) * core
     return fitted_model(core, result)

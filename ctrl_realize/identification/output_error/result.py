@@ -24,6 +24,7 @@ from ...numerics.output_error.result import OutputErrorEstimate, StructureFit
 from ...numerics.output_error.step_data import StepData
 from ...numerics.signals.correlation import fit_percent
 from ...results import Flag, FractionalDelayFit, IntervalKind
+from ..plausible import PlausibleModels
 from ..process_parameters import jump, not_seen_in_words, told, with_intervals
 from ..verdicts import Verdict, in_doubt, verdicts
 from .actuated.result import ActuatorFit
@@ -350,6 +351,11 @@ class OutputErrorFit(FractionalDelayFit):
 
     def _notes(self) -> list[str]:
         return [str(flag) for flag in self.flags if in_doubt(flag)]
+
+    @property
+    def plausible_models(self) -> PlausibleModels:
+        """Models that the data do not rule out, for design and for bands of responses."""
+        return PlausibleModels(self.estimate.plausible, self.dt)
 
     @property
     def verdicts(self) -> tuple[Verdict, ...]:

@@ -9,7 +9,6 @@ import numpy as np
 
 from ..._wording import chosen, interval_in_time
 from ...delayed import DelayedStateSpace, delayed_ss
-from ...numerics.arrays import ComplexArray
 from ...numerics.output_error.result import OutputErrorEstimate
 from .result import FOLLOWED_LESS, OutputErrorFit
 from .words import form_words, model_words, order_words
@@ -27,21 +26,6 @@ def fitted_model(core: ct.StateSpace, result: OutputErrorFit) -> DelayedStateSpa
         inputs=list(first.input_labels),
         outputs=list(first.output_labels),
     )
-
-
-def fitted_core(fit: OutputErrorEstimate, poles: ComplexArray) -> ct.StateSpace:
-    """Companion form of b(s)/a(s), in a time unit that makes its entries comparable."""
-    n = poles.size
-    moving = np.abs(poles[poles != 0])
-    unit = float(np.exp(np.mean(np.log(moving)))) if moving.size else 1.0
-    a = np.real(np.poly(poles / unit))[1:]
-    b = np.zeros(n)
-    b[: fit.numerator.size] = fit.numerator * unit ** (np.arange(fit.numerator.size) - float(n))
-    matrix = np.eye(n, k=1)
-    matrix[-1] = -a[::-1]
-    last = np.zeros((n, 1))
-    last[-1] = 1.0
-    return ct.StateSpace(unit * matrix, unit * last, b[None], np.zeros((1, 1)))
 
 
 def choices_of(fit: OutputErrorEstimate) -> Iterator[str]:

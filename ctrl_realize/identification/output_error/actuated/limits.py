@@ -16,9 +16,10 @@ from ....delayed.simulation import simulate_record
 from ....errors import DataError, UnsuitableSystemError
 from ....numerics.arrays import BoolArray, FloatArray
 from ....numerics.validation.limits import at_limit, clips, ends, passed, plateaus
+from ...plausible import continuous_core
 from ..arguments import FEWEST_SAMPLES, step_data_of
 from ..result import OutputErrorFit
-from ..summary import fitted_core, fitted_model
+from ..summary import fitted_model
 
 _MORE = 0.05  # of the samples on plateaus that a model finds besides: it is fitted anew
 
@@ -107,7 +108,7 @@ def _without_plateaus(record: Record, linear: OutputErrorFit, fit: Fit) -> Outpu
 
 def _simulated(found: OutputErrorFit) -> FloatArray:
     """Response of a model to its record (N,), also where samples are missing."""
-    system = fitted_model(fitted_core(found.estimate, found.poles), found)
+    system = fitted_model(continuous_core(found.estimate.numerator, found.poles), found)
     rest = np.isfinite(found.onset) and not found.data.relaxing
     start = "rest" if rest else "estimate"
     return np.ravel(simulate_record(system, found.records[0], start, gaps=True))
