@@ -20,6 +20,7 @@ from .style import HERTZ, axis_time_unit, decibel, frequency_axis
 
 _LAGS_SHOWN = 6.0  # longest lags that are shown of a step response
 _FEWEST_SHOWN, _MOST_SHOWN = 50, 2000  # samples
+_TURN_SHOWN = 400.0  # deg of phase
 
 
 @documented()
@@ -85,15 +86,18 @@ def plausible_plot(
     )
     count = int(np.clip(longest / models.dt, _FEWEST_SHOWN, _MOST_SHOWN))
     steps = np.stack([system.step(count) for system in models.systems])
-    omega = np.geomspace(0.05 / longest, np.pi / models.dt, 400)
+    omega = np.geomspace(0.3 / longest, np.pi / models.dt, 400)
     responses = models.frequency_response(omega)
-    rows = (steps, decibel(np.abs(responses)), np.degrees(np.unwrap(np.angle(responses))))
+    phase = np.degrees(np.unwrap(np.angle(responses)))
+    # a loop is decided where the phase turns once
+    shown = np.median(phase - phase[:, :1], axis=0) > -_TURN_SHOWN
+    rows = (steps, decibel(np.abs(responses[:, shown])), phase[:, shown])
     with style.canvas(
         ax, 3, title=title, default_title="Models that the data do not rule out", size=(8.0, 8.0),
         sharex=False,
     ) as axes:  # fmt: skip
         factor, unit = axis_time_unit(longest, axes[0])
-        across = (factor * models.dt * np.arange(count), *[omega / (2 * np.pi)] * 2)
+        across = (factor * models.dt * np.arange(count), *[omega[shown] / (2 * np.pi)] * 2)
         lines = []
         for one, x, values in zip(axes, across, rows, strict=True):
             one.fill_between(
@@ -106,7 +110,7 @@ def plausible_plot(
         axes[2].set_ylabel("phase [deg]")
         for one in axes[1:]:
             frequency_axis(one)
-        return style.finished(axes, lines, loc="lower right")
+        return style.finished(axes, lines, loc="best")
 
 
 @documented()
