@@ -282,6 +282,11 @@ class ModelFit(Result):
         return ()
 
     @property
+    def plausible_models(self) -> Any:
+        """Models that the data do not rule out, `PlausibleModels`; None if they are not drawn."""
+        return None
+
+    @property
     def verdicts(self) -> tuple[Any, ...]:
         """Whether dead time and gain are known, and the model fits tuning; empty if not judged."""
         return ()

@@ -138,6 +138,9 @@ def _tuning(
 ) -> Verdict:
     if np.sum(model.poles == 0) > 1 or not fit.gain:
         return Verdict("tuning", "no", "no rule for such a plant", float("inf"))
+    low, high = fit.gain_interval or (-np.inf, np.inf)
+    if low <= 0 <= high:
+        return Verdict("tuning", "no", "the sign of the gain is not known", float("inf"))
     omega = grid(model, fit.dt)
     controller = controller_response(*robust_pi(model, fit.dt), omega, fit.dt)
     responses = np.stack([model_response(one, omega) for one in (model, *others)])

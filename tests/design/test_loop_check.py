@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 import ctrl_realize as cr
 from ctrl_realize.errors import ModelWarning, OptionError, UnsuitableSystemError
 from ctrl_realize.io import FitSummary
+from tests import rigs
 
 
 def fit_with_interval(interval, **values):
@@ -146,6 +147,16 @@ def test_ms_at_the_corners_of_the_intervals_is_that_of_such_a_plant(sign, dead_t
     assert f"Ms {worst:.3g}" in made.report()
     robust = typed(message, plant)
     assert max(brute_ms(each, robust) for each in plants) < 2
+
+
+def test_the_loop_of_an_identified_plant_is_checked_with_models_that_fit_as_well():
+    record = rigs.step_record(rigs.R2, before=300, after=900, dt=0.02, delay=20, noise=0.03, seed=2)
+    plant = cr.fit_output_error(record)
+    made = cr.design.pid(plant)
+    every = sorted(brute_ms(each, made) for each in plant.fit.plausible_models.systems)
+    assert made.check.worst.ms == pytest.approx(every[-2], rel=1e-4)
+    assert f"Ms {every[-2]:.3g}" in made.report()
+    assert not made.check.flags
 
 
 def test_a_gain_that_makes_the_loop_unstable_is_said_with_the_corner():

@@ -6,6 +6,7 @@ time and gain from the identification.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -20,6 +21,7 @@ from ...results import Result
 from ..siso import interval_of_dead_time
 from .delay_robustness import over_interval
 from .delay_robustness_result import DelayRobustness
+from .factors import factor
 from .loop import Loop, open_loop
 from .margin_result import Margins
 from .margins import loop_margins
@@ -31,13 +33,17 @@ the crossovers, see `DelayRobustness`."""
 MOST_SENSITIVE = 2.0
 """Largest Ms without a warning: gain and phase margin are then at least 2 and 29 deg (Astrom and
 Hagglund, Advanced PID Control, 2006, chapter 4)."""
+_AT_INTERVALS = 6  # corners of two intervals and of their nominal values, at most
 ROUNDED = 1e-3
 """Share by which Ms may exceed a limit that a controller was optimized for."""
 
 
 @dataclass(frozen=True)
 class Corner:
-    """Dead time in s and gain at the ends of their intervals, and Ms there; inf if unstable."""
+    """Dead time in s and gain of a plant that the data do not rule out, and Ms; inf if unstable.
+
+    At the ends of their intervals, or those of a plausible model.
+    """
 
     dead_time: float
     gain: float | None
@@ -63,7 +69,8 @@ class LoopCheck(Result):
     robustness : DelayRobustness or None
         Over ``system.fit.dead_time_interval``; None if the system has no interval.
     corners : tuple of Corner
-        Ms at the ends of ``system.fit.dead_time_interval`` and ``system.fit.gain_interval``.
+        Ms with each of ``system.fit.plausible_models`` but the worst, which one of forty is, if the
+        fit has them; otherwise at the ends of its intervals of dead time and gain.
     flags : tuple of Flag
         ``"sensitive"`` if Ms is larger than 2 on the model; ``"unstable_within_interval"`` if some
         dead time within the interval, or a corner, makes the loop unstable;
@@ -167,6 +174,8 @@ def _corners(
     plant: DelayedStateSpace, loop: Loop, found: Margins, robust: DelayRobustness | None
 ) -> tuple[Corner, ...]:
     """Ms at the ends of the intervals of dead time and gain; the gain scales the whole loop."""
+    if plant.fit is not None and plant.fit.plausible_models is not None:
+        return _of_models(loop, plant.fit.plausible_models.systems)
     gains = _gains(plant)
     if robust is None and not gains:
         return ()
@@ -179,11 +188,23 @@ def _corners(
             (int(d), float(t), float(m)) for d, t, m in tried if d != plant.delay or len(tried) < 3
         ]
     corners = [Corner(time, nominal, _ms(size)) for _, time, size in ends]
-    for gain, factor in gains:
+    for gain, ratio in gains:
         for delay, time, _ in ends:
-            at = loop_margins(_moved(loop, delay, factor))
+            at = loop_margins(_moved(loop, delay, ratio))
             corners.append(Corner(time, gain, _ms(at.modulus_margin if at.stable else 0.0)))
     return tuple(corners)
+
+
+def _of_models(loop: Loop, systems: Iterable[DelayedStateSpace]) -> tuple[Corner, ...]:
+    """Ms with other models of the plant, in the place of the first factor of a loop."""
+    found = []
+    for system in systems:
+        other = replace(loop, factors=(factor(system, loop.dt), *loop.factors[1:]))
+        at, gain = loop_margins(other), float(np.real(system.delay_free.dcgain()))
+        ms = _ms(at.modulus_margin if at.stable else 0.0)
+        found.append(Corner(float(system.dead_time), gain if np.isfinite(gain) else None, ms))
+    worst = max(found, key=lambda one: one.ms)
+    return tuple(one for one in found if one is not worst)
 
 
 def _ms(modulus_margin: float) -> float:
@@ -207,8 +228,12 @@ def _moved(loop: Loop, delay: int, factor: float) -> Loop:
 
 
 def _over_intervals(made: LoopCheck) -> tuple[Flag, ...]:
-    """What the intervals from the identification do to the loop."""
-    if made.robustness is not None and not made.robustness.stable:
+    """What the identification leaves open does to the loop.
+
+    The interval of a dead time alone is for fits that say nothing on the lags that go with it.
+    """
+    models = len(made.corners) > _AT_INTERVALS
+    if not models and made.robustness is not None and not made.robustness.stable:
         low, high = made.robustness.dead_time_interval
         inside = flagged(
             "unstable_within_interval",
@@ -222,8 +247,10 @@ def _over_intervals(made: LoopCheck) -> tuple[Flag, ...]:
     if worst is None or worst.ms <= MOST_SENSITIVE * (1 + ROUNDED):
         return ()
     if worst.ms == float("inf"):
-        return (flagged("unstable_within_interval.corner", corner=worst),)
-    return (flagged("sensitive_within_interval", ms=worst.ms, most=MOST_SENSITIVE, corner=worst),)
+        case = "model" if models else "corner"
+        return (flagged(f"unstable_within_interval.{case}", corner=worst),)
+    words = "sensitive_within_interval" + ".model" * models
+    return (flagged(words, ms=worst.ms, most=MOST_SENSITIVE, corner=worst),)
 
 
 def warn_of(check: LoopCheck, advice: str) -> None:

@@ -83,7 +83,8 @@ def pid(
     PIDController
         A `control.StateSpace` from error to plant input, with the parameters as attributes. Its
         `check`, a `LoopCheck`, is for the closed loop with `system` itself, not with a reduced
-        model, and over the intervals of dead time and gain of an identified system.
+        model, and with the models that the data of an identified system do not rule out, or over
+        its intervals of dead time and gain.
 
     Raises
     ------
@@ -96,8 +97,9 @@ def pid(
     Warns
     -----
     ModelWarning
-        Ms is larger than 2 on the model itself, or at an end of those intervals; or the loop is
-        unstable somewhere within them. The warning names a rule that is robust, if there is one.
+        Ms is larger than 2 on the model itself, with one of those models, or at an end of those
+        intervals; or the loop is unstable there. The warning names a rule that is robust, if there
+        is one.
 
     Notes
     -----
