@@ -353,13 +353,19 @@ class OutputErrorFit(FractionalDelayFit):
         return [str(flag) for flag in self.flags if in_doubt(flag)]
 
     @property
-    def plausible_models(self) -> PlausibleModels:
-        """Models that the data do not rule out, for design and for bands of responses."""
-        return PlausibleModels(self.estimate.plausible, self.dt)
+    def plausible_models(self) -> PlausibleModels | None:
+        """Models that the data do not rule out; None beside an actuator."""
+        models = self.estimate.plausible
+        return PlausibleModels(models, self.dt) if models else None
 
     @property
     def verdicts(self) -> tuple[Verdict, ...]:
-        """Whether dead time and gain are known, and whether the model is fit for tuning."""
+        """Whether dead time and gain are known, and whether the model is fit for tuning.
+
+        Empty beside an actuator, which takes part in every loop.
+        """
+        if not self.estimate.plausible:
+            return ()
         own = PlausibleModel(self.dead_time, self._plain_poles, self.estimate.numerator)
         return verdicts(self, own, self.estimate.plausible)
 
