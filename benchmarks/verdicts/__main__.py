@@ -15,7 +15,13 @@ from pathlib import Path
 import numpy as np
 
 import ctrl_realize as cr
-from ctrl_realize.numerics.loops.reference import model_response, simc_pi
+from ctrl_realize.numerics.loops.reference import (
+    controller_response,
+    grid,
+    largest_sensitivity,
+    model_response,
+    robust_pi,
+)
 
 from .cases import KINDS, Case, case
 
@@ -50,28 +56,18 @@ def _loop(one: Case, fit: cr.identification.OutputErrorFit) -> dict[str, object]
     )
     if np.sum(model.poles == 0) > 1:
         return {"true Ms": float("inf"), "inside": []}
-    kp, ti = simc_pi(model, fit.dt)
-    omega = np.geomspace(1e-3 / (fit.dead_time + fit.dt), np.pi / fit.dt, 600)
-    shape = np.exp(-0.5j * omega * fit.dt) * (1 + 1 / (1j * omega * ti))
-    own = shape * model_response(model, omega)
-    # The gain is lowered as by `sensitivities`, until the loop is robust on the model itself.
-    while _ms(kp * own) > 1.7 and kp:
-        kp *= 0.75
-    inside = []
-    above = np.flatnonzero(np.abs(kp * own) > 1)
+    omega = grid(model, fit.dt)
+    controller = controller_response(*robust_pi(model, fit.dt), omega, fit.dt)
+    above = np.flatnonzero(np.abs(controller * model_response(model, omega)) > 1)
     crossover = omega[above[-1]] if above.size else omega[0]
+    inside = []
     for part in BAND:
         at = np.array([part * crossover])
         ratio = np.array([model_response(m, at)[0] for m in models]) / one.plant.response(at)[0]
         for values in (np.log(np.abs(ratio)), np.angle(ratio)):
             inside.append(bool(values.min() <= 0 <= values.max()))
-    return {"true Ms": _ms(kp * shape * one.plant.response(omega)), "inside": inside}
-
-
-def _ms(loop: np.ndarray) -> float:
-    distance = 1 + loop
-    phase = np.unwrap(np.angle(distance))
-    return float(1 / np.abs(distance).min()) if phase[-1] > phase[0] else float("inf")
+    true = largest_sensitivity(controller * one.plant.response(omega))
+    return {"true Ms": float(true), "inside": inside}
 
 
 def rows(path: Path | None, seeds: range) -> list[dict[str, object]]:

@@ -123,10 +123,10 @@ def test_the_transfer_function_stands_in_place_of_the_matrices(page, fitted):
     html = page.read_text(encoding="utf-8")
     fold = html.index("<summary>State-space matrices")
     assert html.rindex("<details>", 0, fold) < fold < html.index("</details>", fold)
-    # said once beside the figures, and once among the parameters
+    # said once beside the figures, once among the parameters, and by the verdict
     low, high = fitted.fit.interval
     outside = re.sub(r"<svg.*?</svg>", "", html, flags=re.DOTALL)
-    assert outside.count(interval_in_time(low, high)) == 2
+    assert outside.count(interval_in_time(low, high)) == 3
 
 
 def test_the_parameters_of_an_actuator_stand_in_the_table_of_parameters(tmp_path):

@@ -247,10 +247,20 @@ def _over_intervals(made: LoopCheck) -> tuple[Flag, ...]:
     if worst is None or worst.ms <= MOST_SENSITIVE * (1 + ROUNDED):
         return ()
     if worst.ms == float("inf"):
-        case = "model" if models else "corner"
-        return (flagged(f"unstable_within_interval.{case}", corner=worst),)
-    words = "sensitive_within_interval" + ".model" * models
-    return (flagged(words, ms=worst.ms, most=MOST_SENSITIVE, corner=worst),)
+        return (
+            flagged(
+                "unstable_within_interval.model" if models else "unstable_within_interval.corner",
+                corner=worst,
+            ),
+        )
+    return (
+        flagged(
+            "sensitive_within_interval.model" if models else "sensitive_within_interval",
+            ms=worst.ms,
+            most=MOST_SENSITIVE,
+            corner=worst,
+        ),
+    )
 
 
 def warn_of(check: LoopCheck, advice: str) -> None:
