@@ -22,9 +22,11 @@ FAULTS = {
 
 
 @cache
-def trees():
+def parsed():
+    """Path of a test, and the nodes of its tree."""
     paths = sorted(TESTS.rglob("*.py"))
-    return [(path.relative_to(TESTS), ast.parse(path.read_text("utf-8"))) for path in paths]
+    trees = ((path.relative_to(TESTS), ast.parse(path.read_text("utf-8"))) for path in paths)
+    return [(path, list(ast.walk(tree))) for path, tree in trees]
 
 
 def private(name):
@@ -35,16 +37,16 @@ def private(name):
 
 def test_no_test_imports_a_private_name():
     found = []
-    for path, tree in trees():
+    for path, nodes in parsed():
         ours = set()
-        for node in ast.walk(tree):
+        for node in nodes:
             if isinstance(node, ast.Import):
                 found += [(path, a.name) for a in node.names if private(a.name)]
             if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("ctrl_realize"):
                 names = [f"{node.module}.{alias.name}" for alias in node.names]
                 found += [(path, name) for name in names if private(name)]
                 ours |= {alias.asname or alias.name for alias in node.names}
-        for node in ast.walk(tree):
+        for node in nodes:
             if isinstance(node, ast.Attribute) and private(node.attr):
                 owner = getattr(node.value, "id", "")
                 # a method of a result may be what IPython asks for
@@ -55,16 +57,16 @@ def test_no_test_imports_a_private_name():
 
 def test_no_test_replaces_a_part_of_the_package():
     found = []
-    for path, tree in trees():
+    for path, nodes in parsed():
         if path.parts[0] == "fuzz":  # leaves out figures, and fits that it has made before
             continue
         ours = {
             alias.asname or alias.name
-            for node in ast.walk(tree)
+            for node in nodes
             if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("ctrl_realize")
             for alias in node.names
         } | {"cr", "ctrl_realize"}
-        for node in ast.walk(tree):
+        for node in nodes:
             if isinstance(node, (ast.Import, ast.ImportFrom)):
                 modules = [getattr(node, "module", None) or "", *(a.name for a in node.names)]
                 found += [(path, "mock") for name in modules if name.split(".")[-1] == "mock"]
@@ -86,6 +88,6 @@ def test_every_deliberate_defect_has_its_place_and_tests_that_concern_it():
     sys.modules[spec.name] = tool = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(tool)
     package = "\n".join(each.read_text("utf-8") for each in Path(cr.__file__).parent.rglob("*.py"))
-    names = " ".join(path.name for path, _ in trees())
+    names = " ".join(path.name for path, _ in parsed())
     assert [d.name for d in tool.DEFECTS if package.count(d.old) != 1] == []
     assert [d.name for d in tool.DEFECTS if not any(w in names for w in d.where[0].split())] == []

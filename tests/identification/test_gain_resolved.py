@@ -157,7 +157,7 @@ def test_an_unstable_plant_in_a_loop_is_called_so(fit):
     assert "unstable" in codes(system)
     assert report.verdict_of(system).level == "poor"
     assert "whether the plant is stable" in warned(cr.design.margins, system, 0.01)
-    assert "unstable" not in codes(fit(held_by_a_controller(0.97)))
+    assert "unstable" not in codes(fit(held_by_a_controller(0.97, n=240)))
 
 
 def test_a_tank_that_fills_after_a_long_rest_is_not_called_unstable():

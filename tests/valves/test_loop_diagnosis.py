@@ -114,7 +114,7 @@ def test_the_fit_finds_the_stiction_of_a_simulated_loop_and_none_in_a_linear_one
     period = {"flow": 15.0, "integrating": 100.0}[process]
     linear = cr.bench.valve_loop(process=process, oscillation=(2.0, period), noise=0.05)
     for loop, truth in ((sticking, 5.0), (linear, 0.0)):
-        record = loop.simulate(30 * period, rng=1).record
+        record = loop.simulate(15 * period, rng=1).record
         fit = cr.valves.diagnose_loop(record, process=process).stiction_fit
         # of the swing: a linear loop has a stem that could stick by as much unseen
         assert abs(fit.S - truth) < 0.1 * truth + 0.25 * (truth == 0) * fit.swing
