@@ -70,6 +70,14 @@ def test_one_record_gives_model_report_and_figures(folder, first):
     assert str(out) in said
 
 
+def test_the_exit_code_tells_whether_a_required_verdict_is_good(folder, tmp_path, capsys):
+    good = ["identify", str(folder / "step_0.csv"), "-o", str(tmp_path / "out"), "--no-report"]
+    assert main([*good, "--require", "gain"]) == 0
+    assert main([*good, "--overwrite", "--method", "scan", "--require", "gain"]) == 4
+    assert "--require gain: the verdict is 'not judged by this method'" in capsys.readouterr().err
+    assert main([*good, "--overwrite", "--require", "order"]) == 2
+
+
 def test_several_records_make_a_campaign_and_a_bad_one_is_a_row(folder, tmp_path, capsys):
     files = [str(folder / name) for name in ("step_0.csv", "flat.csv", "step_1.csv", "text.csv")]
     out = tmp_path / "out"

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from .._checks import one_of
 from ..data import MeasuredFRF
 from ..delayed import DelayedStateSpace, fit_of
 from ..errors import CtrlRealizeError, DataError, OptionError
@@ -27,6 +28,8 @@ from .results import Provenance, campaign_table, write_campaign_files, write_rec
 from .staging import appearing, kept_rows, refuse_a_file
 from .terminal import complain, one_line, printable, progress, say, working
 
+_QUESTIONS = {"dead-time": "dead time", "gain": "gain", "tuning": "tuning"}
+"""Questions as options -> as verdicts."""
 _MANY = 12
 """Number of records from which on all cores are used."""
 
@@ -43,6 +46,7 @@ def run_identify(
     record: Mapping[str, Any],
     response: Mapping[str, Any],
     jobs: int | None,
+    require: list[str] | None,
     run: Run,
 ) -> int:
     """Identify, write the results, and return the exit code."""
@@ -51,20 +55,21 @@ def run_identify(
         raise OptionError("expected --joint or --separate, got both")
     if len(tests) > 1:
         raise OptionError("expected --by or --split, got both")
+    required = [one_of(name, "require", tuple(_QUESTIONS)) for name in require or ()]
     settings = Settings(chosen, joint)
     how = Reading(record, tests)
     measured = None if frf is None else read_frf(frf, **response)
     calls = calls_again(files, settings, how, run.typed, None if frf is None else (frf, response))
-    sources, task = how.sources(files), _Task(settings, measured, run)
+    sources, task = how.sources(files), _Task(settings, measured, required, run)
     if separate and len(sources) > 1:
         return _each_alone(task, sources, folder, how)
     refuse_other_results(folder, run)
     if len(sources) > 1 and not joint:
         return _many(task, sources, folder, calls, jobs)
     with appearing(folder, run) as staged:
-        written = _one(task, sources, staged, calls)
-    _say_what_is_written(folder, ["model.json"], run.report and written)
-    return 0 if written else 1
+        code = _one(task, sources, staged, calls)
+    _say_what_is_written(folder, ["model.json"], run.report and code != 1)
+    return code
 
 
 @dataclass(frozen=True)
@@ -73,11 +78,21 @@ class _Task:
 
     settings: Settings
     frf: MeasuredFRF | None
+    required: list[str]
     run: Run
 
+    def judged(self, system: DelayedStateSpace) -> int:
+        """Exit code by the verdicts that are required."""
+        levels = {one.question: one.level for one in fit_of(system, ModelFit).verdicts}
+        missed = [name for name in self.required if levels.get(_QUESTIONS[name]) != "good"]
+        for name in missed:
+            level = levels.get(_QUESTIONS[name], "not judged by this method")
+            complain(f"--require {name}: the verdict is {level!r}")
+        return 4 if missed else 0
 
-def _one(task: _Task, sources: list[Source], folder: Path, calls: list[tuple[str, str]]) -> bool:
-    """Identify one model into a folder; return whether its report was written as asked."""
+
+def _one(task: _Task, sources: list[Source], folder: Path, calls: list[tuple[str, str]]) -> int:
+    """Identify one model into a folder; return the exit code: 1 if its report was not written."""
     settings, frf = task.settings, task.frf
     records = [source.record() for source in sources]
     options = {**settings.choices, **({} if frf is None or not settings.joint else {"frf": frf})}
@@ -89,7 +104,8 @@ def _one(task: _Task, sources: list[Source], folder: Path, calls: list[tuple[str
     _say_model(system, comparison)
     files = [source.file for source in sources]
     provenance = Provenance(files, frf, comparison, settings.given, calls, task.run.report)
-    return write_record_files(folder, system, records[0], provenance)
+    written = write_record_files(folder, system, records[0], provenance)
+    return task.judged(system) if written else 1
 
 
 def _say_what_is_written(output: Path, names: list[str], reported: bool) -> None:
@@ -128,7 +144,7 @@ def _many(
             written = write_campaign_files(folder, campaign, provenance)
     names = ["model.json", "records.csv", "models/"]
     _say_what_is_written(output, names, task.run.report and written)
-    return 1 if campaign.failed or not written else 0
+    return 1 if campaign.failed or not written else task.judged(campaign.system)
 
 
 def _refuse_useless(campaign: Campaign) -> None:
@@ -146,7 +162,7 @@ def _refuse_useless(campaign: Campaign) -> None:
 def _each_alone(task: _Task, sources: list[Source], output: Path, how: Reading) -> int:
     """Identify each record into its own folder; failures do not stop the rest."""
     refuse_a_file(output)
-    failed = 0
+    failed = unlike = 0
     names = unique_names([source.name for source in sources])
     for name in names:
         refuse_other_results(output / name, task.run)
@@ -162,7 +178,8 @@ def _each_alone(task: _Task, sources: list[Source], output: Path, how: Reading) 
                 test = position(source)
                 typed = task.run.typed
                 calls = calls_again([source.file], task.settings, how, typed, None, test)
-                failed += not _one(task, [source], folder, calls)
+                code = _one(task, [source], folder, calls)
+                failed, unlike = failed + (code == 1), unlike + (code == 4)
         except (CtrlRealizeError, OSError) as error:
             failed += 1
             complain(f"{printable(str(source.file))}: {one_line(error)}")
@@ -170,7 +187,7 @@ def _each_alone(task: _Task, sources: list[Source], output: Path, how: Reading) 
     if failed == len(sources):
         raise DataError(f"none of the {len(sources)} records could be identified")
     say(f"written to {printable(str(output))}: a folder for each record")
-    return 1 if failed else 0
+    return 1 if failed else 4 if unlike else 0
 
 
 def unique_names(names: list[str]) -> list[str]:

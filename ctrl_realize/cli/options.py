@@ -39,6 +39,11 @@ Jobs = Annotated[
     int | None,
     _OPTION(help="Number of processes; -1: all cores. Default: all cores for 12 records or more."),
 ]
+Require = Annotated[
+    list[str] | None,
+    _OPTION(help="Exit with 4 unless the verdict on dead-time, gain or tuning is good; "
+            "repeatable."),
+]  # fmt: skip
 NoReport = Annotated[
     bool, _OPTION("--no-report", help="Write models and tables alone, without report and figures.")
 ]

@@ -28,6 +28,7 @@ def identify(
     record: o.Given,
     response: o.Given,
     jobs: o.Jobs = None,
+    require: o.Require = None,
     no_report: o.NoReport = False,
     overwrite: o.Overwrite = False,
 ) -> None:

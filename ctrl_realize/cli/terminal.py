@@ -14,8 +14,8 @@ from .options import as_options
 
 EXIT_CODES = (
     "Exit codes: 0 done; 1 done, but some records or the report failed; 2 wrong usage, unusable "
-    "input or a disk error, no results written; 3 a defect of the program; 130 interrupted; "
-    "143 terminated."
+    "input or a disk error, no results written; 3 a defect of the program; 4 done, but a verdict "
+    "that was required is not good; 130 interrupted; 143 terminated."
 )
 
 
