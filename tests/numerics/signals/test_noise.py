@@ -66,6 +66,13 @@ def test_a_dozen_samples_at_rest_are_helped_by_the_settled_half(seed):
     assert rest_noise(record[:50], record, 0.0)[0] < 0.3
 
 
+def test_slow_noise_makes_no_drift():
+    # 19 samples count as one: by the error in white noise a quarter of these would drift
+    for seed in range(20):
+        slow = lfilter([1.0], [1.0, -0.9], white(600, seed))[200:]
+        assert rest_noise(slow, np.tile(slow, 3), 0.0)[1] == 0.0
+
+
 def test_wild_samples_make_no_drift_and_hide_none():
     values = white(300)
     slope = 0.05
