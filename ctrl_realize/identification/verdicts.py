@@ -118,9 +118,13 @@ def _dead_time(fit: FractionalDelayFit) -> Verdict:
     if fit.total_delay is not None and np.isfinite(fit.total_delay_interval or np.inf).all():
         least = max(least, _OF_TOTAL * fit.total_delay)
     level, why = _level(fit.flags, "dead_time", width <= least, some=True)
-    said = f"known to {in_time(width)}, {interval_in_time(low, high)}"
-    if low == 0 and width > least:
-        said = f"{interval_in_time(low, high)}, dead time or short lags: the record cannot tell"
+    said = interval_in_time(low, high)
+    if width <= least:
+        said = f"known to {in_time(width)}, {said}"
+    elif low == 0:
+        said = f"{said}, dead time or short lags: the record cannot tell"
+    else:
+        said = f"{said}, {in_time(width)} wide"
     return Verdict("dead time", level, _because(said, why), width)
 
 

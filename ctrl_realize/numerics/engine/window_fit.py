@@ -13,6 +13,7 @@ References
    doi:10.1214/ss/1177011137.
 .. [4] G. Schwarz, Estimating the dimension of a model, Ann. Statist. 6 (1978) 461-464,
    doi:10.1214/aos/1176344136.
+.. [5] Student, The probable error of a mean, Biometrika 6 (1908) 1-25, doi:10.2307/2331554.
 """
 
 from __future__ import annotations
@@ -22,9 +23,10 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
+from scipy.special import ndtr, stdtrit
 
 from ..arrays import FloatArray
-from ..constants import HUBER, SMALLEST, VERY_STRONG
+from ..constants import HUBER, SMALLEST, VERY_STRONG, Z_95
 from ..signals.noise import correlation_of_noise, correlation_time, is_coarse, mad_sigma
 from .compared_fits import converged, on_new_data, settled
 from .problem import Problem, Structure
@@ -44,6 +46,7 @@ _PASSES = 2  # of modified residuals; see `fit_window`
 _RAMP = 0.1
 """Pole of a first-order fit times the length of the record, below which there may be an integrator
 beside a lag that is faster by any ratio. Ablation: integrator beside a lag of any ratio."""
+_LEAST_FREEDOM = 3.0  # of a variance that is estimated: fewer tell none
 _LONG = 2**18  # samples that tell a frequency, for time and memory
 
 
@@ -151,13 +154,18 @@ def with_noise_of_residual(fit: WindowFit) -> WindowFit:
     """Count for errors what a model has taken from slow noise.
 
     For a residual that is noise: that of a misfit tells no noise. Choices are made without it, and
-    the dead time, which shows in the fast part of a response, has its interval without it.
-    Ablation: noise that the model has taken.
+    the dead time, which shows in the fast part of a response, has its interval without it. Few
+    samples are independent then, and their variance is known so badly that Student's distribution
+    [5]_ takes the place of the normal one. Ablation: noise that the model has taken.
     """
     window, count = fit.window, fit.window.output.size - fit.window.start
     parameters = _estimated(window, fit.best.structure)
     correlation, missing = correlation_of_noise(fit.correlation, parameters / count)
-    return replace(fit, taken=correlation / fit.correlation / (1.0 - missing))
+    if correlation <= 1.0:
+        return fit
+    freedom = max(count / correlation - parameters, _LEAST_FREEDOM)
+    wider = (float(stdtrit(freedom, ndtr(Z_95))) / Z_95) ** 2
+    return replace(fit, taken=wider * correlation / fit.correlation / (1.0 - missing))
 
 
 def _estimated(window: Window, structure: Structure) -> int:
