@@ -1,7 +1,8 @@
 """Check of the closed loop before a design function returns a controller.
 
-The loop is closed with the model itself, not with a reduced one, and over the intervals of dead
-time and gain from the identification.
+The loop is closed with the model itself, not with a reduced one, and with the models that the data
+of an output-error fit do not rule out; for other fits, over the intervals of dead time and gain
+from the identification.
 """
 
 from __future__ import annotations

@@ -97,7 +97,7 @@ class PIDComparison(Result):
         Warns
         -----
         ModelWarning
-            None of them is robust over the intervals, see `pid`.
+            None of them is robust with all that the record leaves open, see `pid`.
         """
         fit = [
             (len(self._flags(i)), p.load_error, i)

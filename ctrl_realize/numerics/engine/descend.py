@@ -122,7 +122,8 @@ def descend(
         x[up], cost[up] = trial[better], moved.cost[better]
         residual[up], jacobian[up] = moved.residual[better], moved.jacobian[better]
         usual = better & ~turn
-        ratio = gained[usual] / np.maximum(predicted[usual], 1e-300)
+        expected = predicted[usual]
+        ratio = np.minimum(gained[usual], expected) / np.maximum(expected, 1e-300)
         ease = np.clip(1 - (2 * np.clip(ratio, 0.0, 1.0) - 1) ** 3, 1 / 9, 2.0)
         damping[active[usual]] = np.maximum(damping[active[usual]] * ease, 1e-12)
         growth[active[usual]] = 2.0

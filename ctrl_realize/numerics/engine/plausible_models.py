@@ -97,14 +97,14 @@ def _about(
     variance = max(_CALIBRATED * fits.error_variance, SMALLEST)
     covariance = variance * errors.covariance()
     n, free = theta.size, numerator.size
+    widest = np.full(n + free, np.inf)
+    widest[0], widest[1:n] = 0.5 * (scales.latest - scales.earliest), _WIDEST
     if isinstance(structure, Family):
-        drawn = _normal(covariance, np.full(n + free, np.inf), count, rng) + np.r_[theta, numerator]
+        drawn = _normal(covariance, widest, count, rng) + np.r_[theta, numerator]
         drawn[:, 0] = np.clip(drawn[:, 0], scales.earliest, scales.latest)
         return [_model(row[:n], row[n:]) for row in drawn]
     bounds = parameter_bounds(structure, scales)
-    widest = np.full(n, _WIDEST)
-    widest[0] = 0.5 * (scales.latest - scales.earliest)
-    rows = _WIDER * _directions(covariance[:n, :n], widest)
+    rows = _WIDER * _directions(covariance[:n, :n], widest[:n])
 
     def likelihood(at: FloatArray) -> FloatArray:
         cost = eliminate(problem, structure, at).cost

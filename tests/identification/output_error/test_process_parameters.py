@@ -59,7 +59,7 @@ def test_a_furnace_in_minutes_is_reported_and_drawn_in_minutes(tmp_path):
     units = {"u": "%", "y": "degC", "time": "min"}
     record = cr.Record(t, 30 + 10 * (t >= 6000), y, units=units)
     system = cr.fit_output_error(record, structures="FOPDT")
-    rows = dict(line.strip().split("  ", 1) for line in system.fit.report().splitlines()[1:5])
+    rows = dict(line.strip().split("  ", 1) for line in system.fit.report().splitlines()[1:8])
     assert rows["dead time"].strip().startswith("6.0")
     assert " min = 6.0" in rows["dead time"]
     assert rows[system.fit.interval_label].endswith(" min")

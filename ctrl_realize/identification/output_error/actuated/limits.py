@@ -84,8 +84,9 @@ def _without_plateaus(record: Record, linear: OutputErrorFit, fit: Fit) -> Outpu
     held = plateaus(output, [edge for edge, _ in linear.data.edges])
     if not held.any():
         return linear
-    doubt = flagged("may_be_at_limit", limits=_levels(output, held))
-    linear = replace(linear, flags=(*linear.flags, doubt))
+    if np.isfinite(linear.onset):  # any other input may leave the output where it is
+        doubt = flagged("may_be_at_limit", limits=_levels(output, held))
+        linear = replace(linear, flags=(*linear.flags, doubt))
     if np.count_nonzero(record.seen & ~held) < FEWEST_SAMPLES:
         return linear
     rows = np.round((linear.time - record.time[0]) / record.dt).astype(np.int64)
