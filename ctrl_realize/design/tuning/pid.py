@@ -258,15 +258,15 @@ def _one_that_works(system: Any, rule: str, kind: str, options: TuningOptions) -
         worst = check.margins.ms if check.worst is None else check.worst.ms
         call = f"{_call(name, form, changed)}: Ms {check.margins.ms:.3g}"
         if not check.flags:
-            reached = (
-                ""
-                if check.worst is None
-                else f", at most {worst:.3g} with what the record leaves open"
-            )
-            return f"Try {call}{reached}"
+            if check.worst is None:
+                return f"Try {call}"
+            return f"Try {call}, at most {worst:.3g} with what the record leaves open"
         best = min(best, (worst, call))
     if best[1]:
-        return f"No rule is robust with all that the record leaves open; the best is {best[1]}, at worst {best[0]:.3g}"
+        return (
+            "No rule is robust with all that the record leaves open; the best is "
+            f"{best[1]}, at worst {best[0]:.3g}"
+        )
     return "No other rule does better; see design.compare_pid, or use design.lqg"
 
 
