@@ -171,9 +171,12 @@ _KEPT: dict[str, Callable[[Plain], object]] = {
 
 
 def _stored(key: str, read: Callable[[Plain], object]) -> property:
-    return property(
-        lambda summary: read(summary._value(key)), doc=f"`ModelFit.{key}`, as the file has it."
-    )
+
+    # numpydoc wants the line of a def
+    def stored(summary: FitSummary) -> Any:
+        return read(summary._value(key))
+
+    return property(stored, doc=f"`ModelFit.{key}`, as the file has it.")
 
 
 for _key, _read in _KEPT.items():
