@@ -171,7 +171,6 @@ _KEPT: dict[str, Callable[[Plain], object]] = {
 
 
 def _stored(key: str, read: Callable[[Plain], object]) -> property:
-
     # numpydoc wants the line of a def
     def stored(summary: FitSummary) -> Any:
         return read(summary._value(key))
