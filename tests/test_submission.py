@@ -99,5 +99,6 @@ def test_coverage_and_silent_misses_in_the_paper_are_those_of_the_studies():
     silent, records = re.search(r"Silent: (\d+) of (\d+) records", worlds).groups()
     missed = re.search(r"missed at all: (\d+)", worlds)[1]
     said = " ".join(PAPER.split())
-    assert f"On {records} simulated records of 60 plants" in said
+    plants = re.search(r"records of (\d+) worlds", worlds)[1]
+    assert f"On {records} simulated records of {plants} plants" in said
     assert f"{missed} results missed in this sense, and {silent} of them had no such flag" in said
