@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import ctrl_realize as cr
+from benchmarks.verdicts.cases import case
 from tests import rigs
 
 
@@ -61,3 +62,12 @@ def test_flags_that_do_not_go_with_wrong_answers_are_notes():
     assert "outliers" in {flag.code for flag in fit.flags}
     assert "  - note: " in fit.report()
     assert "  ! " not in fit.report()
+
+
+def test_models_that_fit_as_well_decide_on_tuning():
+    # the PI is robust on the model itself, and not on one of the models in twenty
+    fit = cr.fit_output_error(case("rising at its end", 101).record).fit
+    tuning = fit.verdicts[2]
+    assert tuning.level != "good"
+    assert tuning.number > 2
+    assert "Ms 1." in tuning.sentence
