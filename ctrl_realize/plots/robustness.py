@@ -80,11 +80,11 @@ def plausible_plot(
     >>> [axes.get_ylabel() for axes in cplt.figure.axes]
     ['step response', 'gain [dB]', 'phase [deg]']
     """
-    longest = max(
-        one.dead_time + _LAGS_SHOWN * float(np.max(1 / np.maximum(-one.poles.real, SMALLEST)))
-        for one in models.models[:1]
-    )
-    count = int(np.clip(longest / models.dt, _FEWEST_SHOWN, _MOST_SHOWN))
+    slowest = [np.max(1 / np.maximum(-one.poles.real, SMALLEST)) for one in models.models]
+    waits = [one.dead_time for one in models.models]
+    settled = np.median(waits) + _LAGS_SHOWN * np.median(slowest)
+    count = int(np.clip(settled / models.dt, _FEWEST_SHOWN, _MOST_SHOWN))
+    longest = count * models.dt
     steps = np.stack([system.step(count) for system in models.systems])
     omega = np.geomspace(0.3 / longest, np.pi / models.dt, 400)
     responses = models.frequency_response(omega)

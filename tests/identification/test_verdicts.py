@@ -71,3 +71,13 @@ def test_models_that_fit_as_well_decide_on_tuning():
     assert tuning.level != "good"
     assert tuning.number > 2
     assert "Ms 1." in tuning.sentence
+
+
+def test_the_band_of_an_integrating_plant_has_axes_of_its_record():
+    rng = np.random.default_rng(2)
+    t = 0.1 * np.arange(600)
+    y = 0.3 * np.clip(t - 21.0, 0, None) + 0.02 * rng.standard_normal(t.size)
+    fit = cr.fit_output_error(cr.Record(t, (t >= 20.0) * 1.0, y)).fit
+    axes = fit.plausible_models.plot().figure.axes
+    assert axes[0].get_xlim()[1] < 1e3
+    assert axes[1].get_xlim()[0] > 1e-4
