@@ -15,6 +15,7 @@ from pathlib import Path
 import numpy as np
 
 import ctrl_realize as cr
+from ctrl_realize.numerics.engine.plausible_models import PlausibleModel
 from ctrl_realize.numerics.loops.reference import (
     controller_response,
     grid,
@@ -51,9 +52,7 @@ def judged(one: Case) -> dict[str, object]:
 def _loop(one: Case, fit: cr.identification.OutputErrorFit) -> dict[str, object]:
     """Largest sensitivity on the true plant; whether the envelope holds its response."""
     models = fit.estimate.plausible
-    model = models[0]._replace(
-        dead_time=fit.dead_time, poles=fit.poles, numerator=fit.estimate.numerator
-    )
+    model = PlausibleModel(fit.dead_time, fit.poles, fit.estimate.numerator)
     if np.sum(model.poles == 0) > 1:
         return {"true Ms": float("inf"), "inside": []}
     omega = grid(model, fit.dt)

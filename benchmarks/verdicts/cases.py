@@ -55,7 +55,7 @@ class Plant:
 
 @dataclass(frozen=True)
 class Case:
-    """A record, its plant, and the largest output without noise or load."""
+    """A record of a kind, and its plant."""
 
     kind: str
     seed: int

@@ -102,11 +102,11 @@ def in_doubt(flag: Flag) -> bool:
 def _level(flags: Iterable[Flag], question: str, good: bool, some: bool) -> tuple[Level, str]:
     """Lower what the numbers say where a flag goes with wrong answers; name the first that does."""
     level: Level = "good" if good else "with care" if some else "no"
-    for mark, worst in ((f"no_{question}", "no"), (f"doubts_{question}", "with care")):
+    lowered: tuple[tuple[str, Level], ...] = (("no", "no"), ("doubts", "with care"))
+    for mark, most in lowered:
         for flag in flags:
-            if flag.code in marked(mark):
-                lowered: Level = "no" if worst == "no" else "with care"
-                return max(level, lowered, key=LEVELS.index), flag.code.replace("_", " ")
+            if flag.code in marked(f"{mark}_{question}"):
+                return max(level, most, key=LEVELS.index), flag.code.replace("_", " ")
     return level, ""
 
 
@@ -125,7 +125,7 @@ def _dead_time(fit: FractionalDelayFit) -> Verdict:
         said = f"{said}, dead time or short lags: the record cannot tell"
     else:
         said = f"{said}, {in_time(width)} wide"
-    return Verdict("dead time", level, _because(said, why), width)
+    return Verdict("dead time", level, _because(said, why), float(width))
 
 
 def _gain(fit: FractionalDelayFit) -> Verdict:

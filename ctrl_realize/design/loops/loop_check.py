@@ -17,6 +17,7 @@ from ..._flags import Flag, flagged
 from ..._wording import in_time, interval_in_time
 from ...delayed import DelayedStateSpace
 from ...errors import ModelWarning, UnsuitableSystemError, warn_caller
+from ...identification.plausible import PlausibleModels
 from ...numerics.arrays import ComplexArray
 from ...results import Result
 from ..siso import interval_of_dead_time
@@ -34,7 +35,6 @@ the crossovers, see `DelayRobustness`."""
 MOST_SENSITIVE = 2.0
 """Largest Ms without a warning: gain and phase margin are then at least 2 and 29 deg (Astrom and
 Hagglund, Advanced PID Control, 2006, chapter 4)."""
-_AT_INTERVALS = 6  # corners of two intervals and of their nominal values, at most
 ROUNDED = 1e-3
 """Share by which Ms may exceed a limit that a controller was optimized for."""
 
@@ -162,7 +162,7 @@ def loop_check(plant: Any, controller: Any, dead_time: float = 0.0) -> LoopCheck
     robust = None if interval is None else over_interval(plant, loop, found, interval, TRIED)
     corners = _corners(plant, loop, found, robust)
     made = LoopCheck(found, robust, corners)
-    return replace(made, flags=(*flags, *_over_intervals(made)))
+    return replace(made, flags=(*flags, *_left_open(made, _models_of(plant) is not None)))
 
 
 def _sensitive(found: Margins) -> tuple[Flag, ...]:
@@ -175,8 +175,9 @@ def _corners(
     plant: DelayedStateSpace, loop: Loop, found: Margins, robust: DelayRobustness | None
 ) -> tuple[Corner, ...]:
     """Ms at the ends of the intervals of dead time and gain; the gain scales the whole loop."""
-    if plant.fit is not None and plant.fit.plausible_models is not None:
-        return _of_models(loop, plant.fit.plausible_models.systems)
+    models = _models_of(plant)
+    if models is not None:
+        return _of_models(loop, models.systems)
     gains = _gains(plant)
     if robust is None and not gains:
         return ()
@@ -194,6 +195,10 @@ def _corners(
             at = loop_margins(_moved(loop, delay, ratio))
             corners.append(Corner(time, gain, _ms(at.modulus_margin if at.stable else 0.0)))
     return tuple(corners)
+
+
+def _models_of(plant: DelayedStateSpace) -> PlausibleModels | None:
+    return None if plant.fit is None else plant.fit.plausible_models
 
 
 def _of_models(loop: Loop, systems: Iterable[DelayedStateSpace]) -> tuple[Corner, ...]:
@@ -228,12 +233,11 @@ def _moved(loop: Loop, delay: int, factor: float) -> Loop:
     return replace(loop, factors=(scaled, *loop.factors[1:]))
 
 
-def _over_intervals(made: LoopCheck) -> tuple[Flag, ...]:
-    """What the identification leaves open does to the loop.
+def _left_open(made: LoopCheck, models: bool) -> tuple[Flag, ...]:
+    """What the identification leaves open does to the loop: its models, or else its intervals.
 
     The interval of a dead time alone is for fits that say nothing on the lags that go with it.
     """
-    models = len(made.corners) > _AT_INTERVALS
     if not models and made.robustness is not None and not made.robustness.stable:
         low, high = made.robustness.dead_time_interval
         inside = flagged(

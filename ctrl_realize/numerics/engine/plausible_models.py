@@ -44,9 +44,7 @@ _WIDER = 1.5  # standard deviations of the proposals, over those of the errors: 
 _PROPOSED = 16  # for each model that is drawn
 _EFFECTIVE = 0.7  # independent proposals for each, in effect, below which they are moved instead
 _SWEEPS = 25  # of these moves
-_WIDEST = (
-    1.5  # of the logarithm of a pole, as a standard deviation: a factor of twenty on each side
-)
+_WIDEST = 1.5  # standard deviation of the log of a pole: a factor of twenty on each side
 
 
 class PlausibleModel(NamedTuple):
@@ -81,7 +79,7 @@ def plausible_models(
 
 
 def _counts(shares: FloatArray, count: int) -> FloatArray:
-    """Draws of each, by systematic resampling: within one of what is expected."""
+    """Draws of each, within one of its share."""
     ends = np.round(np.cumsum(shares) * count - 1e-9)
     return np.diff(ends, prepend=0.0)
 
