@@ -55,8 +55,8 @@ def flagged(key: str, /, **values: object) -> Flag:
     Examples
     --------
     >>> from ctrl_realize._flags import flagged
-    >>> flagged("drift", rate="0.2 per s")
-    Flag(code='drift', message='a drift of 0.2 per s was estimated together with the model')
+    >>> flagged("failed_draws", failed=3)
+    Flag(code='failed_draws', message='the estimator raised an error for 3 draws')
     """
     code, _, case = key.partition(".")
     return Flag(code, _table()[code][case or "words"].format(**values))

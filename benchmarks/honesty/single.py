@@ -10,12 +10,10 @@ from .worlds import DT, NOISES, PLANTS, WRONG, step_case
 STRUCTURES = {"R1": (1, 1), "R2": (2, 2), "R3": (3, 3), "R4": (4, 4)}
 DOUBTS = (
     "structured_misfit",
-    "estimates_disagree",
     "structures_disagree",
     "no_delay_resolved",
     "many_lags",
     "dispersed_flow",
-    "onset_open",
     "delay_at_bound",
 )
 """Flags that tell the reader not to trust the interval's middle."""

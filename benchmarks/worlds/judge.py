@@ -22,6 +22,7 @@ MODEL = frozenset(
         "not_linear",
         "time_varying",
         "earlier_input",
+        "not_at_rest",
         "noncausal",
         "cancelled_pair",
         "output_at_limit",
@@ -35,11 +36,9 @@ MODEL = frozenset(
 """Flags that doubt the model as a whole. That nothing was told about a residual but that it is
 coloured does not count, nor that no delay is resolved: that gives an upper end of its own."""
 DELAY = MODEL | {
-    "estimates_disagree",
     "structures_disagree",
     "many_lags",
     "dispersed_flow",
-    "onset_open",
     "delay_at_bound",
     "held_output",
 }

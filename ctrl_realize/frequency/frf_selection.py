@@ -25,7 +25,9 @@ from ..numerics.rational.search import (
     dead_time_bound,
     fit_structures,
 )
+from ..numerics.signals.noise import largest_excess
 from ..numerics.statistics import mixture_quantile
+from .comparison import hertz
 from .frf_fit import FRFFit, FRFStructure
 from .frf_structures import ComparedFits, compared_fits, key_of, residual_ratio
 from .points import FRFPoints
@@ -95,7 +97,9 @@ def chosen_model(
         interval, systematic = _of_lower_orders(data, compared, unit, interval)
         flags.extend(systematic)
     if noise_known and ratio > _POOR_MISFIT:
-        flags.append(flagged("misfit", ratio=plainly(ratio, 2), order=n))
+        first, stop = largest_excess(np.abs(data.misfit(chosen)))
+        band = f"{hertz(frequency[first])} and {hertz(frequency[stop - 1])}"
+        flags.append(flagged("structured_misfit.frf", ratio=plainly(ratio, 2), band=band, order=n))
     flags.extend(_leading_phase(data, fits, chosen, unit))
     poles, pole_std = pole_deviations(data, chosen, scales[key_of(best)], robust=not noise_known)
     A, B, C, D = modal_state_space(data, chosen)

@@ -14,7 +14,7 @@ import control as ct
 import numpy as np
 
 from .._flags import Flag, flagged, marked
-from .._wording import in_time, interval_in_time
+from .._wording import interval_in_time
 from ..data import Record
 from ..delayed import DelayedStateSpace, fit_of
 from ..errors import DataError, OrderError, UnsuitableSystemError
@@ -145,14 +145,13 @@ def _chosen(
         flags += changes
         if total is not None and all(flag.code != "not_linear" for flag in flags):
             flags += nonlinear_flags(shown, _delay(system), total / dt)
-    if own[0] <= _NOTHING:
-        flags.append(flagged("no_delay_resolved", high=in_time(high)))
-    if high - low > max(_FAR_APART * max(dead_time, dt), 2 * dt * (own[1] - own[0])):
+    wide = high - low > max(_FAR_APART * max(dead_time, dt), 2 * dt * (own[1] - own[0]))
+    if own[0] <= _NOTHING or wide:
         flags.append(
             flagged(
-                "structures_disagree.state_space",
-                chosen=interval_in_time(dt * own[0], dt * own[1]),
-                lags=interval_in_time(*lags.interval),
+                "no_delay_resolved" if own[0] <= _NOTHING else "structures_disagree",
+                interval=interval_in_time(low, high),
+                known="",
             )
         )
     reasons = (

@@ -16,6 +16,7 @@ from ..frequency.disagreement import CLOSE, FAR
 from ..identification.campaign.campaign import Campaign
 from ..identification.output_error.words import gain_scatter, sign_is_told
 from ..identification.realization.delay_scan_result import DelayScan
+from ..identification.verdicts import in_doubt
 from ..plots.delays import estimate_of, interval_of
 from .facts import (
     INTEGRATING,
@@ -26,8 +27,6 @@ from .facts import (
 )
 
 _CONTRADICTED = "frf_disagrees"
-_GAIN_OPEN = "gain_not_resolved"
-"""It forbids to use a model only if the sign of the gain is open."""
 
 SCANNED = (
     "the dead time is the delay with the smallest IAE, and the interval shows how flat the "
@@ -98,8 +97,6 @@ def _verdict(
     system: DelayedStateSpace, flags: Sequence[Flag | str], facts: Sequence[tuple[str, str]]
 ) -> Verdict:
     codes = {_code(flag) for flag in flags}
-    if _sign_is_told(system):
-        codes.discard(_GAIN_OPEN)
     level: Level = "caution" if flags else "good"
     judgement = _JUDGEMENTS[level]
     answers = () if system.fit is None else system.fit.verdicts
@@ -111,7 +108,7 @@ def _verdict(
             level = "poor"
         judgement = " ".join(f"{key[:1].upper()}{key[1:]}: {value}." for key, value in said.items())
         codes -= marked("wrong_dead_time")
-    if codes & marked("wrong_model"):
+    if codes & marked("wrong_model") or not _sign_is_told(system):
         level, judgement = "poor", _CONTRADICTION if _CONTRADICTED in codes else _WRONG_MODEL
     elif codes & marked("wrong_dead_time"):
         level, judgement = "poor", _JUDGEMENTS["poor"]
@@ -185,7 +182,7 @@ def headline_of(system: DelayedStateSpace) -> str:
 
 
 def _sign_is_told(system: DelayedStateSpace) -> bool:
-    flagged = any(_code(flag) == _GAIN_OPEN for flag in _flags_of(system))
+    flagged = any(_code(flag) == "gain_not_resolved" for flag in _flags_of(system))
     return not flagged or sign_is_told(None if system.fit is None else system.fit.gain_interval)
 
 
@@ -195,10 +192,15 @@ def _flags_of(system: DelayedStateSpace) -> tuple[Flag | str, ...]:
 
 
 def _reasons(flags: Sequence[Flag | str]) -> tuple[str, ...]:
-    """List the flags, the worst first."""
-    worst = [_CONTRADICTED, *sorted(marked("wrong_model")), *sorted(marked("wrong_dead_time"))]
-    rank = {code: place for place, code in reversed(list(enumerate(worst)))}
-    ordered = sorted(flags, key=lambda flag: rank.get(_code(flag), len(worst)))
+    """List the flags, the worst first: those that go with wrong answers before notes."""
+    wrong, late = marked("wrong_model"), marked("wrong_dead_time")
+
+    def rank(flag: Flag | str) -> tuple[bool, ...]:
+        code = _code(flag)
+        warns = isinstance(flag, Flag) and in_doubt(flag)
+        return code != _CONTRADICTED, code not in wrong, not warns, code not in late
+
+    ordered = sorted(flags, key=rank)
     return tuple(dict.fromkeys(_sentence(str(flag)) for flag in ordered))
 
 

@@ -113,7 +113,7 @@ def test_what_is_no_noise_does_not_buy_orders():
     frf = cr.MeasuredFRF(second_order(s) * wave + noise, f, std=np.full(200, 1e-4))
     fit = cr.fit_frf(frf, dt=1e-3).fit
     assert fit.order <= 5
-    assert "misfit" in {flag.code for flag in fit.flags}
+    assert "structured_misfit" in {flag.code for flag in fit.flags}
     assert fit.interval[0] <= 0.04 <= fit.interval[1]
 
 
@@ -266,7 +266,7 @@ def test_motor_bench_resonance_and_one_sample_of_delay():
     assert fit.dead_time / dt == pytest.approx(1, abs=0.3)
     assert np.abs(fit.poles[-1]) / (2 * np.pi) == pytest.approx(76.6, abs=1)
     # A fast fifth pole would do as well for part of the dead time, which the interval says.
-    assert [flag.code for flag in fit.flags] == ["structures_disagree", "misfit"]
+    assert [flag.code for flag in fit.flags] == ["structures_disagree", "structured_misfit"]
     assert 0.5 < fit.interval[0] / dt < fit.interval[1] / dt < 1.1
 
 

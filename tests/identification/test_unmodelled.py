@@ -12,7 +12,7 @@ from benchmarks.worlds.judge import judged
 from tests.rigs import codes
 
 FAMILIES = [
-    (steps.still_coming_to_rest, 0, "earlier_input"),
+    (steps.still_coming_to_rest, 0, "not_at_rest"),
     (sensors.dead_band_of_a_historian, 0, "held_output"),
     (driven.insensitive, 0, "not_linear"),
     (loops.relay_with_load, 0, "feedback"),

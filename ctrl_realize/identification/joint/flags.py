@@ -12,11 +12,11 @@ from ..._wording import in_time, interval_in_time
 from ...frequency.comparison import hertz
 from ...numerics.joint.agreement import BY_CHANCE
 from ...numerics.rational.bands import running_median, widest_run
+from ...numerics.signals.noise import largest_excess
 from ..output_error.flags import model_flags
 from .result import JointFit
 
 _SMOOTHED_POINTS = 3  # a single bad point is not a band
-_MUCH = 0.5  # of the largest shift of a response: where it is reported to be
 
 
 def joint_flags(fit: JointFit, latest: float | None) -> tuple[Flag, ...]:
@@ -63,13 +63,10 @@ def _points_outside(fit: JointFit) -> str:
 
 def _times_outside(fit: JointFit) -> str:
     shift = np.abs(fit.agreement.shift)
-    worst = int(np.argmax(shift))
-    small = np.flatnonzero(shift < _MUCH * shift[worst])
-    first = int(small[small < worst].max(initial=-1)) + 1
-    last = int(small[small > worst].min(initial=shift.size)) - 1
-    times = fit.time[first], fit.time[last]
+    first, stop = largest_excess(shift)
+    times = fit.time[first], fit.time[stop - 1]
     return (
-        f"is up to {shift[worst] / fit.record_fit.residual:.2g} residuals of the records away from "
+        f"is up to {shift.max() / fit.record_fit.residual:.2g} residuals of the records away from "
         f"their own model, mainly at {interval_in_time(*times)}"
     )
 

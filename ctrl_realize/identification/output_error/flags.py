@@ -16,14 +16,18 @@ from ..._wording import (
     time_within,
 )
 from ...numerics.arrays import ComplexArray, FloatArray
+from ...numerics.constants import SMALLEST
+from ...numerics.engine.modal import partial_fractions
 from ...numerics.engine.poles import lag_sum
 from ...numerics.engine.profile import profile_limits
 from ...numerics.engine.static_gain import INTEGRATOR
 from ...numerics.output_error.margins import CLOSE, DecisionKey
 from ...numerics.output_error.result import OutputErrorEstimate, StructureFit
 from ...numerics.output_error.step_data import StepData
+from ...numerics.signals.filters import moving_mean
+from ...numerics.signals.noise import largest_excess
 from .sensor_flags import outliers
-from .words import ESTIMATE_WORDS, is_firm, order_words, sign_is_told, structure_words
+from .words import gain_in_words, is_firm, order_words, sign_is_told, structure_words
 
 # Thresholds for flags alone are a matter of presentation.
 _SAMPLES_BESIDE_NOTHING = 0.5  # a dead time below it counts as zero
@@ -45,8 +49,33 @@ def fit_flags(
     data: StepData, fit: OutputErrorEstimate, latest: float | None, start: float
 ) -> Iterator[Flag]:
     """List the flags of a fit of one (mean) step record whose first sample is at `start` s."""
+    if not fit.adequate:
+        interval = interval_in_time(fit.low, fit.high)
+        yield flagged("structured_misfit", missed=missed(data, fit, start), interval=interval)
     yield from model_flags(fit, data.dt, data.length, latest)
+    yield from _before_the_step(data, fit)
     yield from _record_flags(data, fit, start)
+
+
+def missed(data: StepData, fit: OutputErrorEstimate, start: float) -> str:
+    """Write how much of the response a model misses where most of the misfit is, and when that is.
+
+    The root mean square without that of the noise; `start` in s. Noise hides the place less in
+    means over as many samples as count as one.
+    """
+    error = data.output - fit.fitted
+    means = moving_mean(error, round(fit.residual.correlation))
+    first, stop = largest_excess(means)
+    power, least = (float(np.mean(part[first:stop] ** 2)) for part in (error, means))
+    share = _percent(float(np.sqrt(max(power - data.sigma**2, least))), data)
+    begins, ends = start + data.clock[[first, stop - 1]]
+    when = interval_in_time(begins, ends, "and")
+    return f"{share} between {when} ({plainly(fit.residual.normalized_rms, 2)} times the noise)"
+
+
+def _percent(size: float, data: StepData) -> str:
+    span = float(np.ptp(data.output)) if data.motion is None else data.motion.span
+    return f"{plainly(100 * size / span, 2)} % of the response"
 
 
 def sampled_flags(
@@ -65,10 +94,7 @@ def model_flags(
 
     `length` is that of the record in s, `latest` the dead time up to which was to be sought.
     """
-    extrapolated = [*_slow_modes(fit, length), *_unresolved_gain(fit, length)]
-    firm = ""
-    if not extrapolated and (fit.static is None or is_firm(fit.static.total, fit.total_ends)):
-        firm = "; only the total delay is well determined"
+    extrapolated = list(_extrapolated(fit, length))
     form, process = fit.process.form, structure_words(fit)
     if fit.better is not None:
         yield flagged(
@@ -90,18 +116,18 @@ def model_flags(
     reached = latest is not None and fit.latest >= latest * (1 - 1e-9)
     if reached and fit.high >= 0.98 * fit.latest:
         yield flagged("delay_at_bound", max_delay=fit.latest / dt)
-    stated = form and (not form.dead_time or "dead_time" in form.fixed)
-    if fit.low <= _SAMPLES_BESIDE_NOTHING * dt and not stated:
-        yield flagged("no_delay_resolved", high=in_time(fit.high))
+    none = _may_be_none(fit, dt)
+    if none or fit.open_start or _is_wide(fit, dt):
+        yield flagged(
+            "no_delay_resolved" if none else "structures_disagree",
+            interval=interval_in_time(fit.low, fit.high),
+            known="" if extrapolated else _known_sum(fit),
+        )
     if fit.distributed.unlimited:
-        yield flagged("many_lags", firm=firm)
+        yield flagged("many_lags", known="" if extrapolated else _known_sum(fit))
     yield from _dispersed_flow(fit)
-    if fit.open_start:
-        interval = interval_in_time(fit.low, fit.high, "and")
-        yield flagged("onset_open", interval=interval, firm=firm)
     yield from extrapolated
     yield from _cancelled_pair(fit)
-    yield from _disagreement(fit, dt, firm)
     zeros = right_zeros(fit)
     right = np.sort(zeros[zeros.imag == 0].real)
     # A response begins in the wrong direction if the number of its real zeros there is odd.
@@ -111,6 +137,12 @@ def model_flags(
         named = [(near.key, near.structure and order_words(near.structure)) for near in fit.close]
         said = "; ".join(_DECISIONS[key].format(structure) for key, structure in named)
         yield flagged("marginal_decision", decisions=said, close=CLOSE)
+
+
+def _known_sum(fit: OutputErrorEstimate) -> str:
+    if fit.static is None or not (fit.adequate and is_firm(fit.static.total, fit.total_ends)):
+        return ""
+    return f"; their sum is {time_and_interval(fit.static.total, *fit.total_ends)}"
 
 
 def _dead_time_of(line: StructureFit) -> str:
@@ -140,21 +172,23 @@ def _dispersed_flow(fit: OutputErrorEstimate) -> Iterator[Flag]:
     )
 
 
-def _slow_modes(fit: OutputErrorEstimate, length: float) -> Iterator[Flag]:
-    """Report that a record of `length` s ends before the slowest mode has decayed."""
-    slowest = float(np.abs(fit.poles).min()) * length
-    if slowest < INTEGRATOR:
+def _extrapolated(fit: OutputErrorEstimate, length: float) -> Iterator[Flag]:
+    """Report that a record of `length` s does not show the gain, or not all of the response."""
+    seen, ends, unseen = max(length - fit.dead_time, 0.0), "", fit.poles[:0]
+    if np.abs(fit.poles).min() * length < INTEGRATOR:
         yield flagged("integrating")
-        return
-    seen = max(length - fit.dead_time, 0.0)
-    unseen = _not_died_away(fit.poles, seen)
-    if unseen.size:
-        less = " of a pole pair of which less than one period was recorded"
-        yield flagged(
-            "not_settled",
-            constants=seen * float(np.min(-unseen.real)),
-            pair=less if np.any(unseen.imag) else "",
-        )
+    elif (unseen := _not_died_away(fit.poles, seen)).size:
+        residues, gain, _ = partial_fractions(fit.poles[None], np.ones(1), fit.numerator.size)
+        left = float(np.real(np.exp(fit.poles * seen) @ residues[0] @ fit.numerator))
+        reached = 1 + left / (gain[0] * fit.numerator[0])
+        ends = f"the record ends at {plainly(100 * reached, 2)} % of the response"
+    unresolved = list(_unresolved_gain(fit, ends and f"; {ends}"))
+    yield from unresolved
+    if ends and not unresolved:
+        periods = 2 * np.pi / np.maximum(np.abs(unseen.imag), SMALLEST)
+        more = float(np.max(np.minimum(_SETTLED / -unseen.real, periods))) - seen
+        said = gain_in_words(float(gain[0] * fit.numerator[0]), fit.gain_ends)
+        yield flagged("not_settled", ends=ends, gain=said, more=in_time(more, 2))
 
 
 def _not_died_away(poles: ComplexArray, seen: float) -> ComplexArray:
@@ -167,23 +201,21 @@ def _not_died_away(poles: ComplexArray, seen: float) -> ComplexArray:
     return poles[slow & (np.abs(poles.imag) * seen < 2 * np.pi)]
 
 
-def _unresolved_gain(fit: OutputErrorEstimate, length: float) -> Iterator[Flag]:
+def _unresolved_gain(fit: OutputErrorEstimate, ends: str) -> Iterator[Flag]:
     """Report that gain or total delay are not determined: structures differ, or the sign is open.
 
-    The sign is determined if the interval of the gain does not contain zero (`sign_is_told`).
+    The sign is determined if the interval of the gain does not contain zero (`sign_is_told`);
+    `ends` says where the record ends, if that is too early.
     """
     if fit.static is not None and not sign_is_told(fit.gain_ends):
         gain, (low, high) = fit.static.gain, fit.gain_ends
         if fit.load is not None and fit.load.early:
             yield flagged("gain_not_resolved.load", gain=gain)
         elif fit.static.resolved:
-            yield flagged("gain_not_resolved.sign", gain=gain, low=low, high=high)
+            yield flagged("gain_not_resolved.sign", gain=gain, low=low, high=high, ends=ends)
         else:
-            slowest = in_time(float(1 / np.abs(fit.poles).min()))
-            error, whole = fit.static.gain_std, in_time(length)
-            yield flagged(
-                "gain_not_resolved.slow", gain=gain, slowest=slowest, length=whole, error=error
-            )
+            slowest, error = in_time(float(1 / np.abs(fit.poles).min())), fit.static.gain_std
+            yield flagged("gain_not_resolved.slow", gain=gain, slowest=slowest, error=error)
         return
     kept = [line for line in fit.structures if line.delta_bic <= _AS_GOOD]
     gain = float(np.real(fit.numerator[0] / np.prod(-fit.poles)))
@@ -191,8 +223,8 @@ def _unresolved_gain(fit: OutputErrorEstimate, length: float) -> Iterator[Flag]:
     gains = np.array([gain, *(line.gain for line in kept)])
     totals = np.array([total, *(line.total_delay for line in kept)])
     if not fit.robust and (_apart(gains) or _apart(totals)):
-        between = interval_in_time(totals.min(), totals.max())
-        yield flagged("gain_not_resolved", low=gains.min(), high=gains.max(), totals=between)
+        low, high, between = gains.min(), gains.max(), interval_in_time(totals.min(), totals.max())
+        yield flagged("gain_not_resolved", low=low, high=high, totals=between, ends=ends)
 
 
 def _apart(values: FloatArray) -> bool:
@@ -209,26 +241,18 @@ def _cancelled_pair(fit: OutputErrorEstimate) -> Iterator[Flag]:
             return
 
 
-def _disagreement(fit: OutputErrorEstimate, dt: float, firm: str) -> Iterator[Flag]:
-    """Report dead times of estimates, or of structures, that are far apart."""
-    width, dead_time = fit.high - fit.low, max(fit.dead_time, dt)
-    if fit.delay_estimates:
-        if width > 0.3 * dead_time:
-            apart = [
-                f"{ESTIMATE_WORDS[key]} {in_time(delay)}"
-                for key, delay in fit.delay_estimates
-                if abs(delay - fit.dead_time) > 0.15 * fit.dead_time
-            ]
-            yield flagged("estimates_disagree", estimates=", ".join(apart))
-        return
-    low, high = profile_limits(*fit.profile)
-    if not fit.open_start and width > max(_FAR_APART * dead_time, 2 * (high - low)):
-        yield flagged(
-            "structures_disagree",
-            chosen=interval_in_time(low, high),
-            all=interval_in_time(fit.low, fit.high),
-            firm=firm,
-        )
+def _may_be_none(fit: OutputErrorEstimate, dt: float) -> bool:
+    """Whether a model without dead time fits as well, unless that was stated."""
+    form = fit.process.form
+    stated = form is not None and (not form.dead_time or "dead_time" in form.fixed)
+    return fit.low <= _SAMPLES_BESIDE_NOTHING * dt and not stated
+
+
+def _is_wide(fit: OutputErrorEstimate, dt: float) -> bool:
+    """Whether structures, or estimates beside a model at noise level, are far apart."""
+    width, (low, high) = fit.high - fit.low, profile_limits(*fit.profile)
+    within = 0.0 if fit.delay_estimates else 2 * (high - low)
+    return not fit.robust and width > max(_FAR_APART * max(fit.dead_time, dt), within)
 
 
 def right_zeros(fit: OutputErrorEstimate) -> ComplexArray:
@@ -241,13 +265,28 @@ def right_zeros(fit: OutputErrorEstimate) -> ComplexArray:
     return np.asarray(zeros[(zeros.real > 0) & near])
 
 
+def _before_the_step(data: StepData, fit: OutputErrorEstimate) -> Iterator[Flag]:
+    """Report an output that moved before the step, or may have.
+
+    An input change before the record may explain the start of the response if that starts together
+    with the step and less than a total delay was recorded before it; or if the model has zeros in
+    the right half-plane, with which it imitates a second response, and less than the dead time was
+    recorded.
+    """
+    rest = data.edges[0][0] * data.dt
+    if data.relaxing:
+        moved = _percent(float(np.ptp(fit.fitted[: data.edge])), data)
+        yield flagged("not_at_rest", moved=moved, rest=in_time(rest))
+        return
+    lags = fit.poles[np.abs(fit.poles) * data.length >= INTEGRATOR]
+    at_once = _may_be_none(fit, data.dt) and rest < fit.dead_time + lag_sum(lags, fit.numerator)
+    detour = rest < fit.high and right_zeros(fit).size > 0
+    if at_once or detour:
+        yield flagged("earlier_input" if at_once else "earlier_input.zeros", rest=in_time(rest))
+
+
 def _record_flags(data: StepData, fit: OutputErrorEstimate, start: float) -> Iterator[Flag]:
-    """List the flags of the record: what the model does not explain, and what disturbed it."""
-    if not fit.adequate:
-        yield flagged(
-            "structured_misfit" if fit.delay_estimates else "structured_misfit.stated",
-            ratio=plainly(fit.residual.normalized_rms, 2),
-        )
+    """List the flags of the record: what disturbed it."""
     if fit.load is not None:
         yield flagged(
             "load_disturbance.early" if fit.load.early else "load_disturbance",
@@ -255,14 +294,14 @@ def _record_flags(data: StepData, fit: OutputErrorEstimate, start: float) -> Ite
             when=in_time(start + fit.load.time, 4),
         )
     if data.edge < 8:
-        yield flagged("no_rest", samples=data.edge)
-    if data.relaxing:
-        yield flagged("not_at_rest")
-    elif data.drift:
-        yield flagged("drift", rate=rate_in_time(data.drift / data.dt))
+        yield flagged("no_rest", samples=data.edge, share=_percent(data.sigma, data))
+    if data.drift and not data.relaxing:
+        share = _percent(abs(data.drift) * data.input.size, data)
+        yield flagged("drift", rate=rate_in_time(data.drift / data.dt), share=share)
     if data.hum:
         yield flagged("hum", lines=", ".join(f"{f / data.dt:.4g} Hz" for f in data.hum))
     if data.coarse:
-        yield flagged("coarse_quantisation", quantum=data.quantum)
-    noise = max(fit.residual.std, data.sigma) if fit.adequate else None
-    yield from outliers(data.output, fit.fitted, noise)
+        share = _percent(data.quantum, data)
+        yield flagged("coarse_quantisation", quantum=data.quantum, share=share)
+    noise = max(fit.residual.std, data.sigma) if fit.adequate else np.inf
+    yield from outliers(data.output, (data.output - fit.fitted) / noise, start + data.clock)

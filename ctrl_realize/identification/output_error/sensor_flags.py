@@ -7,8 +7,9 @@ from collections.abc import Iterator
 import numpy as np
 
 from ..._flags import Flag, flagged
-from ..._wording import in_time
+from ..._wording import in_time, plainly
 from ...numerics.arrays import FloatArray
+from ...numerics.constants import SMALLEST
 from ...numerics.signals.noise import winsorised_sigma
 from ...numerics.validation.held_output import held_share, longest_hold, stuck_samples
 from ...numerics.validation.limits import at_limit
@@ -45,20 +46,22 @@ def sensor_flags(fit: OutputErrorFit, output: FloatArray, fitted: FloatArray) ->
         yield from _onset_in_gap(fit)
         yield from _lead(fit, output, fitted)
     else:
-        yield from outliers(output, fitted, fit.residual if fit.at_noise_level else None)
+        noise = max(fit.residual, SMALLEST) if fit.at_noise_level else np.inf
+        yield from outliers(output, (output - fitted) / noise, fit.time)
 
 
-def outliers(output: FloatArray, fitted: FloatArray, sigma: float | None) -> Iterator[Flag]:
+def outliers(output: FloatArray, off: FloatArray, time: FloatArray) -> Iterator[Flag]:
     """Report a code for missing samples, or samples that are far off the model.
 
-    `sigma` is the standard deviation of the noise; None if the residual is more than noise.
+    `off` (N,) is the residual in standard deviations of the noise, at `time` in s; zero if the
+    residual is more than noise.
     """
+    share, worst = float(np.mean(np.abs(off) > _OUTLIER)), int(np.argmax(np.abs(off)))
     if code := missing_code(output):
         yield code
-    elif sigma is not None:
-        share = float(np.mean(np.abs(output - fitted) > _OUTLIER * sigma))
-        if share > _MANY:
-            yield flagged("outliers", share=100 * share, limit=_OUTLIER)
+    elif share > _MANY:
+        most = f"{plainly(abs(off[worst]), 2)} at {in_time(time[worst])}"
+        yield flagged("outliers", share=100 * share, limit=_OUTLIER, most=most)
 
 
 def missing_code(output: FloatArray) -> Flag | None:

@@ -17,6 +17,9 @@ References
    79 (1998) 61-78, doi:10.1175/1520-0477(1998)079<0061:APGTWA>2.0.CO;2.
 .. [6] R. E. Kass and A. E. Raftery, Bayes factors, J. Amer. Statist. Assoc. 90 (1995) 773-795,
    doi:10.1080/01621459.1995.10476572.
+.. [7] C. Inclan and G. C. Tiao, Use of cumulative sums of squares for retrospective detection of
+   changes of variance, J. Amer. Statist. Assoc. 89 (1994) 913-923,
+   doi:10.1080/01621459.1994.10476824.
 """
 
 from __future__ import annotations
@@ -253,6 +256,25 @@ def _lagged_products(values: FloatArray, lags: int) -> FloatArray:
         product *= np.conj(np.fft.rfft(values[start : start + size], n=points))
         total += np.fft.irfft(product, n=points)[:lags]
     return total
+
+
+def largest_excess(values: FloatArray) -> tuple[int, int]:
+    """First sample, and the one after the last, between which a series is most above its power.
+
+    Of all intervals the one with the largest sum of squares above their mean: where the cumulative
+    sum of squares rises most above its line [7]_.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from ctrl_realize.numerics.signals.noise import largest_excess
+    >>> largest_excess(np.array([1.0, -1.0, 1.0, 4.0, -1.0, -5.0, 1.0, 1.0]))
+    (3, 6)
+    """
+    power = values**2
+    above = np.concatenate([[0.0], np.cumsum(power - power.mean())])
+    stop = int(np.argmax(above - np.minimum.accumulate(above)))
+    return int(np.argmin(above[: stop + 1])), stop
 
 
 def colouring(rest: FloatArray, sigma: float) -> float:

@@ -76,7 +76,7 @@ def test_a_beginning_that_a_zero_imitates_is_left_open():
     fit = cr.fit_output_error(cr.Record(k * TS, (k >= 0).astype(float), y)).fit
     low, high = fit.delay_interval
     assert fit.order > fit.relative_degree
-    assert "onset_open" in codes(fit)
+    assert "structures_disagree" in codes(fit)
     assert fit.delay > 39
     assert low <= 37 <= high
     # three times as far before the delay as the first motion is behind it, and a sample after that

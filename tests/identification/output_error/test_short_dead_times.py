@@ -75,7 +75,7 @@ def test_a_likelihood_that_is_flat_down_to_nothing_gives_way_to_the_first_motion
     assert fit.interval[0] == 0
     assert fit.delay_interval[1] > samples + 0.5
     assert any("agree on a later one" in choice for choice in fit.choices)
-    assert "estimates_disagree" in codes(fit)
+    assert "no_delay_resolved" in codes(fit)
 
 
 def test_a_resonance_is_seen_through_slow_noise_and_a_coarse_encoder():

@@ -6,9 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from ...._flags import flagged, marked
+from ...._flags import Flag, flagged, marked
 from ...._parameters import Parameter
-from ...._wording import plainly
 from ....errors import DataError
 from ....numerics.actuated.choice import ActuatedFit, fit_actuated
 from ....numerics.actuated.intervals import propagated
@@ -31,7 +30,7 @@ from ....numerics.output_error.step_fit import ADEQUATE
 from ....numerics.signals.correlation import fit_percent
 from ....numerics.signals.noise import mad_sigma
 from ...step.steps import found_edges
-from ..flags import model_flags
+from ..flags import missed, model_flags
 from ..result import OutputErrorFit
 from .alternatives import (
     ALTERNATIVES,
@@ -162,13 +161,14 @@ def _replaced(
     staying = marked("stays_with_actuator")
     if result.data.load is not None:
         staying |= {"load_disturbance"}
-    flags = [flag for flag in result.flags if flag.code in staying]
+    flags: list[Flag] = []
+    if not estimate.adequate:
+        part = missed(data, estimate, float(time[0]))
+        flags.append(flagged("structured_misfit.actuator", missed=part))
+    flags += [flag for flag in result.flags if flag.code in staying]
     flags += model_flags(estimate, result.dt, scales.length, None)
     if actuator.unresolved:
         flags.append(flagged("actuator_not_resolved", parameters="; ".join(actuator.unresolved)))
-    if not estimate.adequate:
-        ratio = plainly(estimate.residual.normalized_rms, 3)
-        flags.append(flagged("structured_misfit.actuator", ratio=ratio))
     return replace(
         result,
         estimate=estimate,

@@ -11,6 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from ...._flags import Flag, flagged
+from ...._wording import in_time
 from ....data import Record
 from ....delayed.simulation import simulate_record
 from ....errors import DataError, UnsuitableSystemError
@@ -85,7 +86,8 @@ def _without_plateaus(record: Record, linear: OutputErrorFit, fit: Fit) -> Outpu
     if not held.any():
         return linear
     if np.isfinite(linear.onset):  # any other input may leave the output where it is
-        doubt = flagged("may_be_at_limit", limits=_levels(output, held))
+        when = in_time(record.time[np.argmax(held)])
+        doubt = flagged("may_be_at_limit", limits=_levels(output, held), when=when)
         linear = replace(linear, flags=(*linear.flags, doubt))
     if np.count_nonzero(record.seen & ~held) < FEWEST_SAMPLES:
         return linear
