@@ -22,7 +22,7 @@ SPELLED = {
 _MORE = {"output": ["--response"]}
 _METAVARS = {
     "rest": "INPUT OUTPUT", "band_hz": "LOW HIGH", "command_range": "CLOSED OPEN",
-    "travel_range": "CLOSED OPEN",
+    "travel_range": "CLOSED OPEN", "dead_time": "LOW HIGH",
 }  # fmt: skip
 _TYPES = (
     (r"Selector|Structures|Sequence\[str", list[str]), ("Sequence|tuple", tuple[float, float]),

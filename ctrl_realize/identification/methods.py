@@ -48,6 +48,8 @@ def identify(
     samples: int | None = None,
     feedthrough: bool | None = None,
     frf: ct.FrequencyResponseData | None = None,
+    fastest_lag: float | None = None,
+    dead_time: tuple[float, float] | None = None,
 ) -> DelayedStateSpace:
     """Identify a model with dead time from one record, or from several of one plant.
 
@@ -91,6 +93,10 @@ def identify(
     frf : MeasuredFRF, optional
         Measured frequency response of the same plant, which is fitted together with the records;
         see `fit_joint`.
+    fastest_lag : float, optional
+        No lag of the plant is faster, in s. For ``"output_error"``, see `fit_output_error`.
+    dead_time : (low, high), optional
+        Range in s of the dead time. For ``"output_error"``, see `fit_output_error`.
 
     Returns
     -------
@@ -157,7 +163,8 @@ def identify(
     system = fit(record, **options)
     if name != _OUTPUT_ERROR or known is not None:
         return system
-    return _modes_judged(system, max_delay, asked=order is not None or structures is not None)
+    asked = any(one is not None for one in (order, structures, fastest_lag, dead_time))
+    return _modes_judged(system, max_delay, asked=asked)
 
 
 _DEFAULTS = {

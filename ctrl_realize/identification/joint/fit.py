@@ -56,6 +56,7 @@ def fit_joint(
     weighting: Literal["auto", "std", "relative", "uniform"] = "auto",
     hold: Literal["auto", "zoh"] | None = "auto",
     band_hz: tuple[float, float] | None = None,
+    dead_time: tuple[float, float] | None = None,
 ) -> DelayedStateSpace:
     """Fit one model with dead time to time records and a frequency response of the same plant.
 
@@ -77,6 +78,8 @@ def fit_joint(
     weighting, hold, band_hz : optional
         See `fit_frf`. With ``hold="zoh"`` and an FRF without sample time, that of the records is
         the hold's.
+    dead_time : (low, high), optional
+        Range in s of the dead time, stated by the user; see `fit_output_error`.
 
     Returns
     -------
@@ -128,7 +131,10 @@ def fit_joint(
     """
     several = as_records(records)
     pairs = plain_pairs(structures, "fit_joint")
-    first = fit_of(fit_output_error(several, structures=pairs, max_delay=max_delay), OutputErrorFit)
+    first = fit_of(
+        fit_output_error(several, structures=pairs, max_delay=max_delay, dead_time=dead_time),
+        OutputErrorFit,
+    )
     held = first.dt if hold == "zoh" else None
     other = fit_of(
         fit_frf(
@@ -146,6 +152,8 @@ def fit_joint(
     window, scales, data, time = _records(first, latest)
     lows, highs = zip(first.interval, other.interval, strict=True)
     span = float(min(lows)), float(max(highs))
+    if dead_time is not None:
+        span = max(span[0], dead_time[0]), min(span[1], dead_time[1])
     spread = _spread(first)
     window = with_random_effects(window, first.estimate, spread, scales.dt)
     points, freedom = _points(other, scales.latest)
@@ -175,9 +183,11 @@ def fit_joint(
         record_fit=first,
         frf_fit=other,
         agreement=agreed,
+        stated=first.stated,
         choices=tuple(_choices(estimate, first, other, spread)),
     )
-    result = replace(result, flags=joint_flags(result, latest))
+    stated = tuple(flag for flag in first.flags if flag.code == "parameter_at_bound")
+    result = replace(result, flags=(*joint_flags(result, latest), *stated))
     return fitted_model(continuous_core(estimate.numerator, result.poles), result)
 
 

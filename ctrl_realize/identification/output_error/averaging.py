@@ -12,7 +12,7 @@ from ...data import Record, StepResponse
 from ...errors import DataError
 from ...numerics.arrays import FloatArray
 from ...numerics.output_error.result import OutputErrorEstimate
-from ...numerics.output_error.step_data import StepData, own_regressors, step_data
+from ...numerics.output_error.step_data import StepData, own_regressors, step_data, step_scales
 from ...numerics.signals.noise import mad_sigma
 from ...numerics.validation.own_response import OwnResponse, own_step_response
 from ..step.steps import unit_step
@@ -80,6 +80,18 @@ def mean_step(steps: tuple[StepResponse, ...], used: Sequence[int]) -> StepData:
             "the mean of the records does not leave its baseline by 5 standard deviations"
         )
     return data
+
+
+def latest_onset(steps: tuple[StepResponse, ...], used: Sequence[int]) -> float:
+    """Time in s up to which the dead time of any of some records may last; see `step_scales`.
+
+    Without end if one of them does not visibly move.
+    """
+    try:
+        every = [mean_step(steps, [i]) for i in used]
+    except DataError:
+        return float("inf")
+    return max(step_scales(one, one.output.size, None).latest for one in every)
 
 
 def near_the_rest(steps: tuple[StepResponse, ...]) -> tuple[int, ...]:

@@ -33,6 +33,7 @@ from .any_input import UnrelatedError, fit_any_input
 from .arguments import checked_records, edges_of, known_factor, step_data_of
 from .averaging import (
     aligned_steps,
+    latest_onset,
     mean_step,
     near_the_rest,
     own_responses,
@@ -65,6 +66,8 @@ def fit_output_error(
     include_known: bool = False,
     gains: Gains = "common",
     actuator: Asked | None = None,
+    fastest_lag: float | None = None,
+    dead_time: tuple[float, float] | None = None,
 ) -> DelayedStateSpace:
     """Fit a transfer function with dead time to raw records.
 
@@ -114,6 +117,14 @@ def fit_output_error(
         records share actuator and linear part. A slew rate has one value, or one for each
         direction; stiction with S = J is a resolution; a characteristic is told by the flows at
         the levels of the command.
+    fastest_lag : float, optional
+        No lag of the plant is faster, in s: stated by the user, not found in the data. Short lags
+        can take the place of dead time; without them its interval is narrower, and it holds if the
+        statement does. Real poles of all structures are no faster, nor is 1 / omega of a pair
+        shorter. A flag says whether the data contradict the statement.
+    dead_time : (low, high), optional
+        Range in s of the dead time, stated by the user. Where the best dead time is at an end of
+        it, a flag says whether the data contradict the statement.
 
     Returns
     -------
@@ -231,9 +242,19 @@ def fit_output_error(
         huber=loss == "huber",
         whiten=noise == "auto",
     )
-    linear = partial(_linear, several, tried, own_gains=gains == "own", may_clip=actuator is None)
+    setting = {"own_gains": gains == "own", "may_clip": actuator is None}
+    free = partial(_linear, several, tried, **setting)
+    linear, stated = free, None
+    if fastest_lag is not None or dead_time is not None:
+        from .stated import bounded, checked_statements, told
+
+        beside = {"actuator": actuator, "max_delay": dead_time and max_delay}
+        stated = checked_statements(fastest_lag, dead_time, **beside)
+        linear = partial(_linear, several, bounded(tried, stated), **setting)
     try:
         result = checked(linear(), alone=known is None)
+        if stated is not None:
+            result = told(result, stated, free)
         if actuator is not None:
             result = with_actuator(result, actuator, tried.structures)
     except UnrelatedError:
@@ -321,6 +342,10 @@ def _fit_mean(
         near_the_rest(steps),
     )
     time = data.dt * data.since.astype(np.float64)
+    if fit.high > fit.latest:
+        # What widens the interval for jitter does not go beyond the last visible onset.
+        last = latest_onset(steps, np.flatnonzero(repeats.kept).tolist())
+        fit = replace(fit, high=min(fit.high, max(last, fit.latest)))
     flags = fit_flags(data, fit, requested.latest, float(time[0]))
     every = (*flags, *repeat_flags(repeats, fit.dead_time, data.dt))
     return OutputErrorFit(

@@ -102,14 +102,14 @@ def model_flags(
             requested=process,
             dead_time=time_within(fit.dead_time, fit.low, fit.high),
             other=order_words(fit.better),
-            other_dead_time=_dead_time_of(fit.better),
+            other_dead_time=dead_time_of(fit.better),
         )
     elif other := _contradicting(fit):
         yield flagged(
             "structure_not_certain",
             requested=process,
             other=order_words(other),
-            dead_time=_dead_time_of(other),
+            dead_time=dead_time_of(other),
         )
     if form and (bounds := [name for name in fit.process.at_bound if name in form.bounds]):
         yield flagged("parameter_at_bound", names=", ".join(bounds))
@@ -145,7 +145,8 @@ def _known_sum(fit: OutputErrorEstimate) -> str:
     return f"; their sum is {time_and_interval(fit.static.total, *fit.total_ends)}"
 
 
-def _dead_time_of(line: StructureFit) -> str:
+def dead_time_of(line: StructureFit) -> str:
+    """Dead time of a structure that is not ruled out, with its interval."""
     assert line.interval is not None
     return time_and_interval(line.dead_time, *line.interval)
 

@@ -33,6 +33,7 @@ from .repeat_flags import BY_CHANCE
 from .repeatability import Repeatability
 from .words import (
     ESTIMATE_WORDS,
+    Stated,
     gain_in_words,
     gain_scatter,
     order_words,
@@ -75,6 +76,8 @@ class OutputErrorFit(FractionalDelayFit):
         Warnings about the result.
     actuator : ActuatorFit or None
         Actuator before or behind the linear model, if one was asked for and is needed.
+    stated : Stated or None
+        What the user stated beforehand: `fastest_lag` and `dead_time`, in s.
 
     Examples
     --------
@@ -98,6 +101,7 @@ class OutputErrorFit(FractionalDelayFit):
     choices: tuple[str, ...] = ()
     flags: tuple[Flag, ...] = ()
     actuator: ActuatorFit | None = None
+    stated: Stated | None = None
 
     def __post_init__(self) -> None:
         profile = self.estimate.profile
@@ -377,6 +381,28 @@ class OutputErrorFit(FractionalDelayFit):
             f"{order_words(self.estimate.structure)}, residual {level}>"
         )
 
+    @property
+    def interval_without_short_lags(self) -> tuple[float, tuple[float, float]] | None:
+        """A lag in s, and the interval of the dead time if the plant has none that is shorter.
+
+        None if that is no help, or if something was stated. Lags that are short beside those of the
+        model, and that the data do not rule out, can take the place of dead time; without them the
+        interval is that of the other structures. How often it holds is measured in
+        `benchmarks.records`.
+        """
+        found = None if self.stated else self.estimate.low_without_short_lags
+        return found and (found[0], (found[1], self.interval[1]))
+
+    def _as_stated(self) -> str:
+        return "" if self.stated is None else f", {self.stated.in_words()}"
+
+    def _without_short_lags(self) -> list[tuple[str, str]]:
+        found = self.interval_without_short_lags
+        return (
+            [(f"if no lag is faster than {in_time(found[0], 2)}", interval_in_time(*found[1]))]
+            if found else []
+        )  # fmt: skip
+
     def _other_orders(self) -> list[tuple[str, str]]:
         """What structures of one more pole say that were not requested and are not ruled out."""
         lines = [] if self.estimate.others is None else self.estimate.others.not_ruled_out
@@ -431,7 +457,8 @@ class OutputErrorFit(FractionalDelayFit):
             *([("not seen", not_seen_in_words(left_out))] if left_out else []),
             *((f"verdict: {v.question}", f"{v.level}: {v.sentence}") for v in self.verdicts),
             (self._kind(), "".join(self._dead_time_in_words())),
-            (self.interval_label, interval_in_time(low, high)),
+            (self.interval_label, interval_in_time(low, high) + self._as_stated()),
+            *self._without_short_lags(),
             *self._other_orders(),
             *([("visible onset", in_time(self.onset, 4))] if self.onset == self.onset else []),
             (

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from typing import NamedTuple
 
 import numpy as np
 
@@ -26,6 +27,22 @@ ESTIMATE_WORDS: dict[RobustKey, str] = {
 }
 
 _FIRM = 0.1  # relative half width of the interval of a total delay that is called well determined
+
+
+class Stated(NamedTuple):
+    """Fastest lag in s, and range of the dead time in s, as stated by the user."""
+
+    fastest_lag: float | None = None
+    dead_time: tuple[float, float] | None = None
+
+    def in_words(self) -> str:
+        """What was stated, for a card."""
+        said = []
+        if self.fastest_lag is not None:
+            said.append(f"no lag is faster than {in_time(self.fastest_lag)}")
+        if self.dead_time is not None:
+            said.append(f"it is within {interval_in_time(*self.dead_time)}")
+        return f"if {' and '.join(said)} (stated)"
 
 
 def model_words(model: LagChain | DispersedFlow) -> str:

@@ -21,13 +21,17 @@ from ..arrays import ComplexArray, FloatArray
 _GAP = 0.01
 
 
-def poles_from_parameters(theta: FloatArray) -> tuple[ComplexArray, ComplexArray]:
+def poles_from_parameters(
+    theta: FloatArray, *, apart: bool = True
+) -> tuple[ComplexArray, ComplexArray]:
     """Return the poles and their derivatives with respect to the parameters.
 
     Parameters
     ----------
     theta : ndarray, shape (B, n)
         Parameters of B denominators, in 1/s (logarithmic).
+    apart : bool, optional
+        Separate coincident poles of different factors.
 
     Returns
     -------
@@ -61,7 +65,7 @@ def poles_from_parameters(theta: FloatArray) -> tuple[ComplexArray, ComplexArray
     block[:, order::every] = poles[:, start + 1 :: 2]
     block[:, 1::every] = scale * (turn - 1.0)
     block[:, order + 1 :: every] = -scale * (turn + 1.0)
-    return _separate(poles), derivative
+    return _separate(poles) if apart else poles, derivative
 
 
 def parameters_from_poles(poles: ComplexArray) -> FloatArray:

@@ -104,8 +104,9 @@ def static_gain(
     point = np.concatenate([theta, numerator])
     moves = _moves(candidate, numerator, length)
 
-    def steady_values(at: FloatArray) -> FloatArray:
-        return np.array(_steady_values(at[: theta.size], at[theta.size :], length))
+    # Poles that are nearly equal would jump apart in one difference, and not in the other.
+    def steady_values(at: FloatArray, apart: bool = False) -> FloatArray:
+        return np.array(_steady_values(at[: theta.size], at[theta.size :], length, apart))
 
     gradient = np.stack(
         [(steady_values(point + m) - steady_values(point - m)) / (2 * m.sum()) for m in moves],
@@ -113,7 +114,7 @@ def static_gain(
     )
     errors = local_errors(problem, candidate, numerator, length)
     gain_std, total_std, rate_std = errors.std(gradient, variance)
-    gain, total, rate = (float(value) for value in steady_values(point))
+    gain, total, rate = (float(value) for value in steady_values(point, apart=True))
     slow = np.abs(candidate.poles)
     # An integrator has no slowest time constant, but a constant slope.
     slow = slow[slow * length >= INTEGRATOR]
@@ -254,10 +255,10 @@ def reached_after(poles: ComplexArray, numerator: FloatArray, length: float) -> 
 
 
 def _steady_values(
-    theta: FloatArray, numerator: FloatArray, length: float
+    theta: FloatArray, numerator: FloatArray, length: float, apart: bool
 ) -> tuple[float, float, float]:
     """Gain, total delay, and the gain that is integrated by poles slower than the record."""
-    poles = poles_from_parameters(theta[None, 1:])[0][0]
+    poles = poles_from_parameters(theta[None, 1:], apart=apart)[0][0]
     pace = np.abs(poles) * length
     moving = poles[pace >= INTEGRATOR]
     gain, rate = (

@@ -130,7 +130,12 @@ def likelihood_fit(
         tuple(others),
     )
     return replace(
-        found, process=process, distributed=distributed, open_start=open_start, close=close
+        found,
+        process=process,
+        distributed=distributed,
+        open_start=open_start,
+        close=close,
+        points=kept.points,
     )
 
 
@@ -141,6 +146,7 @@ class _Kept:
     profiles: dict[Structure, Profile]
     flows: list[tuple[DispersedFlow, Profile]]
     chains: list[LagChain]
+    points: dict[Structure, Points]
 
     def profile_of(self, choice: Choice, scales: Scales) -> Profile:
         """Misfit over the dead time for the chosen model."""
@@ -185,7 +191,7 @@ def _compared(
     return (
         fits,
         choice,
-        _not_ruled_out(fits, choice, chains, flows, curves(fits, kept)),
+        _not_ruled_out(fits, choice, chains, flows, kept),
     )
 
 
@@ -194,18 +200,19 @@ def _not_ruled_out(
     choice: Choice,
     chains: Sequence[LagChain],
     flows: Sequence[DispersedFlow],
-    profiles: dict[Structure, Profile],
+    points: dict[Structure, Points],
 ) -> _Kept:
     more = max(LEAST_CHARGE - fits.penalty, 0.0)
     limit = _charged_level(fits, choice) + VERY_STRONG
     return _Kept(
-        profiles,
+        curves(fits, points),
         [
             (flow, profile_of(fits, flow.fit))
             for flow in flows
             if flow.criterion + more * flow.parameters <= limit
         ],
         [chain for chain in chains if chain.criterion + more * FREE_IN_A_CHAIN <= limit],
+        points,
     )
 
 

@@ -44,10 +44,12 @@ class Requested:
         The dead time is that of the best of them, adequate or not. Default: structures are chosen.
     forms : tuple of ProcessForm
         Process models to which the choice is limited; `structures` are theirs.
-    latest : float, optional
-        Largest dead time, in s.
+    latest, earliest : float, optional
+        Largest and smallest dead time, in s.
     known : KnownFactor
         Dynamics in cascade that are not part of the plant.
+    fastest : float, optional
+        Fastest lag, in s.
     huber : bool
         Huber's loss (k = 1.345) instead of least squares.
     whiten : bool
@@ -57,6 +59,8 @@ class Requested:
     structures: tuple[Structure, ...] | None = None
     forms: tuple[ProcessForm, ...] = ()
     latest: float | None = None
+    earliest: float = 0.0
+    fastest: float | None = None
     known: KnownFactor = field(default_factory=KnownFactor)
     huber: bool = True
     whiten: bool = True
@@ -89,11 +93,12 @@ def other_structures(fits: WindowFit, refit: Callable[[], WindowFit]) -> OtherSt
     # Relative to the residual of the richer ones: that of the given one may be large and
     # correlated.
     variance = least / max(problem.data.size - 2 * n - 4, 1)
-    better = _better(refit(), given) if cost - least > VERY_STRONG * variance else None
+    better = better_than(given, refit()) if cost - least > VERY_STRONG * variance else None
     return OtherStructures(better, () if better is not None else _not_ruled_out(fits, richer))
 
 
-def _better(free: WindowFit, given: Candidate) -> StructureFit | None:
+def better_than(given: Candidate, free: WindowFit) -> StructureFit | None:
+    """The best of some structures, if it rules a model out."""
     best = free.best
     if best.structure == given.structure:
         return None

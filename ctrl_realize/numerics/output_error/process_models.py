@@ -1,6 +1,7 @@
-"""Estimate of process models of a prescribed form: the best of them, and whether others fit better.
+"""Estimate of models with prescribed parameters: the best of them, and whether others fit better.
 
-The counterpart of `interval.likelihood_fit` for forms, fixed and bounded parameters: profile
+The counterpart of `interval.likelihood_fit` for process models with fixed and bounded parameters,
+and for structures without fast lags: profile
 likelihoods [1]_ of all forms that the data do not rule out.
 
 References
@@ -22,11 +23,13 @@ from ..engine.window_fit import WindowFit
 from ..families.form_fit import fit_form
 from ..families.lag_profiles import with_profiled_lags
 from ..families.process_form import ProcessForm
+from ..families.slow_lags import fit_slow_lags
 from ..signals.noise import correlation_time
 from .interval import likelihood_fit
 from .margins import CloseDecision
-from .other_structures import line_of
+from .other_structures import better_than, line_of
 from .result import OtherStructures, OutputErrorEstimate, ProcessEstimate, StructureFit
+from .selection import chains_of
 
 _CONTRADICTED = 1.01
 """Sum of squares over that without the prescriptions, from which on these are no small error."""
@@ -87,6 +90,43 @@ def process_fit(
         process=_with_profiles(given, found.process),
         others=others._replace(better=_better(fits, chosen, others.better)),
     )
+
+
+def fit_without_fast_lags(
+    fits: WindowFit,
+    fastest: float,
+    *,
+    is_noise: IsNoise,
+    near: tuple[CloseDecision, ...] = (),
+) -> OutputErrorEstimate:
+    """Determine model, dead time and interval among structures without lags that are faster, in s.
+
+    Parameters
+    ----------
+    fits : WindowFit
+        Of the structures, without that bound.
+    fastest, is_noise, near
+        As for `fit_slow_lags` and `process_fit`.
+    """
+    every = fits.candidates.values()
+    models = {}
+    for host in every:
+        order = host.structure.order
+        fewer = [one for one in every if order - 1 <= one.structure.order < order]
+        setting = fits.scales, fits.variance, fastest
+        model = fit_slow_lags(fits.problem, host, fewer, *setting)
+        models[model.structure] = model
+    given = replace(fits, candidates=models, criterion=fits.criteria(models), rivals={})
+    excess = given.best.cost / max(fits.best.cost, SMALLEST)
+    better = better_than(given.best, fits)
+    if better is not None:
+        # What the bound costs is part of the noise.
+        given = replace(given, sigma=given.sigma * float(np.sqrt(max(excess, 1.0))))
+        given = replace(given, criterion=given.criteria(models))
+    adequate = is_noise(fits.misfit(given.best), fits.correlation)
+    chains = [c for c in chains_of(fits) if fastest * np.abs(c.candidate.poles).max() <= 1]
+    found = likelihood_fit(given, adequate=adequate, chains=chains, near=near)
+    return replace(found, others=OtherStructures(better))
 
 
 def _with_profiles(fits: WindowFit, process: ProcessEstimate) -> ProcessEstimate:

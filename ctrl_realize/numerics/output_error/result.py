@@ -10,7 +10,8 @@ References
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import Literal, NamedTuple, TypeAlias
 
 import numpy as np
@@ -21,13 +22,14 @@ from ..engine.modal import respond
 from ..engine.plausible_models import PlausibleModel, plausible_models
 from ..engine.poles import lag_sum
 from ..engine.problem import Structure
-from ..engine.profile import profile_limits
+from ..engine.profile import Points, profile_limits
 from ..engine.static_gain import StaticGain, averaged_ends
 from ..engine.structures import Candidate, Scales, needless_parameters
 from ..engine.window_fit import WindowFit
 from ..families.equal_lags import LagChain
 from ..families.flow import DispersedFlow
 from ..families.form_fit import FormFamily
+from ..families.lag_profiles import low_without_short_lags
 from ..families.physical import ProcessParameter, fitted_parameters
 from ..families.process_form import ProcessForm
 from ..signals.correlation import fit_percent
@@ -210,7 +212,7 @@ class OutputErrorEstimate:
     `close` are decisions that rounding errors may reverse. `unweighted` is the model of
     plain least squares, if the residual was whitened. `load` is a step of a load; it is part
     of the model unless it is early. `plausible` are models that the data do not rule out, all
-    equally likely.
+    equally likely. `points` are the profiles of structures that are not ruled out.
     """
 
     dead_time: float
@@ -238,6 +240,7 @@ class OutputErrorEstimate:
     unweighted: UnweightedModel | None = None
     load: LoadStep | None = None
     plausible: tuple[PlausibleModel, ...] = ()
+    points: Mapping[Structure, Points] = field(default_factory=dict)
 
     @property
     def robust(self) -> bool:
@@ -262,6 +265,22 @@ class OutputErrorEstimate:
         return averaged_ends(
             [(one.gain, one.gain_std, weight) for one, weight in ((self.static, 1.0), *self.alike)]
         )
+
+    @property
+    def low_without_short_lags(self) -> tuple[float, float] | None:
+        """A lag in s, and the low end of the interval if none is shorter; None if that is no help.
+
+        See `families.lag_profiles`.
+        """
+        ends = [(other.low, np.inf) for other in self.distributed.not_ruled_out]
+        for line in self.structures:
+            if line.interval is not None:
+                low, high = line.interval
+                points = self.points.get(line.structure, {}).items()
+                lags = [1 / np.abs(one.poles).max() for at, one in points if low <= at <= high]
+                ends.append((low, max(lags, default=np.inf)))
+        own = float(1 / np.abs(self.poles).max())
+        return low_without_short_lags(ends, own, self.dead_time, (self.low, self.high))
 
     @property
     def total_ends(self) -> tuple[float, float]:

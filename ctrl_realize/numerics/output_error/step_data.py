@@ -266,7 +266,7 @@ def window(data: StepData, stop: int, known: KnownFactor) -> Window:
     )
 
 
-def step_scales(data: StepData, stop: int, latest: float | None) -> Scales:
+def step_scales(data: StepData, stop: int, latest: float | None, earliest: float = 0.0) -> Scales:
     """Initial guesses of the times of the response, from its onset and its 63 % point."""
     assert data.motion is not None
     motion, dt = data.motion, data.dt
@@ -283,7 +283,8 @@ def step_scales(data: StepData, stop: int, latest: float | None) -> Scales:
         rise=max(rise, 2.0) * dt,
         length=(end - data.edges[0][0]) * dt,
         dt=dt,
-        latest=last if latest is None else min(last, latest),
+        latest=last if latest is None else min(last, latest) if earliest < last else latest,
+        earliest=earliest,
     )
 
 

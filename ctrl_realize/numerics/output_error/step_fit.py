@@ -71,6 +71,7 @@ from ..engine.structures import (
     ALL_STRUCTURES,
     SIMPLE_STRUCTURES,
     Candidate,
+    Scales,
     choose,
 )
 from ..engine.window_fit import WindowFit, among, fit_window, with_noise_of_residual
@@ -85,9 +86,15 @@ from .interval import likelihood_fit
 from .load import load_of
 from .margins import CloseDecision, close_to
 from .other_structures import Requested, other_structures
-from .process_models import process_fit
+from .process_models import fit_without_fast_lags, process_fit
 from .profiles import profile_of
-from .result import DelayInterval, OutputErrorEstimate, RobustKey, assembled
+from .result import (
+    DelayInterval,
+    OtherStructures,
+    OutputErrorEstimate,
+    RobustKey,
+    assembled,
+)
 from .rounded import in_rounded_data
 from .selection import chains_of, flows_of
 from .step_data import StepData, settled_at, step_scales, stop_at, window
@@ -136,7 +143,7 @@ def fit_step_record(
     if loaded is not None and not loaded[0].early:
         data, found = fit_step_record(given.with_load(*loaded), requested)
         return data, replace(found, load=loaded[0])
-    if structures is None:
+    if structures is None and requested.fastest is None:
         found = _free_choice(data, fits, fit, requested.whiten)
     else:
         found = _given_structures(data, fits, free, requested)
@@ -151,13 +158,18 @@ def _given_structures(
 ) -> OutputErrorEstimate:
     """Estimate the dead time by the likelihood of the best of given structures, adequate or not."""
     adequate, near = _is_noise(data, fits, fits.best), _close_to_noise(data, fits)
-    others = other_structures(fits, free)
+    limited = requested.fastest is not None
+    others = OtherStructures() if limited else other_structures(fits, free)
     if adequate and requested.whiten:
         fits = in_coloured_noise(fits, data)
     if adequate and fits.colour is None and others.better is None:
         fits = with_noise_of_residual(fits)
+    level = max(ADEQUATE * data.colour, fits.normalized_rms if adequate else 0.0)
+    if requested.fastest is not None:
+        return fit_without_fast_lags(
+            fits, requested.fastest, is_noise=lambda rms, _: rms <= level, near=near
+        )
     if requested.forms:
-        level = max(ADEQUATE * data.colour, fits.normalized_rms if adequate else 0.0)
         return process_fit(
             fits, requested.forms, is_noise=lambda rms, _: rms <= level, others=others, near=near
         )
@@ -203,7 +215,7 @@ def _free_choice(
     simple = among(plain, kept)
     chosen = simple.best_of({s: simple.criterion[s] for s in kept})
     rise = fit(data, stop_at(data, 0.63), SIMPLE_STRUCTURES)
-    estimates = _views(data, early, rise, chosen, plain.scales.latest)
+    estimates = _views(data, early, rise, chosen, plain.scales)
     if likely is not None:
         agreed = later(likely, estimates)
         likely = with_close_decision(likely, agreed)
@@ -311,21 +323,21 @@ def _fit_until(
     return fit_window(
         window(data, stop, requested.known),
         structures,
-        step_scales(data, stop, requested.latest),
+        step_scales(data, stop, requested.latest, requested.earliest),
         (data.sigma, data.quantum),
         requested.huber,
     )
 
 
 def _views(
-    data: StepData, early: WindowFit, rise: WindowFit, fits: Candidate, latest: float
+    data: StepData, early: WindowFit, rise: WindowFit, fits: Candidate, scales: Scales
 ) -> tuple[tuple[RobustKey, float], ...]:
     """Six estimates in s with independent errors; the sixth only widens the interval."""
     assert data.motion is not None
     onset = data.motion.onset * data.dt
     one, two, three = (early.candidates[lags].dead_time for lags in _LAGS)
     return (
-        ("onset", min(onset, latest)),
+        ("onset", max(min(onset, scales.latest), scales.earliest)),
         ("one_lag_early", one),
         ("two_lags_early", two),
         # by the criterion alone: the first part of a response does not show the gain

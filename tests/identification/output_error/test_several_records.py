@@ -197,3 +197,19 @@ def test_a_campaign_tells_what_differs_from_record_to_record(name):
         assert due <= {f.code for f in cr.identify_campaign(records, method="scan").flags}
         assert campaign_verdict(campaign).level == "poor"
         np.testing.assert_allclose(campaign.table()["gain"], [1.0, 0.5, 0.25], rtol=0.05)
+
+
+def test_records_that_differ_widen_the_interval_to_their_last_visible_onset_at_most():
+    """With other gains and lags, delays of a common model scatter: up to 20 s, though all move."""
+    t = np.arange(300.0)
+    u = np.where(t < 39.5, 0.0, 1.0)
+    records = []
+    for gain, lag, seed in ((0.6, 15, 1), (1.4, 60, 2)):
+        plant = ct.tf([gain], [lag, 1]) * ct.tf([1], [6, 1])
+        y = cr.delayed_ss(plant, dead_time=3.0, dt=1.0).simulate(u)
+        y += 0.01 * np.random.default_rng(seed).standard_normal(t.size)
+        records.append(cr.Record(t, u, y, name=str(seed)))
+    fit = cr.identify(records).fit
+    assert "records_differ" in {flag.code for flag in fit.flags}
+    # Each moves visibly, by five standard deviations, 6 s after the step.
+    assert fit.interval[0] <= 3.0 <= fit.interval[1] <= 12.0

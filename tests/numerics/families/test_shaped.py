@@ -7,12 +7,15 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy.special import gammainc
 
-from ctrl_realize.numerics.engine.problem import KnownFactor, Structure
+from ctrl_realize.numerics.engine.eliminate import eliminate
+from ctrl_realize.numerics.engine.problem import Bounds, KnownFactor, Structure
+from ctrl_realize.numerics.engine.static_gain import static_gain
 from ctrl_realize.numerics.engine.structures import Candidate
 from ctrl_realize.numerics.families.equal_lags import fit_chains
 from ctrl_realize.numerics.families.flow import fit_flows
 from ctrl_realize.numerics.families.form_fit import fit_form, form_family
 from ctrl_realize.numerics.families.process_form import ProcessForm
+from ctrl_realize.numerics.families.slow_lags import SlowLags, fit_slow_lags
 from ctrl_realize.numerics.output_error.step_data import step_data, step_scales, window
 
 DELAY, SIGMA = 20.3, 1e-3
@@ -98,3 +101,37 @@ def test_standard_errors_are_those_of_the_derivatives(case):
     jacobian = fit.structure.evaluate(problem, fit.parameters[None]).jacobian[0][:, seen]
     covariance = SIGMA**2 * np.linalg.inv(jacobian.T @ jacobian)
     assert_allclose(found["dead_time"].std, np.sqrt(covariance[0, 0]), rtol=1e-6)
+
+
+@pytest.mark.parametrize("pairs", [0, 1])
+def test_derivatives_of_slow_lags_are_limits_of_differences(case, pairs):
+    problem, _ = case
+    shape = np.log([0.05, 0.048, 0.11]) if not pairs else np.log([0.05, 0.08, 0.7])
+    x = np.append(DELAY + 3.3, shape)
+    family = SlowLags(3, 2, Bounds(x - 1, x + 1), pairs, 600.0)
+    assert_exact(problem, family, x)
+    alone = eliminate(problem, Structure(3, 2), family.theta(x)[None])
+    assert_allclose(family.evaluate(problem, x[None]).cost, alone.cost, rtol=1e-12)
+
+
+def test_the_fastest_lag_is_a_bound_of_the_best_fit(case):
+    problem, scales = case
+    free = Candidate(Structure(2, 2), np.array([25.0, np.log(0.06), np.log(1.2)]), 0.0)
+    free = fit_slow_lags(problem, free, [], scales, SIGMA**2, 1.0)  # two lags for four: 19 each
+    slow = fit_slow_lags(problem, free, [], scales, SIGMA**2, 24.0)
+    assert np.all(np.abs(free.poles) > 1 / 24)
+    assert slow.cost > free.cost
+    assert_allclose(np.abs(slow.poles).max(), 1 / 24, rtol=0.02)  # equal poles are set apart
+    assert slow.dead_time < free.dead_time
+
+
+def test_nearly_equal_lags_leave_the_error_of_the_gain(case):
+    """Differences see poles jump apart: they said 660 times the gain."""
+    problem, _ = case
+    stds = []
+    for lags in ([12.0, 12.06, 11.95, 12.04], [13.5, 12.6, 11.6, 10.4]):
+        x = np.append(DELAY, -np.log(lags))
+        family = SlowLags(4, 4, Bounds(x - 1, x + 1), 0, 600.0)
+        cost = float(family.evaluate(problem, x[None]).cost[0])
+        stds.append(static_gain(problem, Candidate(family, x, cost), SIGMA**2, 600.0).gain_std)
+    assert stds[1] <= stds[0] < 20 * stds[1]

@@ -38,7 +38,7 @@ from ...validation.own_response import OwnResponse, matched, response_slopes
 from ..interval import likelihood_fit
 from ..margins import close_to
 from ..other_structures import Requested, other_structures
-from ..process_models import process_fit
+from ..process_models import fit_without_fast_lags, process_fit
 from ..result import OutputErrorEstimate, followed_by
 from ..selection import chains_of
 from .condensed import MOST_LAGS, Condensed, condensed
@@ -155,7 +155,11 @@ def fit_sampled(
         # case.
         others = other_structures(stretch, partial(part.fit_of, ORDERS))
     white = fits.correlation <= WHITE
-    if requested.forms and others is not None:
+    if requested.fastest is not None:
+        fit = fit_without_fast_lags(
+            fits, requested.fastest, is_noise=lambda _, correlation: correlation <= WHITE
+        )
+    elif requested.forms and others is not None:
         fit = process_fit(
             fits,
             requested.forms,

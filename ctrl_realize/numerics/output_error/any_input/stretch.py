@@ -43,7 +43,8 @@ def fit_stretch(
 ) -> SampledWindow:
     """Fit structures to a part of the records, by default dead times up to a quarter of it."""
     limit = 0.25 * data.longest if requested.latest is None else requested.latest
-    part = fit_windows(data, structures, limit, requested.huber, np.ones(1))
+    within = requested.earliest, max(limit, requested.earliest)
+    part = fit_windows(data, structures, within, requested.huber, np.ones(1))
     if not (part.fit.correlation > WHITE and requested.whiten and data.complete):
         return part
     return replace(in_coloured_noise(part), unweighted=part.model)

@@ -78,24 +78,25 @@ class SampledWindow:
 def fit_windows(
     data: SampledData,
     structures: Sequence[Structure],
-    limit: float,
+    within: tuple[float, float],
     huber: bool,
     noise: FloatArray,
 ) -> SampledWindow:
     """Fit structures to filtered records, every record weighted by its noise.
 
-    Dead times are sought up to `limit`, in s.
+    Dead times are sought `within` these, in s.
     """
     dt, n, usual = data.step, max(y.size for y in data.outputs), data.spacing * data.dt
     order = noise.size - 1
     alike = (1.0,) * len(data.outputs)
     data = replace(data, starts=tuple(y.size // 20 for y in data.outputs), scales=alike)
     filtered = data.whitened(noise)
-    rough = _first_order(filtered.problem, n, dt, usual, limit, _seen(filtered, limit))
+    rough = _first_order(filtered.problem, n, dt, usual, within, _seen(filtered, within[1]))
     lag = float(-1.0 / rough.poles[0].real)
     data = data.after(rough.dead_time)
     length = (max(data.lengths) - order) * dt
-    scales = Scales(max(rough.dead_time, 0.5 * usual), max(lag, 2 * usual), length, dt, limit)
+    onset, rise = max(rough.dead_time, 0.5 * usual), max(lag, 2 * usual)
+    scales = Scales(onset, rise, length, dt, within[1], within[0])
     fits = _fit(data.whitened(noise), structures, scales, huber)
     levels = _noise_levels(data.whitened(noise), fits)
     if levels.max() > _UNLIKE * levels.min():
@@ -119,13 +120,13 @@ def in_coloured_noise(plain: SampledWindow) -> SampledWindow:
         model = modelled(found.data, parameters, found.model.numerator)
         error = found.data.problem.data - model
         noise = whitening_filter(error, noise_lags(min(found.data.counts)))
-        limit = plain.scales.latest
-        again = fit_windows(plain.data, ORDERS, limit, plain.huber, noise)
+        within = plain.scales.earliest, plain.scales.latest
+        again = fit_windows(plain.data, ORDERS, within, plain.huber, noise)
         settling = [s for s, c in again.fit.candidates.items() if _settles(again.fit.static(c))]
         if not settling:
             break
         if len(settling) < len(ORDERS):
-            again = fit_windows(plain.data, settling, limit, plain.huber, noise)
+            again = fit_windows(plain.data, settling, within, plain.huber, noise)
         if not again.fit.correlation < plain.fit.correlation:
             break
         found = again
@@ -187,14 +188,20 @@ def _seen(data: SampledData, limit: float) -> list[float]:
 
 
 def _first_order(
-    problem: Problem, n: int, dt: float, usual: float, limit: float, seen: Sequence[float]
+    problem: Problem,
+    n: int,
+    dt: float,
+    usual: float,
+    within: tuple[float, float],
+    seen: Sequence[float],
 ) -> Candidate:
     """Best first-order model from a grid of dead times and time constants.
 
     `usual` is the mean distance of the samples in s, of which `n` would follow every `dt`.
     """
+    earliest, latest = within
     scales = [
-        Scales(min(onset, limit), min(rise * usual, n * dt / 4), n * dt, dt, limit)
+        Scales(min(onset, latest), min(rise * usual, n * dt / 4), n * dt, dt, latest, earliest)
         for rise in _RISES
         for onset in (*(usual * onset for onset in _ONSETS), *(dt * lag for lag in seen))
     ]
