@@ -85,6 +85,7 @@ TABLES = {
         "docs/tables/verdicts_table.md",
         "python -m benchmarks.verdicts --table docs/tables/verdicts_table.md",
     ),
+    "several": ("docs/tables/several_table.md", "python -m benchmarks.records several"),
     "statements": ("docs/tables/statements_table.md", "python -m benchmarks.records statements"),
     "kernels": ("docs/tables/kernels_table.md", "python -m benchmarks.kernels"),
     "ablation": ("docs/tables/ablation_table.md", "python -m benchmarks.ablation"),

@@ -3,7 +3,8 @@
 Data are simulated; CPU time of the process, one call each. ``python -m benchmarks.records
 measured`` prints how well halves of measured records are predicted, beside subspace methods, and
 ``responses`` what measured frequency responses gave, ``joint`` what they gave with step records,
-``statements`` what it gains to state a fastest lag.
+``several`` what several records of a plant give together, ``statements`` what it gains to state a
+fastest lag.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ from scipy.signal import lfilter
 
 import ctrl_realize as cr
 
-from . import joint, measured, responses, statements
+from . import joint, measured, responses, several, statements
 
 
 def cpu(work: Callable[[], object]) -> float:
@@ -85,6 +86,7 @@ if __name__ == "__main__":
         "measured": measured.table,
         "responses": responses.table,
         "joint": joint.table,
+        "several": several.table,
         "statements": statements.table,
     }
     asked = [tables[word] for word in sys.argv[1:] if word in tables]
