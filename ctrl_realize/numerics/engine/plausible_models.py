@@ -120,11 +120,13 @@ def _about(
         places = (np.arange(count) + rng.random()) / count * weight.sum()
         drawn = tried[np.searchsorted(np.cumsum(weight), places).clip(0, len(tried) - 1)]
     there = eliminate(problem, structure, drawn).numerator
-    # The error of the numerator beside given poles, in gain: it grows with their product.
+    # The error of the numerator beside given poles is one of gain, and grows with their product;
+    # with a pole slower than the record it is one of slope, and does not.
     given = variance * LocalErrors(errors.slopes[:, n:], errors.own).covariance()
     beside = _normal(given, np.full(free, np.inf), count, rng)
-    own = np.prod(np.abs(candidate.poles))
-    scale = np.prod(np.abs(poles_from_parameters(drawn[:, 1:])[0]), axis=1) / own
+    slowest = 1 / scales.length
+    own = np.prod(np.abs(candidate.poles) + slowest)
+    scale = np.prod(np.abs(poles_from_parameters(drawn[:, 1:])[0]) + slowest, axis=1) / own
     return [_model(*pair) for pair in zip(drawn, there + scale[:, None] * beside, strict=True)]
 
 
