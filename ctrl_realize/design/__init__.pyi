@@ -44,3 +44,5 @@ from .tuning.simulated import LoopSimulation as LoopSimulation
 from .tuning.simulated import simulate_loop as simulate_loop
 from .tuning.table import PIDComparison as PIDComparison
 from .tuning.table import compare_pid as compare_pid
+from .tuning.ultimate import UltimateGain as UltimateGain
+from .tuning.ultimate import ultimate as ultimate

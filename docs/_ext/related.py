@@ -73,6 +73,7 @@ PAGES: dict[str, tuple[str, ...]] = {
     "io.CampaignStore": ("howto/several_records", "howto/cluster"),
     "io.FitSummary": ("howto/export",),
     "design.*[pP][iI][dD]*": ("howto/tune_pid",),
+    "design.*ltimate*": ("howto/tune_pid",),
     "design.ProcessModel": ("howto/tune_pid",),
     "design.LoopCheck": ("howto/tune_pid",),
     "design.*oop*": ("howto/tune_pid", "howto/closed_loop"),

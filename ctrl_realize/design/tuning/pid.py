@@ -9,20 +9,19 @@ from typing import Any
 import numpy as np
 
 from ..._checks import one_of, positive, real
-from ..._parameters import gain_unit
-from ...data.shown_units import in_shown_units, shown_time_unit
+from ...data.shown_units import in_shown_units
 from ...delayed import DelayedStateSpace, DelaySystem
-from ...errors import OptionError, UnsuitableSystemError
+from ...errors import OptionError
 from ...numerics.blas_threads import single_threaded
 from ..loops.loop_check import MOST_SENSITIVE, loop_check, refuse_unstable, warn_of
-from ..loops.margins import margins
 from ..models.process_model import ProcessModel
 from ..models.reduction import METHODS as REDUCTIONS
 from .algorithm import DISCRETIZATIONS
 from .controller import PIDController
 from .optimal import optimal
-from .plant import reduced, reference_plant, total_time
-from .rules import MODEL_RULES, SYSTEM_RULES, Parameters, kinds_of, ultimate
+from .plant import gain_and_time_units, reduced, reference_plant, total_time
+from .rules import MODEL_RULES, SYSTEM_RULES, from_ultimate, kinds_of
+from .ultimate import critical_point
 
 RULES = (*MODEL_RULES, *SYSTEM_RULES)
 KINDS = ("P", "PI", "PD", "PID")
@@ -30,8 +29,6 @@ SAFE = ("amigo", "simc", "lambda")
 """Rules that are suggested if the loop of another is unstable; then the optimal PI."""
 SLOWER = (2.0, 4.0, 8.0)
 """Closed-loop times of simc, in dead times of its model, that are suggested after those."""
-SETTLED = 10_000
-"""Samples after the delay at which a step response has the sign of the gain."""
 
 
 @single_threaded
@@ -59,9 +56,12 @@ def pid(
         process model or a continuous system, with its dead time at input or output, the controller
         is continuous unless `dt` is given.
     rule : str, optional
-        ``"simc"``, ``"lambda"``, ``"imc"``, ``"amigo"``, ``"ziegler_nichols"`` and ``"cohen_coon"``
-        use a reduced model; ``"ziegler_nichols_ultimate"`` the exact ultimate gain; ``"optimal"``
-        minimizes the integrated absolute error after a load step subject to `max_sensitivity`.
+        ``"simc"``, ``"lambda"``, ``"imc"``, ``"amigo"``, ``"ziegler_nichols"``, ``"cohen_coon"``,
+        ``"chr_*"`` (``"chr_setpoint_0"``, ``"chr_load_20"``, ...: Chien, Hrones and Reswick for
+        moves of the set-point or loads, with 0 or 20 % of overshoot), ``"itae_setpoint"`` and
+        ``"itae_load"`` use a reduced model; ``"ziegler_nichols_ultimate"`` and
+        ``"tyreus_luyben"`` the exact ultimate gain, see `ultimate`; ``"optimal"`` minimizes the
+        integrated absolute error after a load step subject to `max_sensitivity`.
     kind : {"P", "PI", "PD", "PID"}, optional
         Not every rule exists for every kind. The PID of simc is a PI for a plant with one lag.
     closed_loop_time : float, optional
@@ -104,9 +104,10 @@ def pid(
     Notes
     -----
     The rules are those of [1]_ (simc, sections 3 and 4), [2]_ and [3]_ (lambda, stable and
-    integrating), [4]_ (imc, table II), [5]_ (amigo), [6]_ (both rules of Ziegler and Nichols) and
-    [7]_. The optimal rule solves the problem of [9]_, least absolute load error under a limit on
-    the sensitivity (in [8]_: least integrated error), on the exact frequency response.
+    integrating), [4]_ (imc, table II), [5]_ (amigo), [6]_ (both rules of Ziegler and Nichols),
+    [7]_, [10]_ (chr), [11]_ and [12]_ (itae, load and set-point), [13]_ (PI) and [14]_ (PID of
+    tyreus_luyben). The optimal rule solves the problem of [9]_, least absolute load error under a
+    limit on the sensitivity (in [8]_: least integrated error), on the exact frequency response.
 
     References
     ----------
@@ -128,6 +129,15 @@ def pid(
        non-convex optimization, Automatica 34 (1998) 585-601, doi:10.1016/S0005-1098(98)00011-9.
     .. [9] O. Garpinger, T. Hagglund and K. J. Astrom, Performance and robustness trade-offs in PID
        control, J. Process Control 24 (2014) 568-577, doi:10.1016/j.jprocont.2014.02.020.
+    .. [10] K. L. Chien, J. A. Hrones and J. B. Reswick, On the automatic control of generalized
+       passive systems, Trans. ASME 74 (1952) 175-185.
+    .. [11] A. M. Lopez, J. A. Miller, C. L. Smith and P. W. Murrill, Tuning controllers with
+       error-integral criteria, Instrum. Technol. 14 (1967) 57-62.
+    .. [12] A. A. Rovira, P. W. Murrill and C. L. Smith, Tuning controllers for setpoint changes,
+       Instrum. Control Syst. 42 (1969) 67-69.
+    .. [13] B. D. Tyreus and W. L. Luyben, Tuning PI controllers for integrator/dead time processes,
+       Ind. Eng. Chem. Res. 31 (1992) 2625-2628, doi:10.1021/ie00011a029.
+    .. [14] W. L. Luyben and M. L. Luyben, Essentials of Process Control, McGraw-Hill 1997.
 
     Examples
     --------
@@ -206,8 +216,8 @@ def tuned(
             plant, total, kind, max_sensitivity=limit, filter_ratio=ratio, method=method
         )
     else:
-        kp, ti, td = _ultimate(plant, exact, kind)
-    units = _units(plant)
+        kp, ti, td = from_ultimate(rule, kind, *critical_point(plant, exact))
+    units = gain_and_time_units(plant)
     made = PIDController(
         kp,
         ti,
@@ -222,15 +232,6 @@ def tuned(
         time_unit=units[1],
     )
     return made, exact
-
-
-def _units(plant: DelayedStateSpace) -> tuple[str, str]:
-    """Units of the gain and of shown times, from the first record of an identified plant."""
-    records = () if plant.fit is None else plant.fit.records
-    if not records:
-        return "", "s"
-    first = records[0]
-    return gain_unit(first.input_units[0], first.output_units[0]), shown_time_unit(first)
 
 
 def _one_that_works(system: Any, rule: str, kind: str, options: TuningOptions) -> str:
@@ -291,20 +292,3 @@ def _call(rule: str, kind: str, options: TuningOptions) -> str:
         words["max_sensitivity"] = options.max_sensitivity
     given = [f"{key}={value!r}" for key, value in words.items() if value != getattr(usual, key)]
     return f"design.pid({', '.join(['sys', repr(rule), *[repr(kind)] * (kind != 'PI'), *given])})"
-
-
-def _ultimate(
-    plant: DelayedStateSpace, exact: DelayedStateSpace | DelaySystem, kind: str
-) -> Parameters:
-    if np.any(np.abs(np.asarray(plant.delay_free.poles())) > 1 + 1e-9):
-        raise UnsuitableSystemError("the plant is unstable and has no ultimate gain")
-    reverse = bool(np.real(plant.step(plant.delay + SETTLED)[-1]) < 0)
-    found = margins(-exact if reverse else exact)
-    if found.gain_margins.size == 0:
-        raise UnsuitableSystemError(
-            "the phase of the plant never reaches -180 deg: it has no ultimate gain"
-        )
-    at = int(np.argmin(found.gain_margins))
-    gain, omega = float(found.gain_margins[at]), float(found.phase_crossovers[at])
-    kp, ti, td = ultimate(gain, 2 * np.pi / omega, kind)
-    return -kp if reverse else kp, ti, td

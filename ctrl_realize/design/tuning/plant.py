@@ -8,6 +8,8 @@ from typing import Any
 import control as ct
 
 from ..._checks import positive
+from ..._parameters import gain_unit
+from ...data.shown_units import shown_time_unit
 from ...delayed import DelayedStateSpace, DelaySystem, delay
 from ...errors import OptionError
 from ..models.conversions import to_discrete
@@ -21,7 +23,7 @@ FINE = 1000
 
 
 def reference_plant(
-    system: Any, dt: float | None
+    system: Any, dt: float | None, purpose: str = "a PID controller"
 ) -> tuple[DelayedStateSpace, DelayedStateSpace | DelaySystem, float]:
     """Discrete plant, the plant in the time base of the controller, and its sample time.
 
@@ -39,13 +41,13 @@ def reference_plant(
         if dt is None:
             exact = system
             if not isinstance(system, DelaySystem):
-                exact = DelaySystem(proper_ss(system, "a PID controller"))
+                exact = DelaySystem(proper_ss(system, purpose))
             return both_forms(system)[1], exact, 0.0
-        core, dead_time = core_and_dead_time(system, "a PID controller")
+        core, dead_time = core_and_dead_time(system, purpose)
         plant = to_discrete(core, dead_time, dt)
         return plant, plant, float(plant.dt)
-    plant = delayed_system(system, "a PID controller")
-    check_sign(plant, "a PID controller")
+    plant = delayed_system(system, purpose)
+    check_sign(plant, purpose)
     warn_unresolved(plant)
     if dt is not None:
         raise OptionError(
@@ -76,3 +78,12 @@ def total_time(system: Any, plant: DelayedStateSpace) -> float:
     if isinstance(system, ProcessModel):
         return system.total_time
     return reduce_sopdt(plant).total_time + float(plant.dt)
+
+
+def gain_and_time_units(plant: DelayedStateSpace) -> tuple[str, str]:
+    """Units of a controller gain and of shown times, from the first record of a fitted plant."""
+    records = () if plant.fit is None else plant.fit.records
+    if not records:
+        return "", "s"
+    first = records[0]
+    return gain_unit(first.input_units[0], first.output_units[0]), shown_time_unit(first)

@@ -117,13 +117,67 @@ def cohen_coon(model: ProcessModel, kind: str, closed_loop_time: float | None) -
     }[kind]
 
 
-def ultimate(gain: float, period: float, kind: str) -> Parameters:
-    """Ziegler and Nichols (1942), from the gain and period of sustained oscillation."""
-    return {
-        "P": (0.5 * gain, INF, 0.0),
-        "PI": (0.45 * gain, period / 1.2, 0.0),
-        "PID": (0.6 * gain, period / 2, period / 8),
-    }[kind]
+def chr_setpoint_0(model: ProcessModel, kind: str, closed_loop_time: float | None) -> Parameters:
+    """Chien, Hrones and Reswick (1952): fastest set-point response without overshoot."""
+    return _chr(model, {"P": (0.3, INF, 0), "PI": (0.35, 1.2, 0), "PID": (0.6, 1, 0.5)}[kind])
+
+
+def chr_setpoint_20(model: ProcessModel, kind: str, closed_loop_time: float | None) -> Parameters:
+    """Chien, Hrones and Reswick (1952): fastest set-point response with 20 % of overshoot."""
+    return _chr(model, {"P": (0.7, INF, 0), "PI": (0.6, 1, 0), "PID": (0.95, 1.4, 0.47)}[kind])
+
+
+def chr_load_0(model: ProcessModel, kind: str, closed_loop_time: float | None) -> Parameters:
+    """Chien, Hrones and Reswick (1952): fastest response to a load without overshoot."""
+    row = {"P": (0.3, INF, 0), "PI": (0.6, 4, 0), "PID": (0.95, 2.4, 0.42)}[kind]
+    return _chr(model, row, load=True)
+
+
+def chr_load_20(model: ProcessModel, kind: str, closed_loop_time: float | None) -> Parameters:
+    """Chien, Hrones and Reswick (1952): fastest response to a load with 20 % of overshoot."""
+    row = {"P": (0.7, INF, 0), "PI": (0.7, 2.3, 0), "PID": (1.2, 2, 0.42)}[kind]
+    return _chr(model, row, load=True)
+
+
+def _chr(model: ProcessModel, row: tuple[float, float, float], *, load: bool = False) -> Parameters:
+    """Factors of 1 / a, of the lag (set-point) or dead time (load), and of the dead time."""
+    _needs_lag(model, "chr")
+    L = _dead_time(model, "chr")
+    return row[0] * model.lag / (model.gain * L), row[1] * (L if load else model.lag), row[2] * L
+
+
+def itae_load(model: ProcessModel, kind: str, closed_loop_time: float | None) -> Parameters:
+    """Lopez, Miller, Smith and Murrill (1967): least ITAE after a step of a load."""
+    r, T, K = _itae_ratio(model), model.lag, model.gain
+    if kind == "PI":
+        return 0.859 * r**-0.977 / K, T / 0.674 * r**0.680, 0.0
+    return 1.357 * r**-0.947 / K, T / 0.842 * r**0.738, 0.381 * T * r**0.995
+
+
+def itae_setpoint(model: ProcessModel, kind: str, closed_loop_time: float | None) -> Parameters:
+    """Rovira, Murrill and Smith (1969): least ITAE after a step of the set-point."""
+    r, T, K = _itae_ratio(model), model.lag, model.gain
+    if kind == "PI":
+        return 0.586 * r**-0.916 / K, T / (1.03 - 0.165 * r), 0.0
+    return 0.965 * r**-0.85 / K, T / (0.796 - 0.1465 * r), 0.308 * T * r**0.929
+
+
+def _itae_ratio(model: ProcessModel) -> float:
+    """Ratio of dead time and lag, which these rules were fitted to between 0.1 and 1."""
+    _needs_lag(model, "itae")
+    ratio = model.dead_time / model.lag
+    if not 0.1 <= ratio <= 1:
+        raise UnsuitableSystemError(
+            f"the itae rules are for dead times of 0.1 to 1 lags, the model has {ratio:.3g}; use "
+            "'simc', 'lambda', 'amigo' or 'optimal'"
+        )
+    return ratio
+
+
+def from_ultimate(rule: str, kind: str, gain: float, period: float) -> Parameters:
+    """Parameters from the gain and period of sustained oscillation."""
+    kp, ti, td = ULTIMATE_RULES[rule][kind]
+    return kp * gain, ti * period, td * period
 
 
 def _dead_time(model: ProcessModel, rule: str) -> float:
@@ -147,11 +201,28 @@ MODEL_RULES: dict[str, tuple[Rule, tuple[str, ...]]] = {
     "amigo": (amigo, ("PI", "PID")),
     "ziegler_nichols": (ziegler_nichols, ("P", "PI", "PID")),
     "cohen_coon": (cohen_coon, ("P", "PI", "PD", "PID")),
+    "chr_setpoint_0": (chr_setpoint_0, ("P", "PI", "PID")),
+    "chr_setpoint_20": (chr_setpoint_20, ("P", "PI", "PID")),
+    "chr_load_0": (chr_load_0, ("P", "PI", "PID")),
+    "chr_load_20": (chr_load_20, ("P", "PI", "PID")),
+    "itae_setpoint": (itae_setpoint, ("PI", "PID")),
+    "itae_load": (itae_load, ("PI", "PID")),
 }
 """Rules that use a process model, and the kinds that they offer."""
 
+ULTIMATE_RULES: dict[str, dict[str, Parameters]] = {
+    "ziegler_nichols_ultimate": {
+        "P": (0.5, INF, 0.0),
+        "PI": (0.45, 1 / 1.2, 0.0),
+        "PID": (0.6, 0.5, 0.125),
+    },
+    "tyreus_luyben": {"PI": (1 / 3.2, 2.2, 0.0), "PID": (1 / 2.2, 2.2, 1 / 6.3)},
+}
+"""Factors of the ultimate gain (kp) and period (ti, td): Ziegler and Nichols (1942); Tyreus and
+Luyben (1992), whose PID is that of Luyben and Luyben (1997)."""
+
 SYSTEM_RULES: dict[str, tuple[str, ...]] = {
-    "ziegler_nichols_ultimate": ("P", "PI", "PID"),
+    **{rule: tuple(kinds) for rule, kinds in ULTIMATE_RULES.items()},
     "optimal": ("P", "PI", "PD", "PID"),
 }
 """Rules that use the frequency response of the plant itself, and the kinds that they offer."""
