@@ -8,6 +8,7 @@ from .plant import Plant as Plant
 from .plants import flow_loop as flow_loop
 from .plants import heater as heater
 from .plants import tank as tank
+from .relay import relay_test as relay_test
 from .set_up import paper_valve as paper_valve
 from .set_up import valve as valve
 from .truth import PlantTruth as PlantTruth

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 from .._checks import real
 from ..data import Record
 from ..errors import OptionError
+from ..numerics.arrays import FloatArray
 from .control_valve import Seed
 from .imperfections import band_limited_noise, slow_disturbance
 from .instruments import held_input
@@ -152,17 +153,29 @@ class Plant:
         if truth.integrating_rate is None:
             start += truth.gain * (held[0] - self.steady_state[0])
         output = start + response_to_changes(truth.matrices, held, self.dt, truth.dead_time)
-        output = output + slow_disturbance(
-            held.size, self.disturbance, self.disturbance_time, self.dt, generator
-        )
-        output = output + band_limited_noise(held.size, self.noise, generator, limited=False)
-        if self.resolution is not None:
-            output = self.resolution * np.round(output / self.resolution)
-        return Record(
-            self.dt * np.arange(held.size, dtype=np.float64),
-            held,
-            output,
-            name=name or truth.plant,
-            input_labels=[f"{self.labels[0]} (simulated) [{truth.units[0]}]"],
-            output_labels=[f"{self.labels[1]} (simulated) [{truth.units[1]}]"],
-        )
+        return recorded_plant(self, held, output + added_noise(self, held.size, generator), name)
+
+
+def added_noise(plant: Plant, n_samples: int, rng: np.random.Generator) -> FloatArray:
+    """Draw what is added to the output of a plant: disturbance and noise of the sensor."""
+    slow = slow_disturbance(n_samples, plant.disturbance, plant.disturbance_time, plant.dt, rng)
+    return slow + band_limited_noise(n_samples, plant.noise, rng, limited=False)
+
+
+def rounded_by(plant: Plant, output: FloatArray) -> FloatArray:
+    """Round an output to the resolution of the sensor."""
+    step = plant.resolution
+    return output if step is None else np.asarray(step * np.round(output / step))
+
+
+def recorded_plant(plant: Plant, held: FloatArray, output: FloatArray, name: str) -> Record:
+    """Record of a plant, rounded."""
+    truth = plant.truth
+    return Record(
+        plant.dt * np.arange(held.size, dtype=np.float64),
+        held,
+        rounded_by(plant, output),
+        name=name or truth.plant,
+        input_labels=[f"{plant.labels[0]} (simulated) [{truth.units[0]}]"],
+        output_labels=[f"{plant.labels[1]} (simulated) [{truth.units[1]}]"],
+    )
