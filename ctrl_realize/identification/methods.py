@@ -40,6 +40,7 @@ def identify(
     known: ct.LTI | None = None,
     loss: Literal["huber", "least_squares"] = "huber",
     noise: Literal["auto", "white"] = "auto",
+    focus: Literal["simulation", "prediction"] = "simulation",
     structures: Structures | None = None,
     include_known: bool = False,
     gains: Literal["common", "own"] = "common",
@@ -71,7 +72,7 @@ def identify(
         Largest delay in samples. Default: for ``"scan"`` the time at which the step response has
         reached half of its final value, for ``"paper"`` 100, for ``"output_error"`` see
         `fit_output_error`.
-    known, loss, noise, include_known : optional
+    known, loss, noise, focus, include_known : optional
         For ``"output_error"``, see `fit_output_error`.
     structures : optional
         Process model, such as P1D, P2DZ, FOPDT or SOPDT. For ``"output_error"``, which also takes
@@ -118,12 +119,13 @@ def identify(
     -----
     A record with one input and one output whose input is not a step is fitted by lags with a dead
     time. If the residual is correlated with the input, a state-space model with a delay of whole
-    samples (`fit_state_space`) is fitted as well. It is chosen if its information criterion is
-    smaller by 10 or more, on the same samples and with an autoregressive noise model for each. Its
-    `fit` has `dead_time`, `interval` and `total_delay`; the interval spans the delays that are not
-    ruled out at its order and the interval of the lag model (``fit.lags``), unless the residual of
-    the latter is more than twice as large. If `order`, `structures` or `known` is given, or if
-    samples are missing, no other model class is tried.
+    samples (`fit_state_space`) is fitted as well; also if it is so within the same sample alone, as
+    of a feedthrough, unless later inputs show that a controller does it. It is chosen if its
+    information criterion is smaller by 10 or more, on the same samples and with an autoregressive
+    noise model for each. Its `fit` has `dead_time`, `interval` and `total_delay`; the interval
+    spans the delays that are not ruled out at its order and the interval of the lag model
+    (``fit.lags``), unless the residual of the latter is more than twice as large. If `order`,
+    `structures` or `known` is given, or if samples are missing, no other model class is tried.
 
     ``"paper"`` and ``"scan"`` are the method of [1]_; for the sources of the output-error fit see
     `fit_output_error`.

@@ -3,6 +3,8 @@
 A record of one input and one output is fitted by lags with a dead time first. If the residual is
 correlated with the input, a state-space model is fitted as well (`fit_state_space`), and both are
 compared on the same samples with autoregressive noise models whose orders are chosen by BIC.
+Correlation with the input of the same sample alone is that of a feedthrough, which lags do not
+have, or of a controller.
 """
 
 from __future__ import annotations
@@ -29,6 +31,7 @@ from .output_error.own_gains import at_model_gain
 from .output_error.result import OutputErrorFit
 from .state_space_fit.starts import Outcome, from_starts
 from .validation.residuals import analyse_residuals
+from .validation.residuals_result import ResidualAnalysis
 
 LAGS = 25
 """Lags after the dead time at which the correlation of residual and input is tested."""
@@ -54,10 +57,12 @@ def with_modes_judged(
     fit = fit_of(system, OutputErrorFit)
     records, cut = lively_parts(at_model_gain(fit))
     try:
-        follows, left = _left(system, records)
+        checks = _checks(system, records)
+        follows, left = [not check.independent for check in checks], _residuals(checks)
+        related = [bool(check.flags) for check in checks]
     except UnsuitableSystemError:  # an unstable model is not simulated
-        follows, left = [True] * len(records), None
-    if not any(follows):
+        related, follows, left = [True] * len(records), [True] * len(records), None
+    if not any(related):
         return system
     why = "nothing else could be fitted"
     outlying = fit.repeatability is not None and fit.repeatability.outlying
@@ -75,8 +80,10 @@ def with_modes_judged(
             found = from_starts(records, most_starts=MOST_STARTS, enough=MOST_SAMPLES)
             gain = _gain(fit, records, left, found)
             late = max_delay is not None and _delay(found.system) > max_delay
-            if gain > VERY_STRONG and not late:
-                return _chosen(found, fit, sum(follows), gain, cut)
+            # A feedthrough alone leaves nothing of the input in this residual, a controller does.
+            loop = not any(follows) and any(c.flags for c in _checks(found.system, records))
+            if gain > VERY_STRONG and not late and not loop:
+                return _chosen(found, fit, sum(related), gain, cut)
             why = (
                 f"a model of {found.fit.order} states starts after max_delay"
                 if late
@@ -84,20 +91,23 @@ def with_modes_judged(
             )
         except (DataError, OrderError) as refused:
             why = f"no state-space model: {refused}"
-    if left is None:
+    if left is None or not any(follows):
         return system
     flag = flagged("input_in_residual.lags", count=sum(follows), records=len(follows), why=why)
     return system.replace(fit=replace(fit, flags=(*fit.flags, flag)))
 
 
-def _left(system: DelayedStateSpace, records: Sequence[Record]) -> tuple[list[bool], Residuals]:
-    """Test whether residuals are correlated with the input, and return them."""
+def _checks(system: DelayedStateSpace, records: Sequence[Record]) -> list[ResidualAnalysis]:
+    """Test whether residuals are correlated with the input."""
     late = int(np.ceil(np.max(system.delay)))
-    checks = [
+    return [
         analyse_residuals(system, record, lags=min(late + LAGS, record.n_samples // 3))
         for record in records
     ]
-    return [not check.independent for check in checks], [np.ravel(c.residual) for c in checks]
+
+
+def _residuals(checks: Sequence[ResidualAnalysis]) -> Residuals:
+    return [np.ravel(check.residual) for check in checks]
 
 
 def _delay(system: DelayedStateSpace) -> int:
@@ -116,7 +126,7 @@ def _gain(
     # parameters, dead time, and the initial states
     lags = 2 * fit.order - fit.relative_degree + 2 + starts * fit.order
     other = 2 * modes.order + modes.feedthrough + 1 + starts * modes.order
-    theirs = _left(found.system, records)[1]
+    theirs = _residuals(_checks(found.system, records))
     fewer = (lags - other) * float(np.log(samples))
     return float(coloured_criterion(left)[0] - coloured_criterion(theirs)[0] + fewer)
 

@@ -114,6 +114,69 @@ def test_a_structure_that_was_asked_for_is_only_judged():
     assert "fit_state_space" in str(flag)
 
 
+WITHIN_A_SAMPLE = ct.tf([0.2, 1.0], [0.5, 1.0])
+"""0.4 at once, and the rest with a lag of 0.5 s."""
+
+
+def test_a_feedthrough_is_not_taken_for_a_controller():
+    rng = np.random.default_rng(0)
+    u = np.repeat(rng.standard_normal(150), 2)
+    y = cr.delayed_ss(WITHIN_A_SAMPLE, dt=DT).simulate(u) + 0.1 * rng.standard_normal(300)
+    found = cr.identify(cr.Record(DT * np.arange(300), u, y))
+    assert isinstance(found.fit, cr.identification.StateSpaceFit)
+    # three standard deviations of 0.1 / sqrt(150): held inputs tell the jump every second time
+    assert found.markov(1).item() == pytest.approx(0.4, abs=0.025)
+
+
+def test_a_controller_is_not_taken_for_a_feedthrough():
+    rng = np.random.default_rng(1)
+    noise = lfilter([0.06], [1, -0.8], rng.standard_normal(400))
+    target = np.repeat(rng.choice([-1.0, 1.0], 20), 20)
+    u, y, x, integral = np.zeros(403), np.zeros(400), 0.0, 0.0  # the plant is 3 samples late
+    for k in range(400):
+        y[k] = x + noise[k]
+        integral += 0.05 * (target[k] - y[k])
+        u[k + 3] = 0.8 * (target[k] - y[k]) + integral
+        x = 0.9 * x + 0.1 * u[k]
+    found = cr.identify(cr.Record(DT * np.arange(400), u[3:], y))
+    assert isinstance(found.fit, cr.identification.OutputErrorFit)
+    assert "feedback" in codes(found)
+
+
+def focused(plant, count):
+    """Fits for prediction and for simulation in slow noise, and the record without it."""
+    rng = np.random.default_rng(1)
+    u = np.repeat(rng.standard_normal(count), 6)
+    y = cr.delayed_ss(plant, dt=DT).simulate(u)
+    noise = lfilter([np.sqrt(1 - 0.95**2)], [1, -0.95], rng.standard_normal(u.size + 200))[200:]
+    time = DT * np.arange(u.size)
+    record = cr.Record(time, u, y + 0.3 * y.std() * noise)
+    fits = [
+        cr.fit_output_error(record, focus=focus, max_delay=10)
+        for focus in ("prediction", "simulation")
+    ]
+    return fits, cr.Record(time, u, y)
+
+
+def test_for_simulation_a_model_of_a_wrong_class_is_fitted_to_the_frequencies_of_the_input():
+    # The noise is slow and lags cannot respond at once: prediction weighs the fast part of the
+    # response, which no lag follows.
+    (prediction, simulation), clean = focused(ct.tf([-1.0, 1.0], [2.0, 1.0]), 100)
+    first, second = (
+        cr.validation.analyse_residuals(one, clean).fit_percent[0]
+        for one in (prediction, simulation)
+    )
+    assert second > first + 10
+    assert "coloured_residual" in codes(simulation)
+
+
+def test_for_simulation_as_for_prediction_a_right_structure_is_weighted_by_the_noise():
+    (prediction, simulation), _ = focused(LAG, 40)
+    assert simulation.fit.estimate.residual.noise_lags
+    assert simulation.fit.dead_time == prediction.fit.dead_time
+    assert simulation.fit.gain == prediction.fit.gain
+
+
 def ringing(strength, seed=8):
     """Modes at 12 and 7 rad/s beside a lag, behind a dead time of 0.55 s."""
     rng = np.random.default_rng(seed)

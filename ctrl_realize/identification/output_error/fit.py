@@ -51,6 +51,7 @@ from .summary import choices_of, fitted_model
 Loss = Literal["huber", "least_squares"]
 Noise = Literal["auto", "white"]
 Gains = Literal["common", "own"]
+Focus = Literal["simulation", "prediction"]
 
 
 @single_threaded
@@ -63,6 +64,7 @@ def fit_output_error(
     known: ct.LTI | None = None,
     loss: Loss = "huber",
     noise: Noise = "auto",
+    focus: Focus = "simulation",
     include_known: bool = False,
     gains: Gains = "common",
     actuator: Asked | None = None,
@@ -101,6 +103,10 @@ def fit_output_error(
         exceed it, for other inputs if the residual is coloured, no sample is missing, and no
         structures are given. ``"white"``: all samples have equal weight, and correlation only
         widens the interval.
+    focus : {"simulation", "prediction"}, optional
+        For other inputs than steps in coloured noise. ``"prediction"``: errors weigh by the noise
+        model. ``"simulation"``: so do they unless the model then simulates the records worse than
+        that with equal weights, by more than the noise explains (see Notes).
     include_known : bool, optional
         Include the known dynamics in the returned model.
     gains : {"common", "own"}, optional
@@ -186,6 +192,14 @@ def fit_output_error(
     shorter than a block is resolved as far as noise and input allow. If the part is shorter than
     the record, that is reported (``cut``).
 
+    Simulation of data that were not used is best with errors that weigh by the noise model where
+    the structure is right (then both weights have the same limit, and this one is the more
+    accurate), and with equal weights where it is not: weighted errors lead to the best model for
+    the frequencies at which the noise is small, plain ones to that for the frequencies of the input
+    (section 8.5 of [1]_). So `focus` ``"simulation"`` keeps the weights unless a likelihood ratio
+    of the simulation errors, counted in independent samples, exceeds 10 as in a Bayesian
+    information criterion.
+
     In a model with more zeros than the plant the dead time has no Fisher information: a superfluous
     zero can take its place. Therefore the relative degree is chosen, not left free.
 
@@ -224,6 +238,7 @@ def fit_output_error(
     """
     loss = one_of(loss, "loss", ("huber", "least_squares"))
     noise = one_of(noise, "noise", ("auto", "white"))
+    focus = one_of(focus, "focus", ("simulation", "prediction"))
     gains = one_of(gains, "gains", ("common", "own"))
     if actuator is not None:
         one_of(actuator, "actuator", ASKED)
@@ -241,6 +256,7 @@ def fit_output_error(
         known=factor,
         huber=loss == "huber",
         whiten=noise == "auto",
+        simulates=focus == "simulation",
     )
     setting = {"own_gains": gains == "own", "may_clip": actuator is None}
     free = partial(_linear, several, tried, **setting)

@@ -54,6 +54,8 @@ class Requested:
         Huber's loss (k = 1.345) instead of least squares.
     whiten : bool
         Prewhiten the data if the noise is coloured.
+    simulates : bool
+        But not if the model then simulates them worse than coloured noise explains.
     """
 
     structures: tuple[Structure, ...] | None = None
@@ -64,6 +66,7 @@ class Requested:
     known: KnownFactor = field(default_factory=KnownFactor)
     huber: bool = True
     whiten: bool = True
+    simulates: bool = True
 
 
 def other_structures(fits: WindowFit, refit: Callable[[], WindowFit]) -> OtherStructures:

@@ -18,7 +18,7 @@ from ...engine.window_fit import WindowFit
 from ..other_structures import Requested
 from .condensed import MOST_LAGS
 from .data import BEYOND, SampledData, cut
-from .window import ORDERS, SampledWindow, fit_windows, in_coloured_noise
+from .window import ORDERS, SampledWindow, fit_windows, in_coloured_noise, simulates_worse
 
 FOLLOWS = 36.0
 """Least chi-square of the response to the input: six standard deviations. White noise without any
@@ -47,7 +47,10 @@ def fit_stretch(
     part = fit_windows(data, structures, within, requested.huber, np.ones(1))
     if not (part.fit.correlation > WHITE and requested.whiten and data.complete):
         return part
-    return replace(in_coloured_noise(part), unweighted=part.model)
+    weighted = in_coloured_noise(part)
+    if requested.simulates and simulates_worse(weighted, part):
+        return part
+    return replace(weighted, unweighted=part.model)
 
 
 def samples_in_a_block(

@@ -10,6 +10,7 @@ References
    Symposium on Identification in Automatic Control Systems, Prague 1967, paper 3.17.
 .. [2] T. Soderstrom, Convergence properties of the generalised least squares identification method,
    Automatica 10 (1974) 617-626, doi:10.1016/0005-1098(74)90083-8.
+.. [3] L. Ljung, System Identification: Theory for the User, 2nd ed., Prentice Hall 1999.
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ...arrays import FloatArray, without_gaps
+from ...constants import SMALLEST, VERY_STRONG
 from ...engine.compared_fits import settled
 from ...engine.eliminate import evaluate
 from ...engine.modal import respond
@@ -29,7 +31,7 @@ from ...engine.static_gain import StaticGain
 from ...engine.structures import Candidate, Scales, search
 from ...engine.window import Window, window_of_rows
 from ...engine.window_fit import WindowFit, fit_window
-from ...signals.noise import quantisation_step, winsorised_sigma
+from ...signals.noise import correlation_time, quantisation_step, winsorised_sigma
 from ...signals.noise_model import noise_lags, whitening_filter
 from ...signals.onset import correlation_onset
 from ..result import UnweightedModel
@@ -131,6 +133,28 @@ def in_coloured_noise(plain: SampledWindow) -> SampledWindow:
             break
         found = again
     return found
+
+
+def simulates_worse(weighted: SampledWindow, plain: SampledWindow) -> bool:
+    """Whether a fit of filtered records simulates them worse than a fit to the records themselves.
+
+    That is, by more than the noise explains: where the structure is right both estimates have the
+    same limit, and the weighted one is the more accurate; where it is not, the weighted one is that
+    for the frequencies at which the noise is small [3]_, section 8.5, not for those of the input.
+    Likelihood ratio with as many samples as independent ones tell as much, and the charge of BIC.
+    """
+    before, after = (_simulated(plain.data, fit) for fit in (plain, weighted))
+    independent = after.size / correlation_time(after)
+    ratio = winsorised_sigma(after, 0.0) / max(winsorised_sigma(before, 0.0), SMALLEST)
+    fewer = weighted.fit.best.structure.free - plain.fit.best.structure.free
+    evidence = 2 * independent * np.log(max(ratio, SMALLEST)) + fewer * np.log(independent)
+    return bool(evidence > VERY_STRONG)
+
+
+def _simulated(data: SampledData, fit: SampledWindow) -> FloatArray:
+    """Error of a simulation with the best local terms."""
+    best = fit.fit.best
+    return np.asarray(data.problem.data - modelled(data, best.parameters, fit.model.numerator))
 
 
 def _settles(static: StaticGain) -> bool:
