@@ -1,7 +1,7 @@
 """Print a table of speeds, each a ratio to a named baseline: ``python -m benchmarks.records``.
 
 Data are simulated; CPU time of the process, one call each. ``python -m benchmarks.records
-measured`` prints how well halves of measured records are predicted, beside subspace methods, and
+measured`` prints how well halves of measured records are simulated, beside rivals, and
 ``responses`` what measured frequency responses gave, ``joint`` what they gave with step records,
 ``several`` what several records of a plant give together, ``statements`` what it gains to state a
 fastest lag.
