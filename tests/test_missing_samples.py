@@ -210,3 +210,10 @@ def test_a_model_is_validated_and_drawn_on_the_samples_that_there_are():
     assert drawn.size == np.count_nonzero(record.seen)
     with pytest.raises(DataError, match="a simulation needs complete data"):
         cr.validation.analyse_residuals(sys, record)
+
+
+def test_a_record_without_an_output_after_its_step_is_refused():
+    time = 0.1 * np.arange(200)
+    y = np.where(time < 10, np.random.default_rng(0).standard_normal(200), np.nan)
+    with pytest.raises(DataError, match="expected samples of the output after the step at 10 s"):
+        cr.fit_output_error(cr.Record(time, 1.0 * (time >= 10), y, missing="keep"))

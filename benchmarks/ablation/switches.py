@@ -179,6 +179,12 @@ SWITCHES = (
     Switch("Huber's loss", {f"{PUBLIC}.fit:fit_step_record": _least_squares}, called=True),
     Switch("noise made white", {f"{STEP}:in_coloured_noise": first}),
     Switch(
+        "noise of a short rest made white",
+        {f"{FITS}.coloured:first_order_covariance": giving(np.ones(1))},
+    ),
+    Switch("louder noise that goes on", {f"{STEP}:continues": giving(False)}),
+    Switch("first motion in slow noise", {f"{FITS}.step_data:_unseen_at_rest": giving(1.0)}),
+    Switch(
         "unlike residual left alone",
         {f"{FITS}.coloured:_UNLIKE": value(float("inf"))},
         (f"{STEP}:in_coloured_noise",),

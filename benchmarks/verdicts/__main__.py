@@ -42,6 +42,7 @@ def judged(one: Case) -> dict[str, object]:
         "flags": [flag.code for flag in fit.flags],
         "held": bool(low - 1e-9 <= plant.dead_time <= high + 1e-9),
         "near": bool(abs(fit.dead_time - plant.dead_time) <= reach),
+        "narrow": bool(high - low <= max(0.4 * fit.onset, reach)),
         "gain held": bool(fit.gain_interval[0] <= plant.gain <= fit.gain_interval[1]),
         "gain error": float(abs(fit.gain / plant.gain - 1)),
         "worst Ms": said["tuning"].number,

@@ -11,7 +11,7 @@ import ctrl_realize as cr
 
 KINDS = (
     "one lag", "two lags", "three lags", "four lags", "five lags", "zero on the left",
-    "zero on the right", "pair", "slow noise", "load", "clipped", "rising at its end",
+    "zero on the right", "pair", "slow noise", "load", "clipped", "rising at its end", "loud noise",
 )  # fmt: skip
 Rng = np.random.Generator
 
@@ -74,7 +74,7 @@ def _lags(rng: Rng, count: int) -> tuple[complex, ...]:
 
 def _plant(kind: str, rng: Rng) -> Plant:
     count = {"one lag": 1, "three lags": 3, "four lags": 4, "five lags": 5}.get(kind, 2)
-    if kind in ("slow noise", "load", "clipped", "rising at its end"):
+    if kind in KINDS[8:]:
         count = int(rng.integers(1, 4))
     plant = Plant(float(rng.choice([-1, 1]) * rng.uniform(0.5, 4)), 0.0, _lags(rng, count))
     plant = replace(plant, dead_time=float(20 * np.exp(rng.uniform(np.log(0.1), np.log(2.0)))))
@@ -90,7 +90,7 @@ def _plant(kind: str, rng: Rng) -> Plant:
 
 
 def case(kind: str, seed: int) -> Case:
-    """Make one record of a kind: dt 1 s, noise of 0.2 to 4 % of the response."""
+    """Make one record of a kind: dt 1 s, noise of 0.2 to 4 % of the response, loud 10 to 50 %."""
     rng = np.random.default_rng([KINDS.index(kind), seed])
     plant = _plant(kind, rng)
     before = int(rng.integers(40, 120))
@@ -107,7 +107,8 @@ def case(kind: str, seed: int) -> Case:
     if kind == "clipped":
         limit = float(rng.uniform(0.6, 0.97)) * height
         y = np.clip(y, -limit, limit)
-    level = height * float(np.exp(rng.uniform(np.log(0.002), np.log(0.04))))
+    least, most = (0.1, 0.5) if kind == "loud noise" else (0.002, 0.04)
+    level = height * float(np.exp(rng.uniform(np.log(least), np.log(most))))
     noise = rng.standard_normal(time.size + 200)
     if kind == "slow noise" or (kind == "load" and rng.random() < 0.3):
         noise = lfilter([np.sqrt(1 - 0.9**2)], [1, -0.9], noise)

@@ -104,6 +104,11 @@ def step_data_of(record: Record) -> StepData | None:
     edges = edges_of(record)
     if not edges:
         return None
+    if np.isnan(output[edges[0].index :]).all():
+        raise DataError(
+            f"expected samples of the output after the step at {edges[0].time:.6g} s, but all of "
+            f"{named('record', record.name)} are missing there; use a longer record"
+        )
     data = step_data(output, signal, record.dt, [(e.index, e.samples) for e in edges])
     if data.motion is None:
         raise DataError(

@@ -34,9 +34,6 @@ from .window_fit import WindowFit
 COUNT = 39
 """Models that are drawn: a further one lies between the extremes of 39 with 95 % (2 / 40 on both
 sides together)."""
-_TEMPERED = 0.5
-"""Power of the evidence with which a structure is drawn: the criterion says too surely which one of
-two is right (five lags: a further one is seldom seen). Measured as below."""
 _CALIBRATED = 1.5
 """Variance of the models over that of the errors at a given structure, so that their envelope holds
 the true response as often as it says. Measured: `benchmarks.verdicts`, seeds below 100."""
@@ -69,7 +66,7 @@ def plausible_models(
         The fit of each.
     """
     rng = np.random.default_rng(COUNT)
-    weights = np.array(list(evidence.values())) ** _TEMPERED
+    weights = np.array(list(evidence.values()))
     counts = _counts(weights / weights.sum(), COUNT)
     models: list[PlausibleModel] = []
     for structure, count in zip(evidence, counts, strict=True):

@@ -57,10 +57,11 @@ class WindowFit:
     ``variance`` is that of independent noise with the same effect on the estimates as the residual:
     the variance of the residual, plus that of a coarse `rounding` (neighbours are rounded alike),
     times its `correlation`; after prewhitening, times `colour`, the mean square of the whitened
-    residual. `taken` is what a model takes from slow noise: errors of gain and process parameters
-    have the variance times that. `normalized_rms` is the root mean square of the residual of the
-    chosen structure, in means over bins, over the given noise level. `rivals` are the margins by
-    which structures were chosen, or not, for estimating the noise.
+    residual, and `correlation` is that of the noise. `taken` is what a model takes from slow noise:
+    errors of gain and process parameters have the variance times that. `normalized_rms` is the root
+    mean square of the residual of the chosen structure, in means over bins, over the given noise
+    level. `rivals` are the margins by which structures were chosen, or not, for estimating the
+    noise.
     """
 
     window: Window
@@ -99,6 +100,13 @@ class WindowFit:
     def penalty(self) -> float:
         """Penalty on a parameter in the criterion: log of the number of independent samples."""
         return parameter_charge(self.independent)
+
+    @property
+    def estimated(self) -> tuple[int, int]:
+        """Parameters that were estimated, and samples from which they were."""
+        window = self.window
+        parameters = _estimated(window, self.best.structure)
+        return parameters, window.output.size - window.start
 
     @cached_property
     def best(self) -> Candidate:
@@ -158,9 +166,10 @@ def with_noise_of_residual(fit: WindowFit) -> WindowFit:
     samples are independent then, and their variance is known so badly that Student's distribution
     [5]_ takes the place of the normal one. Ablation: noise that the model has taken.
     """
-    window, count = fit.window, fit.window.output.size - fit.window.start
-    parameters = _estimated(window, fit.best.structure)
-    correlation, missing = correlation_of_noise(fit.correlation, parameters / count)
+    parameters, count = fit.estimated
+    correlation, missing = fit.correlation, 0.0
+    if fit.colour is None:  # otherwise it is that of the noise already
+        correlation, missing = correlation_of_noise(correlation, parameters / count)
     if correlation <= 1.0:
         return fit
     freedom = max(count / correlation - parameters, _LEAST_FREEDOM)

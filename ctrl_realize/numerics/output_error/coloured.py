@@ -1,7 +1,8 @@
-"""Repeat the fits for a step record with coloured noise that is known from the baseline.
+"""Repeat the fits for a step record with coloured noise.
 
-Generalised least squares [1]_; noise at rest counts as coloured by its correlation time [2]_. The
-thresholds are our own.
+Generalised least squares [1]_; noise counts as coloured by its correlation time [2]_. Samples at
+rest tell its autocovariance where there are enough; of a short rest that of a first-order
+autoregression is taken if the residual is one. The thresholds are our own.
 
 References
 ----------
@@ -25,7 +26,13 @@ from ..engine.problem import Problem, Structure
 from ..engine.structures import Candidate, Scales, choose, neighbour_starts, parameter_bounds
 from ..engine.window_fit import WindowFit
 from ..signals.noise import correlation_time, mad_sigma
-from ..signals.noise_model import noise_covariance, whitener
+from ..signals.noise_model import (
+    first_order_covariance,
+    noise_covariance,
+    noise_lags,
+    whitener,
+    whitening_filter,
+)
 from .step_data import StepData, settled_at
 
 _COLOURED = 2.0  # samples at rest that count as one, from which on: white noise scatters to 1.5
@@ -44,11 +51,12 @@ alone."""
 
 
 def in_coloured_noise(fits: WindowFit, data: StepData) -> WindowFit:
-    """Fit by generalised least squares if the baseline noise is coloured; otherwise return `fits`.
+    """Fit by generalised least squares if the noise is coloured; otherwise return `fits`.
 
     White baseline noise is not changed: correlation of the residual is then a misfit. Neither are
     records with gaps: an autoregression from the covariances of the pairs of samples that there are
     (Parzen 1963) need not be stable, and with 30 % missing its intervals were no narrower.
+    Ablation: noise of a short rest made white.
     """
     bins = fits.window.bins
     if data.coarse or bins is None or fits.problem.segments is not None:
@@ -57,15 +65,19 @@ def in_coloured_noise(fits: WindowFit, data: StepData) -> WindowFit:
         return fits
     error = fits.window.output - fits.window.predict(fits.problem, fits.best)
     rest = error[: data.edge]
-    if rest.size < _FEWEST:
-        return fits
     samples = correlation_time(rest)
-    if samples < max(_COLOURED, 0.5 * fits.correlation) or rest.size < _TIMES * samples:
+    told = rest.size >= max(_FEWEST, _TIMES * samples)
+    if (samples if told else fits.correlation) < max(_COLOURED, 0.5 * fits.correlation):
         return fits
     # Not the pseudo-values of Huber's loss, which distort smooth noise.
     limit = _OUTLIER * max(mad_sigma(error), fits.sigma)
     plain = fits.window.with_output(fits.window.output - error + np.clip(error, -limit, limit))
-    covariance = noise_covariance(_quiet(error, data), error.size)
+    if told:
+        covariance = noise_covariance(_quiet(error, data), error.size)
+    elif whitening_filter(error, noise_lags(error.size)).size == 2:
+        covariance = first_order_covariance(error, fits.estimated[0])
+    else:
+        return fits
     if covariance.size == 1:
         return fits
     problem = replace(plain, whitener=whitener(bins, covariance))
@@ -77,7 +89,8 @@ def in_coloured_noise(fits: WindowFit, data: StepData) -> WindowFit:
     colour = chosen.cost / max(problem.data.size - lost, 1) / fits.sigma**2
     if colour > _UNLIKE**2:
         return fits
-    refit = replace(refit, colour=max(colour, 1.0))
+    slowness = 2 * float(np.sum(covariance)) - 1.0
+    refit = replace(refit, colour=max(colour, 1.0), correlation=max(slowness, 1.0))
     return replace(refit, criterion=refit.criteria(candidates))
 
 

@@ -26,6 +26,8 @@ from ..signals.filters import moving_mean
 from ..signals.load_step import LoadStep
 from ..signals.noise import (
     colouring,
+    correlation_of_noise,
+    correlation_time,
     hum_frequencies,
     is_coarse,
     quantisation_step,
@@ -192,9 +194,21 @@ def step_data(
         colour = colouring(output[:edge] - line, sigma)
     span = float(np.ptp(output))
     sigma = max(sigma, 1e-4 * span)
-    motion = first_motion(quiet, edge, sigma, quantum, drift, gaps)
+    loud = sigma * _unseen_at_rest(quiet[:edge] - line) if edge >= 8 else sigma
+    motion = first_motion(quiet, edge, loud, quantum, drift, gaps)
     seen = sigma, quantum, drift, colour, hum, motion, quiet, relaxing
     return StepData(output, signal, dt, edges, rows, *seen, bend=bend)
+
+
+def _unseen_at_rest(rest: FloatArray) -> float:
+    """Scatter of slow noise about the level of a short rest, over that about a line through it.
+
+    The line takes part c of the variance (`correlation_of_noise`), and the level is off by half of
+    that. Without, an excursion of the noise passes for the first motion, and no dead time is later.
+    Ablation: first motion in slow noise.
+    """
+    _, lost = correlation_of_noise(correlation_time(rest), 2 / rest.size)
+    return float(np.sqrt((1.0 + 0.5 * lost) / (1.0 - lost)))
 
 
 def bare_data(

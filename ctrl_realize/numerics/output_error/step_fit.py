@@ -75,9 +75,8 @@ from ..engine.structures import (
     choose,
 )
 from ..engine.window_fit import WindowFit, among, fit_window, with_noise_of_residual
-from ..families.equal_lags import LagChain
-from ..families.flow import DispersedFlow
 from ..families.physical import without_errors
+from ..signals.noise_model import continues
 from .before_the_step import fitted_from_rest
 from .coloured import in_coloured_noise
 from .extrapolation import least_extrapolating
@@ -157,12 +156,13 @@ def _given_structures(
     requested: Requested,
 ) -> OutputErrorEstimate:
     """Estimate the dead time by the likelihood of the best of given structures, adequate or not."""
-    adequate, near = _is_noise(data, fits, fits.best), _close_to_noise(data, fits)
+    near, noisy = _close_to_noise(data, fits), _at_noise_level(data, fits)
+    adequate, fits = noisy is not None, noisy or fits
     limited = requested.fastest is not None
     others = OtherStructures() if limited else other_structures(fits, free)
     if adequate and requested.whiten:
         fits = in_coloured_noise(fits, data)
-    if adequate and fits.colour is None and others.better is None:
+    if adequate and others.better is None:
         fits = with_noise_of_residual(fits)
     level = max(ADEQUATE * data.colour, fits.normalized_rms if adequate else 0.0)
     if requested.fastest is not None:
@@ -187,14 +187,14 @@ def _free_choice(
     noisy = _at_noise_level(data, plain)
     if noisy is not None:
         fits = in_coloured_noise(noisy, data) if whiten else noisy
-        if fits.colour is None:
-            fits = with_noise_of_residual(fits)
+        fits = with_noise_of_residual(fits)
         chains = chains_of(fits)
         likely = likelihood_fit(
             fits,
             adequate=True,
             chains=chains,
-            flows=_flows(data, fits, chains),
+            # Rounding would decide on how smoothly a response begins.
+            flows=[] if data.coarse else flows_of(fits, chains),
             onset=data.motion.onset * data.dt,
             may_stick=not data.coarse,  # what is rounded begins with a jump
             near=near,
@@ -258,6 +258,9 @@ def _is_noise(data: StepData, fits: WindowFit, candidate: Candidate) -> bool:
         return False
     if fits.correlation == 1.0 and candidate is fits.best:
         return True
+    error = fits.window.output - fits.window.predict(fits.problem, candidate)
+    if continues(error[: data.edge], error[data.edge :]):
+        return True
     state = evaluate(fits.problem, candidate.structure, candidate.parameters[None])
     assert fits.window.bins is not None
     first = fits.window.bins.first
@@ -269,11 +272,6 @@ def _is_noise(data: StepData, fits: WindowFit, candidate: Candidate) -> bool:
     # The error of a wrong model decays: it is in the first half.
     late = late[late.size // 2 :]
     return bool(np.mean(moving**2) <= ADEQUATE**2 * np.mean(late**2))
-
-
-def _flows(data: StepData, fits: WindowFit, chains: Sequence[LagChain]) -> Sequence[DispersedFlow]:
-    """Dispersion, unless rounding decides on how smoothly a response begins."""
-    return [] if data.coarse else flows_of(fits, chains)
 
 
 def _robust_fit(

@@ -24,6 +24,7 @@ from scipy.linalg import cholesky, solve_triangular
 from scipy.signal import lfilter
 
 from ..arrays import FloatArray, IntArray
+from ..constants import SMALLEST, Z_95
 from .bins import Bins
 from .correlation import autoregression
 from .noise import mad_sigma
@@ -62,8 +63,10 @@ def coloured_criterion(residuals: Sequence[FloatArray]) -> tuple[float, int]:
     return min(found)
 
 
+_AS_LARGE = 1.3  # standard deviations that may be equal: of 30 samples it is off by 13 %
 _WILD = 4.0  # standard deviations of which one of 16 000 Gaussian samples is beyond: cut
 _NOTHING = 1e-6  # relative size of a response that has decayed
+_SLOWEST = 0.99  # pole of noise: slower noise is a drift over 200 samples
 _JITTER = 1e-9  # of the variance: a covariance of smooth noise is nearly singular
 
 
@@ -101,6 +104,49 @@ def noise_covariance(quiet: FloatArray, longest: int) -> FloatArray:
     power = np.abs(np.fft.rfft(lfilter([1.0], denominator, pulse), 2 * pulse.size)) ** 2
     covariance: FloatArray = np.fft.irfft(power)[: pulse.size]
     return np.asarray(covariance / covariance[0])
+
+
+def continues(rest: FloatArray, later: FloatArray) -> bool:
+    """Whether a louder residual is the slow noise of a short rest, as its samples tell.
+
+    A rest of a few correlation times shows part of the variance of AR(1) noise alone, but its pole
+    r, with a standard error of sqrt((1 - r^2) / n), and that of the steps ``e[k] - r e[k-1]``. A
+    misfit has a slower residual than the noise at rest. Ablation: louder noise that goes on.
+    """
+    centred = rest - rest.mean()
+    if not centred.any() or rest.size < _SAMPLES_PER_LAG:
+        return False
+    pole = float(later[1:] @ later[:-1]) / max(float(later @ later), SMALLEST)
+    known = float(centred[1:] @ centred[:-1]) / float(centred @ centred)
+    error = Z_95 * np.sqrt(max(1.0 - pole**2, 0.0) / rest.size)
+    # Kendall (1954): an estimate with the mean is lower by (1 + 3 r) / n.
+    if pole > known + error + (1.0 + 3.0 * pole) / rest.size:
+        return False
+    steps = [e[1:] - pole * e[:-1] for e in (centred, later)]
+    return bool(np.std(steps[1]) <= _AS_LARGE * np.std(steps[0]))
+
+
+def first_order_covariance(residual: FloatArray, parameters: int) -> FloatArray:
+    """Autocovariance, as `noise_covariance`, of AR(1) noise of which a model has taken its part.
+
+    A model with p parameters takes part ``c = (p / n) (1 + rho) / (1 - rho)`` of the variance of
+    noise with pole rho, and lowers its autocorrelations by c (`correlation_of_noise`): that at one
+    sample is then ``r = (rho - c) / (1 - c)``, a quadratic equation for rho. Where no pole gives so
+    small a one, the nearest does.
+
+    Parameters
+    ----------
+    residual : ndarray, shape (n,)
+    parameters : int
+        Estimated parameters p.
+    """
+    r = float(residual[1:] @ residual[:-1]) / max(float(residual @ residual), SMALLEST)
+    part = parameters / residual.size
+    middle = 0.5 * (1.0 - part + r * (1.0 + part))
+    square = middle**2 - part - r * (1.0 - part)
+    pole = np.clip(middle - np.sqrt(max(square, 0.0)), 0.0, _SLOWEST)
+    covariance: FloatArray = pole ** np.arange(residual.size, dtype=np.float64)
+    return covariance[: max(int(np.sum(covariance > _NOTHING)), 1)]
 
 
 def whitener(bins: Bins, covariance: FloatArray) -> FloatArray:

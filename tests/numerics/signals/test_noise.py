@@ -16,7 +16,12 @@ from ctrl_realize.numerics.signals.noise import (
     rest_noise,
     winsorised_sigma,
 )
-from ctrl_realize.numerics.signals.noise_model import noise_covariance, whitener
+from ctrl_realize.numerics.signals.noise_model import (
+    continues,
+    first_order_covariance,
+    noise_covariance,
+    whitener,
+)
 from ctrl_realize.numerics.validation.held_output import held_share, longest_hold
 from ctrl_realize.numerics.validation.limits import at_limit
 
@@ -184,6 +189,36 @@ def test_slow_noise_is_told_from_what_a_model_leaves_of_it():
     assert after == pytest.approx(true, rel=0.15)
     # of each known to 19 %; the median, since what scatters stands in the denominator
     assert np.median(variances) == pytest.approx(1.0, rel=0.05)
+
+
+def slow(n, seed, pole=0.9):
+    """AR(1) noise of unit variance."""
+    return lfilter([np.sqrt(1 - pole**2)], [1, -pole], white(n + 200, seed))[200:]
+
+
+def test_the_pole_of_noise_is_found_in_what_a_polynomial_leaves_of_it():
+    powers = np.polynomial.legendre.legvander(np.linspace(-1, 1, 250), 5)
+    project = powers @ np.linalg.pinv(powers)
+    plain, found = [], []
+    for seed in range(40):
+        left = (noise := slow(250, seed)) - project @ noise
+        plain.append(left[1:] @ left[:-1] / (left @ left))
+        found.append(first_order_covariance(left, 6)[1])
+    # one is off by sqrt(1 - rho^2) / sqrt(n) = 0.03 at least, the mean of 40 by a sixth of that
+    assert np.mean(found) == pytest.approx(0.9, abs=0.02)
+    assert np.mean(plain) < 0.85
+
+
+def test_noise_of_a_short_rest_goes_on_and_a_misfit_is_none():
+    k = np.arange(250)
+    misfit = 0.03 * np.exp(-k / 40) * np.sin(2 * np.pi * k / 90)
+    went_on = [continues(noise[:60], noise[60:]) for noise in (slow(310, i) for i in range(40))]
+    assert np.mean(went_on) >= 0.85  # two tests that 95 % pass
+    for seed in range(10):
+        noise = 0.004 * white(310, seed)
+        assert not continues(noise[:60], noise[60:] + misfit)
+    assert not continues(np.zeros(60), misfit)
+    assert not continues(slow(15, 0), slow(250, 1))
 
 
 def test_white_noise_loses_nothing_but_degrees_of_freedom():
