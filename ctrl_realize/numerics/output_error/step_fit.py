@@ -75,6 +75,8 @@ from ..engine.structures import (
     choose,
 )
 from ..engine.window_fit import WindowFit, among, fit_window, with_noise_of_residual
+from ..families.equal_lags import LagChain
+from ..families.flow import DispersedFlow
 from ..families.physical import without_errors
 from ..signals.noise_model import continues
 from .before_the_step import fitted_from_rest
@@ -193,8 +195,7 @@ def _free_choice(
             fits,
             adequate=True,
             chains=chains,
-            # Rounding would decide on how smoothly a response begins.
-            flows=[] if data.coarse else flows_of(fits, chains),
+            flows=_flows(data, fits, chains),
             onset=data.motion.onset * data.dt,
             may_stick=not data.coarse,  # what is rounded begins with a jump
             near=near,
@@ -272,6 +273,11 @@ def _is_noise(data: StepData, fits: WindowFit, candidate: Candidate) -> bool:
     # The error of a wrong model decays: it is in the first half.
     late = late[late.size // 2 :]
     return bool(np.mean(moving**2) <= ADEQUATE**2 * np.mean(late**2))
+
+
+def _flows(data: StepData, fits: WindowFit, chains: Sequence[LagChain]) -> Sequence[DispersedFlow]:
+    """Dispersion, unless rounding decides on how smoothly a response begins."""
+    return [] if data.coarse else flows_of(fits, chains)
 
 
 def _robust_fit(
