@@ -58,6 +58,16 @@ def test_plants_without_an_ultimate_gain_are_refused(plant, words):
         design.ultimate(plant)
 
 
+def test_a_sign_that_is_given_stands_above_that_of_the_static_gain():
+    # a slow part of the other sign, as a drift leaves it in a fit
+    wanted = design.ProcessModel(2.0, 20.0, 5.0)
+    plant = (ct.tf([2.0], [20.0, 1]) - ct.tf([5.0], [9000.0, 1])) * cr.delay(5.0)
+    right, found = design.ultimate(wanted), design.ultimate(plant, reverse=False)
+    assert design.ultimate(plant).gain < 0 < found.gain
+    assert found.gain == pytest.approx(right.gain, rel=0.02)
+    assert found.period == pytest.approx(right.period, rel=0.02)
+
+
 def test_intervals_are_the_extremes_over_the_plausible_models():
     heater = cr.bench.heater()
     sys = cr.identify(heater.step_record(rng=1))

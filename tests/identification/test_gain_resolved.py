@@ -102,6 +102,7 @@ def test_a_gain_whose_sign_is_not_told_is_called_so(unknown):
     [
         cr.design.pid,
         cr.design.compare_pid,
+        cr.design.ultimate,
         lambda plant: cr.design.smith_predictor(plant, 0.1),
         lambda plant: cr.design.predictor_lqr(plant, 1.0, 1.0),
         lambda plant: cr.design.lqg(plant, 1.0, 1.0, 1.0, 1.0),

@@ -18,6 +18,7 @@ from ..loops.loop import open_loop
 from ..loops.margins import loop_margins
 from ..models.conversions import to_continuous
 from ..models.process_model import ProcessModel
+from ..resolved import check_sign
 from ..siso import delayed_system, is_continuous
 from .plant import gain_and_time_units, reference_plant
 
@@ -85,7 +86,7 @@ class UltimateGain(Result):
 
 
 @single_threaded
-def ultimate(system: Any, *, continuous: bool = False) -> UltimateGain:
+def ultimate(system: Any, *, continuous: bool = False, reverse: bool | None = None) -> UltimateGain:
     """Compute the ultimate gain and period of a plant, exact at any dead time.
 
     They are those of the phase crossover with the smallest gain margin, as a relay test looks for
@@ -99,6 +100,10 @@ def ultimate(system: Any, *, continuous: bool = False) -> UltimateGain:
         Plant with one input and one output, stable or with one integrator.
     continuous : bool, default False
         Tell the values of continuous control for a sampled plant, too.
+    reverse : bool, optional
+        Whether the output falls when the input rises. Default: by the sign of the static gain,
+        which the record of a symmetric relay, or a drift, may leave open; with a value given, the
+        response far below the ultimate frequency does not matter.
 
     Returns
     -------
@@ -109,7 +114,7 @@ def ultimate(system: Any, *, continuous: bool = False) -> UltimateGain:
     ------
     UnsuitableSystemError
         The phase never reaches -180 deg, or the loop is unstable with small gains, too; several
-        channels.
+        channels; a sign that is neither given nor known.
 
     References
     ----------
@@ -129,9 +134,11 @@ def ultimate(system: Any, *, continuous: bool = False) -> UltimateGain:
     """
     if isinstance(system, ProcessModel) or is_continuous(system):
         plant, exact, step = reference_plant(system, None, PURPOSE)
-    else:  # a static gain that is not known does not matter
+    else:  # a static gain that is not known does not matter, but for its sign
         plant = exact = delayed_system(system, PURPOSE)
         step = float(plant.dt)
+        if reverse is None:
+            check_sign(plant, f"{PURPOSE} without reverse=False or True")
     fit = plant.fit
     models = None if fit is None else fit.plausible_models
     others: Iterable[Any] = () if models is None else models.systems
@@ -141,7 +148,7 @@ def ultimate(system: Any, *, continuous: bool = False) -> UltimateGain:
             DelaySystem(continuous_core(m.numerator, m.poles)) * delay(m.dead_time)
             for m in (() if models is None else models.models)
         )
-    gain, period = critical_point(plant, exact)
+    gain, period = critical_point(plant, exact, reverse)
     found = np.array([_crossing(one, np.sign(gain)) for one in others])
     gains: Interval | None = None
     periods: Interval | None = None
@@ -151,7 +158,7 @@ def ultimate(system: Any, *, continuous: bool = False) -> UltimateGain:
 
 
 def critical_point(
-    plant: DelayedStateSpace, exact: DelayedStateSpace | DelaySystem
+    plant: DelayedStateSpace, exact: DelayedStateSpace | DelaySystem, reverse: bool | None = None
 ) -> tuple[float, float]:
     """Ultimate gain and period of `exact`; its sampled form `plant` has the sign of its gain.
 
@@ -159,13 +166,15 @@ def critical_point(
     ------
     UnsuitableSystemError
     """
-    sign = -1.0 if np.real(plant.step(plant.delay + SETTLED)[-1]) < 0 else 1.0
-    gain, period = _crossing(exact, sign)
+    falls = reverse
+    if falls is None:
+        falls = bool(np.real(plant.step(plant.delay + SETTLED)[-1]) < 0)
+    gain, period = _crossing(exact, -1.0 if falls else 1.0)
     if not np.isfinite(gain):
         raise UnsuitableSystemError(
             "the phase of the plant never reaches -180 deg: it has no ultimate gain"
         )
-    if not loop_margins(open_loop(exact, 0.01 * gain)).stable:
+    if reverse is None and not loop_margins(open_loop(exact, 0.01 * gain)).stable:
         raise UnsuitableSystemError(
             "the plant has no ultimate gain: its loop is unstable with small gains, too"
         )
