@@ -102,6 +102,10 @@ TABLES = {
         "docs/tables/campaign_table.md",
         "python -m benchmarks.campaign --output docs/tables/campaign_table.md",
     ),
+    "relay": (
+        "docs/tables/relay_table.md",
+        "python -m benchmarks.relay --store relay.jsonl --output docs/tables/relay_table.md",
+    ),
     "missing": ("docs/tables/missing_table.md", "python -m benchmarks.accuracy.missing"),
     "loops": ("docs/tables/loops_table.md", "python -m benchmarks.loops"),
     "fuzz": ("docs/tables/fuzz_table.md", "python3 tools/fuzz_table.py"),

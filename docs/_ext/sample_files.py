@@ -35,6 +35,7 @@ def files() -> Iterator[tuple[str, str]]:
     yield "furnace.csv", _furnace()
     yield "loop.csv", _running_loop(setpoints=True)
     yield "regulation.csv", _running_loop(setpoints=False)
+    yield "heattest.txt", _heattest()
 
 
 def _duct() -> str:
@@ -155,6 +156,33 @@ def _running_loop(setpoints: bool) -> str:
 
 LOOP = {"gain": 2.0, "dead_time": 3.0, "lags": (8.0, 1.5)}
 """Plant in the loop: degC per %, s."""
+
+
+def _heattest() -> str:
+    """Hot end that Klipper's PID_CALIBRATE heats to 200 degC and lets swing; see `HOT_END`."""
+    rng = np.random.default_rng(5)
+    dt, dead = 0.3, 6
+    plant = signal.cont2discrete(signal.tf2ss([380.0], [120.0 * 4, 124.0, 1.0]), dt)
+    A, B, C = plant[0], plant[1][:, 0], plant[2][0]
+    state, drive = np.zeros(2), [0.0] * (dead + 1)
+    pwm, out = [], []
+    heating, switches = False, 0
+    while switches < 12:
+        i = len(out)
+        warm = 25 + C @ state + 0.05 * rng.standard_normal()
+        out.append(f"{100 + dt * i:.3f} {warm:.3f}")
+        # on below 195 degC (and at first), off from 200 degC on; in effect a sample later
+        turned = warm < 200 if heating else warm <= 195
+        if turned is not heating:
+            heating, switches = turned, switches + 1
+            pwm.append(f"pwm: {100 + dt * (i + 1):.3f} {float(heating):.3f}")
+        drive.append(float(heating))
+        state = A @ state + B * drive[i]
+    return "\n".join(pwm + out)
+
+
+HOT_END = {"gain": 380.0, "dead_time": 1.8, "lags": (120.0, 4.0)}
+"""Plant of `heattest.txt`: degC at full power, s."""
 
 
 def _lines(header: str, form: str, *columns: object) -> str:
