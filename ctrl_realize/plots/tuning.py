@@ -84,18 +84,24 @@ def _name_points(axes: Axes, points: list[tuple[float, float, str, str]]) -> Non
     where = [axes.transData.transform((x, y)) for x, y, _, _ in points]
     # Left end, right end, height and half the free space: a point needs less of it than a name.
     taken = [(float(x) - gap, float(x) + gap, float(y), 0.6 * high) for x, y in where]
-    edge, floor = axes.transAxes.transform((0, 0))
-    shifts = [0.4 * high * k * way for k in range(30) for way in (1, -1)]
+    (edge, floor), (end, top) = axes.transAxes.transform([(0, 0), (1, 1)])
+    offsets = sorted(
+        ((gap + 3 * wide * k, 0.4 * high * n) for k in range(12) for n in range(-29, 30)),
+        key=lambda offset: 0.5 * offset[0] + abs(offset[1]),
+    )
     for (x, y, name, colour), (left, at) in zip(points, where, strict=True):
         length = wide * len(name)
-        right_or_left = ((left + gap, 1), (left - gap - length, -1))
-        places = [(at + shift, *place) for shift in shifts for place in right_or_left]
+        places = [
+            (at + shift, left + far if side > 0 else left - far - length, side)
+            for far, shift in offsets
+            for side in (1, -1)
+        ]
         level, start, side = next(
             (
                 place
                 for place in places
-                if place[0] > floor + high / 2
-                and place[1] > edge
+                if floor + high / 2 < place[0] < top - high / 2
+                and edge < place[1] < max(end - length, left + 2 * gap)
                 and all(
                     place[1] + length <= a or b <= place[1] or abs(place[0] - used) >= room
                     for a, b, used, room in taken
@@ -105,11 +111,12 @@ def _name_points(axes: Axes, points: list[tuple[float, float, str, str]]) -> Non
         )
         taken.append((start, start + length, level, high))
         line = {"arrowstyle": "-", "color": colour, "linewidth": 0.8, "shrinkB": 3}
+        far = start - left if side > 0 else start + length - left
         axes.annotate(
-            name, (x, y), (6 * side, (level - at) / unit), textcoords="offset points",
+            name, (x, y), (far / unit, (level - at) / unit), textcoords="offset points",
             va="center", ha="left" if side > 0 else "right", fontsize=NAME_POINTS, color=colour,
             # A distant name is connected to its point by a line.
-            arrowprops=line if abs(level - at) > high else None,
+            arrowprops=line if abs(level - at) > high or abs(far) > 2 * gap else None,
         )  # fmt: skip
 
 
