@@ -7,6 +7,7 @@ from .impulse.from_io import impulse_from_io as impulse_from_io
 from .joint.fit import fit_joint as fit_joint
 from .joint.result import JointFit as JointFit
 from .methods import identify as identify
+from .noise import NoiseModel as NoiseModel
 from .output_error.actuated.result import ActuatorFit as ActuatorFit
 from .output_error.fit import fit_output_error as fit_output_error
 from .output_error.record_gains import RecordGains as RecordGains

@@ -138,6 +138,8 @@ def fit_sketches(system: DelayedStateSpace, step: StepResponse | None) -> list[S
     if isinstance(fit, OutputErrorFit):
         size = (6.2, 3.6 + evidence_height(fit))
         sketches.append(sketch("fit", plots.fit_plot, fit, size=size))
+        if (models := fit.plausible_models) is not None:
+            sketches.append(sketch("plausible", plots.plausible_plot, models, size=(6.2, 6.4)))
     elif step is not None:
         sketches.append(sketch("step", plots.step_plot, step, system))
     if isinstance(fit, StateSpaceFit) and fit.checks:

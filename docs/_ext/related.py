@@ -22,6 +22,7 @@ PAGES: dict[str, tuple[str, ...]] = {
     "identification.ActuatorFit": ("howto/actuator", "theory/actuators"),
     "fit_output_error": ("theory/output_error", "howto/process_models"),
     "identification.OutputErrorFit": ("howto/process_models", "howto/trust_delay"),
+    "identification.NoiseModel": ("howto/noisy_data",),
     "identification.PlausibleModels": ("verdicts",),
     "identification.ProcessStructure": ("howto/process_models",),
     "fit_state_space": ("howto/several_channels", "howto/random_inputs"),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -40,6 +41,9 @@ from .words import (
     structure_words,
     total_in_words,
 )
+
+if TYPE_CHECKING:
+    from ..noise import NoiseModel
 
 FOLLOWED_LESS = 0.5
 """Per cent of a response by which two fits differ, from which on the difference is stated."""
@@ -343,6 +347,13 @@ class OutputErrorFit(FractionalDelayFit):
     def residual_std(self) -> float:
         """Standard deviation of the residual, the same as `residual`."""
         return self.residual
+
+    @property
+    def noise_model(self) -> NoiseModel:
+        """Autoregressive model of the residual, with a one-step predictor."""
+        from ..noise import noise_of
+
+        return noise_of(self.measured - self.fitted, self.dt)
 
     @property
     def structure(self) -> tuple[int, int]:
