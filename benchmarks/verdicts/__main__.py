@@ -9,7 +9,7 @@ import argparse
 import json
 import sys
 import warnings
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -70,12 +70,12 @@ def _loop(one: Case, fit: cr.identification.OutputErrorFit) -> dict[str, object]
     return {"true Ms": float(true), "inside": inside}
 
 
-def rows(path: Path | None, seeds: range) -> list[dict[str, object]]:
-    """Judge all kinds and seeds; what is stored already is not judged again."""
+def rows(path: Path | None, seeds: range, kinds: Sequence[str]) -> list[dict[str, object]]:
+    """Judge kinds and seeds; what is stored already is not judged again."""
     lines = path.read_text("utf-8").splitlines() if path is not None and path.exists() else []
     done = {(row["kind"], row["seed"]): row for row in map(json.loads, lines)}
     for seed in seeds:
-        for kind in KINDS:
+        for kind in kinds:
             if (kind, seed) not in done:
                 with warnings.catch_warnings():
                     warnings.simplefilter("ignore")
@@ -83,16 +83,17 @@ def rows(path: Path | None, seeds: range) -> list[dict[str, object]]:
                 if path is not None:
                     with path.open("a", encoding="utf-8") as file:
                         file.write(json.dumps(done[kind, seed]) + "\n")
-    return [row for (_, seed), row in done.items() if seed in seeds]
+    return [row for (kind, seed), row in done.items() if seed in seeds and kind in kinds]
 
 
 def table(found: list[dict[str, object]]) -> Iterator[str]:
     """Rows of the table of the docs, a kind each, and all together."""
     yield (
-        "| kind | records | dead time: held | good | of these wrong | gain: held | good | "
-        "of these wrong | tuning: right | good | of these wrong | envelope holds |"
+        "| kind | records | dead time: held | good | of these wrong | useful, called good | "
+        "gain: held | good | of these wrong | tuning: right | good | of these wrong | "
+        "envelope holds |"
     )
-    yield "|" + "---|" * 12
+    yield "|" + "---|" * 13
     kinds = dict.fromkeys(row["kind"] for row in found)
     for name in (*kinds, "all"):
         some = [row for row in found if name in ("all", row["kind"])]
@@ -113,16 +114,19 @@ def table(found: list[dict[str, object]]) -> Iterator[str]:
             f"{100 * right[:, 2].mean():.0f} %",
         ]
         cells = [f"{parts[i]} | {good[i]} | {wrong[i]}" for i in range(3)]
+        useful = right[:, 0] & np.array([row["narrow"] for row in some])
+        cells[0] += f" | {np.sum(levels[useful, 0])} of {np.sum(useful)}"
         yield f"| {name} | {len(some)} | {' | '.join(cells)} | {100 * inside:.0f} % |"
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--seeds", type=int, nargs=2, default=(100, 125))
+    parser.add_argument("--kinds", nargs="+", choices=KINDS, default=KINDS)
     parser.add_argument("--store", type=Path)
     parser.add_argument("--table", type=Path, help="write the table there")
     options = parser.parse_args()
-    text = "\n".join(table(rows(options.store, range(*options.seeds)))) + "\n"
+    text = "\n".join(table(rows(options.store, range(*options.seeds), options.kinds))) + "\n"
     if options.table is not None:
         options.table.write_text(text, encoding="utf-8")
     sys.stdout.write(text)
