@@ -8,6 +8,7 @@ from . import data as data
 from . import datasets as datasets
 from . import design as design
 from . import errors as errors
+from . import experiment as experiment
 from . import export as export
 from . import frequency as frequency
 from . import identification as identification

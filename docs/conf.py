@@ -87,6 +87,10 @@ TABLES = {
     ),
     "several": ("docs/tables/several_table.md", "python -m benchmarks.records several"),
     "statements": ("docs/tables/statements_table.md", "python -m benchmarks.records statements"),
+    "experiment": (
+        "docs/tables/experiment_table.md",
+        "python -m benchmarks.experiment --table docs/tables/experiment_table.md",
+    ),
     "kernels": ("docs/tables/kernels_table.md", "python -m benchmarks.kernels"),
     "ablation": ("docs/tables/ablation_table.md", "python -m benchmarks.ablation"),
     "ablation_worlds": (

@@ -13,7 +13,7 @@ MOST = 33  # names that a user learns
 
 MODULES = """
 actuators bench data datasets design errors export frequency identification io paper plots report
-results validation valves
+results validation valves experiment
 """
 SUBMODULES = set(MODULES.split())
 PROMISED = """

@@ -25,6 +25,7 @@ FLOORS = [
     {"identification"},
     {"design", "validation"},
     {"io"},
+    {"experiment"},
     {"valves", "datasets"},
     {"plots", "export"},
     {"report"},

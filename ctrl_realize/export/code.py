@@ -1,4 +1,4 @@
-"""Controllers and plants as code: C, Python, Structured Text."""
+"""Controllers, plants and inputs of tests as code: C, Python, Structured Text."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ def to_c(system: Any, path: str | os.PathLike[str], *, name: str | None = None) 
 
     Parameters
     ----------
-    system : PIDAlgorithm, PIDController or DelayedStateSpace
-        A discrete controller (`PIDController.algorithm` gives it limits and anti-windup), or a
-        discrete plant with its delays at inputs and outputs.
+    system : PIDAlgorithm, PIDController, DelayedStateSpace or ExperimentPlan
+        A discrete controller (`PIDController.algorithm` gives it limits and anti-windup), a
+        discrete plant with its delays at inputs and outputs, or the input of a planned test.
     path : path-like
         File to write, ending in ``.c``; the header stands beside it.
     name : str, optional

@@ -1,28 +1,33 @@
-"""The difference equations that are exported: a PID algorithm and a plant with dead time."""
+"""What is exported as code: a PID algorithm, a plant with dead time, the input of a test."""
 
 from __future__ import annotations
 
 import math
 from typing import Any
 
+import numpy as np
+
 from ..delayed import DelayedStateSpace
 from ..design import PIDAlgorithm, PIDController
 from ..errors import UnsuitableSystemError
+from ..experiment import ExperimentPlan
 from .names import identifier
-from .program import Assign, If, Program, Statement, Variable, weighted_sum
+from .program import Assign, If, Program, Statement, Variable, literal, weighted_sum
 
 MOST_TERMS = 10_000
 """Largest number of products in a step of exported code."""
 
 
 def program_of(system: Any, name: str | None) -> Program:
-    """Return the equations of a controller or a plant.
+    """Return the equations of a controller, a plant or the input of a test.
 
     Raises
     ------
     UnsuitableSystemError
-        Anything but a discrete PID, or a discrete plant whose delays are at its ends.
+        Anything but a discrete PID, a discrete plant whose delays are at its ends, or a plan.
     """
+    if isinstance(system, ExperimentPlan):
+        return test_program(system, identifier(name or "test_input", "test_input"))
     if isinstance(system, PIDController):
         system = system.algorithm()
     if isinstance(system, PIDAlgorithm):
@@ -30,8 +35,8 @@ def program_of(system: Any, name: str | None) -> Program:
     if isinstance(system, DelayedStateSpace):
         return plant_program(system, identifier(name or str(system.name), "plant"))
     raise UnsuitableSystemError(
-        f"code can be written for a PIDAlgorithm, a discrete PIDController and a "
-        f"DelayedStateSpace; got a {type(system).__name__}. A continuous plant: "
+        f"code can be written for a PIDAlgorithm, a discrete PIDController, a DelayedStateSpace "
+        f"and an ExperimentPlan; got a {type(system).__name__}. A continuous plant: "
         "design.to_discrete(core, dead_time, dt)"
     )
 
@@ -191,6 +196,39 @@ def plant_program(plant: DelayedStateSpace, name: str) -> Program:
         tuple(states),
         tuple(scratch),
         tuple(body),
+    )
+
+
+def test_program(plan: ExperimentPlan, name: str) -> Program:
+    """Write the input of a test, one sample a call; before and after it the input rests."""
+    changes = np.flatnonzero(np.diff(plan.command)) + 1
+    if changes.size > MOST_TERMS:
+        raise UnsuitableSystemError(
+            f"the input changes {changes.size} times, too often for code without tables; expected "
+            f"at most {MOST_TERMS}. Use a binary signal: plan.using('random binary')"
+        )
+    rest = Assign("u", literal(plan.level))
+    levels = [If(f"at >= {k}", (Assign("u", literal(plan.command[k])),)) for k in changes]
+    count = plan.time.size
+    return Program(
+        name,
+        (
+            f"Input of a test ({plan.kind}), call every {plan.dt:g} s, {count} times",
+            f"level at rest {plan.level:.6g}; starts when run is true",
+        ),
+        (Variable("run", "the test is running", "boolean"),),
+        (Variable("u", "input of the plant"),),
+        (),
+        (Variable("at", "sample of the test", "integer"),),
+        (),
+        (
+            rest,
+            If(
+                "run",
+                (*levels, If(f"at >= {count}", (rest,)), Assign("at", "at + 1")),
+                (Assign("at", "0"),),
+            ),
+        ),
     )
 
 

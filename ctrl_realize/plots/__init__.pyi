@@ -16,6 +16,7 @@ from .frequencies import truth_plot as truth_plot
 from .frf_comparison import comparison_plot as comparison_plot
 from .loops import closed_loop_plot as closed_loop_plot
 from .loops import margins_plot as margins_plot
+from .records import experiment_plot as experiment_plot
 from .records import onset_plot as onset_plot
 from .records import record_plot as record_plot
 from .records import step_plot as step_plot

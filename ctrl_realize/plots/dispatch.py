@@ -22,7 +22,7 @@ from .fits import fit_plot
 from .frequencies import frf_fit_plot, frf_plot, joint_fit_plot, truth_plot
 from .frf_comparison import comparison_plot
 from .loops import margins_plot
-from .records import record_plot, step_plot
+from .records import experiment_plot, record_plot, step_plot
 from .residuals import model_comparison_plot, prediction_plot, residual_plot, state_space_fit_plot
 from .responses import impulse_estimate_plot, impulse_plot, mimo_realization_plot, system_plot
 from .robustness import delay_robustness_plot, plausible_plot, robustness_plot, uncertainty_plot
@@ -86,6 +86,7 @@ for _plot in (
     comparison_plot,
     delay_comparison_plot,
     delay_robustness_plot,
+    experiment_plot,
     frf_fit_plot,
     gain_plot,
     hankel_plot,

@@ -1,4 +1,4 @@
-"""Plots of time signals: records, step responses and their onset."""
+"""Plots of time signals: records, step responses and their onset, planned inputs."""
 
 from __future__ import annotations
 
@@ -13,10 +13,12 @@ from matplotlib.lines import Line2D
 
 from .._checks import check_type
 from .._parameters import gain_unit
+from .._wording import time_unit
 from ..data import Record, StepResponse
 from ..data.given import as_record
 from ..delayed import DelayedStateSpace
 from ..errors import DataError
+from ..experiment.result import ExperimentPlan
 from ..identification.step.steps import unit_step
 from ..numerics.arrays import FloatArray
 from . import style
@@ -267,3 +269,56 @@ def _axis_label(labels: Sequence[str], units: Sequence[str], kind: str, width: i
         return f"{kind}s"
     default = {"output": "y", "input": "u"}[kind]
     return wrapped(with_unit(kind if labels[0] == default else labels[0], units[0]), width)
+
+
+@documented("sequence of two Axes")
+def experiment_plot(
+    plan: ExperimentPlan, *, ax: style.AxesLike = None, title: str | None = None, **kwargs: Any
+) -> ct.ControlPlot:
+    """Draw the standard error against the length of a test, and the input that is planned.
+
+    Above: the error of the best kind of signal and of one step, all candidates at the length that
+    is planned, and today's error, if there are records. Below: the input.
+
+    Parameters
+    ----------
+    plan : ExperimentPlan
+    **kwargs
+        Line properties of the curve of the best kind.
+
+    Examples
+    --------
+    >>> import ctrl_realize as cr
+    >>> flow = cr.design.ProcessModel(gain=1.2, lag=3.0, dead_time=2.0)
+    >>> plan = cr.experiment.plan(flow, time=60, amplitude=5, rate=5, noise=0.1)
+    >>> cplt = cr.plots.experiment_plot(plan)
+    >>> [text.get_text() for text in cplt.figure.axes[0].get_legend().get_texts()]
+    ['relay', 'one step', 'other candidates']
+    """
+    curve, of_time = plan.curve, plan.want == "dead_time"
+    shape: dict[str, Any] = {"size": (8.0, 6.4), "heights": (2.0, 1.0), "sharex": False}
+    with style.canvas(ax, 2, title=title, default_title=plan._title(), **shape) as (upper, lower):
+        factor, unit = axis_time_unit(float(curve.time[-1]), upper)
+        scale, name = time_unit(plan.std) if of_time else (1.0, "deg" * (plan.want == "phase"))
+        best, step = plan.candidates[0], plan.step
+        looks = {**style.model_looks(0), "marker": "o", "label": best.kind, **kwargs}
+        lines = list(upper.loglog(factor * curve.time, scale * curve.best, **looks))
+        plain_looks = {**style.model_looks(1), "marker": "s", "label": step.kind}
+        lines += upper.loglog(factor * curve.time, scale * curve.step, **plain_looks)
+        others = [one.std for one in plan.candidates if one not in (best, step)]
+        at = np.full(len(others), factor * plan.duration)
+        dots: dict[str, Any] = {
+            "color": style.NOISE,
+            "marker": "_",
+            "markersize": 14,
+            "linestyle": "none",
+        }
+        lines += upper.plot(at, scale * np.array(others), label="other candidates", **dots)
+        if curve.first is not None:
+            today = [factor * curve.first[0]], [scale * curve.first[1]]
+            lines += upper.plot(*today, "D", color=style.MEASURED, label="today")
+        upper.set(xlabel=f"length of the test [{unit}]", ylabel=with_unit("standard error", name))
+        factor, unit = axis_time_unit(plan.duration, lower)
+        drive = lower.step(factor * plan.time, plan.command, where="post", color=style.INPUT)
+        lower.set(xlabel=f"time [{unit}]", ylabel=f"input: {plan.kind}")
+        return style.finished((upper, lower), [lines, drive], loc="best")

@@ -66,6 +66,7 @@ SUBMODULES = {
     "actuators": "Models of stiction, backlash, slew limits and characteristics.",
     "datasets": "What is known of each set is on [Data sets](../../datasets.md).",
     "bench": "Simulated set-ups with known truth.",
+    "experiment": "Which input tells most, and how closely; predicted and achieved errors.",
     "valves": "Step tests of control valves: metrics, report, test plan; oscillating loops.",
     "report": "HTML reports: one self-contained file, the verdict first.",
     "paper": "Every number that the paper prints.",

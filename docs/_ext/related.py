@@ -89,6 +89,8 @@ PAGES: dict[str, tuple[str, ...]] = {
     "design.root_locus": ("howto/dead_time",),
     "design.*": ("howto/closed_loop",),
     "export.*": ("howto/export", "howto/tune_pid"),
+    "experiment.*": ("howto/which_test",),
+    "plots.experiment_*": ("howto/which_test",),
     "plots.loop_*": ("howto/oscillating_loop",),
     "plots.valve_*": ("howto/valve_test",),
     "plots.*": ("pictures", "gallery"),

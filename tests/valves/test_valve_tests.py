@@ -293,7 +293,7 @@ PLANNED = {"dead_time": 1, "time_constant": 1}
     ("error", "match", "call"),
     [
         (DataError, "at least one", lambda r: valves.valve_report([])),
-        (DataError, "position has", lambda r: valves.valve_test_plan(**PLANNED).record([1.0, 2])),
+        (DataError, "output has", lambda r: valves.valve_test_plan(**PLANNED).record([1.0, 2])),
         (OptionError, "'t87'", lambda r: valves.valve_report(r, limits={"t87": 1})),
         (OptionError, "largest", lambda r: valves.valve_report(r, limits={"t86": "1"})),
         (OptionError, "by step", lambda r: valves.valve_report(r, limits={"linearity": {2: 1}})),

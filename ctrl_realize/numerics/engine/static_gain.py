@@ -102,7 +102,7 @@ def static_gain(
     theta = candidate.theta
     numerator = eliminate(problem, candidate.structure, candidate.parameters[None]).numerator[0]
     point = np.concatenate([theta, numerator])
-    moves = _moves(candidate, numerator, length)
+    moves = parameter_steps(candidate, numerator, length)
 
     # Poles that are nearly equal would jump apart in one difference, and not in the other.
     def steady_values(at: FloatArray, apart: bool = False) -> FloatArray:
@@ -187,7 +187,7 @@ def local_errors(
         slopes, tangent = candidate.structure.directions(problem, candidate.parameters)
         return LocalErrors(slopes, slopes[:, :0], tangent)
     theta = candidate.parameters
-    moves = _moves(candidate, numerator, length)
+    moves = parameter_steps(candidate, numerator, length)
     # A dead time is not negative: the derivatives at zero are those slightly later.
     inside = np.concatenate([[max(theta[0], moves[0, 0])], theta[1:], numerator])
     there = np.concatenate([inside + moves, inside - moves])
@@ -204,13 +204,13 @@ def local_errors(
     return LocalErrors(columns[:, :count], columns[:, count:])
 
 
-def _moves(candidate: Candidate, numerator: FloatArray, length: float) -> FloatArray:
+def parameter_steps(candidate: Candidate, numerator: FloatArray, length: float) -> FloatArray:
     """Steps of the parameters for derivatives by differences, on the diagonal of a matrix."""
     # A response of nothing has a numerator of zeros, from which any step is as good.
     largest = float(np.abs(numerator).max()) or 1.0
     steps = np.concatenate(
         [
-            [_STEP * min(1 / float(np.abs(candidate.poles).max()), length)],
+            [_STEP * min(1 / float(np.abs(candidate.poles).max(initial=1 / length)), length)],
             np.full(candidate.theta.size - 1, _STEP),
             _STEP * np.maximum(np.abs(numerator), _STEP * largest),
         ]

@@ -1,0 +1,1 @@
+"""Predicted and achieved standard errors of planned tests, on simulated plants."""

@@ -1,0 +1,169 @@
+"""Standard errors that a test will have: the Cramer-Rao bound of a model, an input and a noise.
+
+The information [1]_ of dead time, poles, numerator and level, from the derivatives of the response
+that the fits use. Coloured noise is whitened by its autoregression; tests of one plant add up.
+
+References
+----------
+.. [1] S. M. Kay, Fundamentals of Statistical Signal Processing: Estimation Theory, Prentice Hall
+   1993, sections 3.7 and 3.8 (vector parameter, transformations).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Literal, NamedTuple, TypeAlias
+
+import numpy as np
+from scipy.linalg import block_diag
+from scipy.signal import lfilter
+
+from ..errors import UnsuitableSystemError
+from ..numerics.arrays import FloatArray
+from ..numerics.engine.modal import respond
+from ..numerics.engine.plausible_models import PlausibleModel
+from ..numerics.engine.poles import parameters_from_poles, poles_from_parameters
+from ..numerics.engine.problem import KnownFactor, Problem, Structure
+from ..numerics.engine.responses import SampledInput
+from ..numerics.engine.static_gain import LocalErrors, local_errors, parameter_steps
+from ..numerics.engine.structures import SLOWEST, Candidate
+from ..numerics.loops.reference import (
+    controller_response,
+    grid,
+    largest_sensitivity,
+    model_response,
+    robust_pi,
+)
+
+Wanted: TypeAlias = Literal["dead_time", "gain", "phase", "Ms"]
+_REMEMBERED = 2000  # samples of the answer of a noise filter
+WANTED: tuple[Wanted, ...] = ("dead_time", "gain", "phase", "Ms")
+
+
+class Noise(NamedTuple):
+    """Noise of the output: what is left of it, standard deviation, behind the filter ``1 - a/z``.
+
+    `filter` (1 + r,) makes it white; for white noise it is 1.
+    """
+
+    innovation: float
+    filter: FloatArray
+
+    @property
+    def sigma(self) -> float:
+        """Standard deviation of the noise itself."""
+        answer = lfilter([1.0], self.filter, np.eye(1, _REMEMBERED)[0])
+        return self.innovation * float(np.linalg.norm(answer))
+
+    def whitened(self, columns: FloatArray) -> FloatArray:
+        """Columns (N, k) in units of the noise, without those that the filter does not reach."""
+        left = lfilter(self.filter, [1.0], columns, axis=0)[self.filter.size - 1 :]
+        return np.asarray(left / self.innovation)
+
+
+class Experiment(NamedTuple):
+    """Input (N,), from rest, and the noise that its record will have."""
+
+    input: FloatArray
+    noise: Noise
+
+
+@dataclass(frozen=True, eq=False)
+class Bound:
+    """Standard errors of one model, at a sample time in s.
+
+    Integrators are known to integrate.
+    """
+
+    model: PlausibleModel
+    dt: float
+
+    def response(self, signal: FloatArray) -> FloatArray:
+        """Response (N,) to an input, from rest."""
+        theta, numerator, known = self._parts(signal.size)
+        return respond(self._drive(signal), known, numerator, theta)
+
+    def errors(self, tests: Sequence[Experiment], gradient: FloatArray) -> FloatArray:
+        """Standard errors (k,) of quantities with gradients (k, p) after all tests together."""
+        slopes, own = zip(
+            *([noise.whitened(part) for part in self.slopes(signal)] for signal, noise in tests),
+            strict=True,
+        )
+        together = LocalErrors(np.concatenate(slopes), block_diag(*own))
+        # The parameters themselves are asked for as well: all of them are unknown.
+        every = np.concatenate([gradient, np.eye(gradient.shape[1])])
+        return together.std(every, 1.0)[: len(gradient)]
+
+    def slopes(self, signal: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Derivatives (N, p) of the response by the parameters, and the level (N, 1)."""
+        theta, numerator, known = self._parts(signal.size)
+        level = np.ones((signal.size, 1))
+        problem = Problem(np.zeros(signal.size), level[:, 0], self._drive(signal), level, known)
+        there = Candidate(Structure(theta.size - 1, theta.size - numerator.size), theta, 0.0)
+        found = local_errors(problem, there, numerator, signal.size * self.dt)
+        return found.slopes, found.own
+
+    def gradient(self, wanted: Sequence[Wanted]) -> FloatArray:
+        """Derivatives (k, p) of quantities by dead time, pole parameters and numerator."""
+        theta, numerator, known = self._parts(1)
+        value = quantities(self.model, self.dt, wanted)
+
+        def at(point: FloatArray) -> FloatArray:
+            poles = poles_from_parameters(point[None, 1 : theta.size])[0][0]
+            poles = np.append(poles, np.zeros(known.poles.size))
+            return value(PlausibleModel(float(point[0]), poles, point[theta.size :]))
+
+        there = Candidate(Structure(theta.size - 1, theta.size - numerator.size), theta, 0.0)
+        steps = parameter_steps(there, numerator, self.dt)
+        point = np.concatenate([theta, numerator])
+        return np.stack([(at(point + s) - at(point - s)) / (2 * s.sum()) for s in steps], axis=1)
+
+    def _drive(self, signal: FloatArray) -> SampledInput:
+        return SampledInput(signal - signal[0], self.dt)
+
+    def _parts(self, samples: int) -> tuple[FloatArray, FloatArray, KnownFactor]:
+        """Free parameters [dead time, poles...], numerator, and the integrator."""
+        poles = self.model.poles
+        moving = poles[poles != 0]
+        if poles.size - moving.size > 1 or np.any(moving.real >= 0):
+            raise UnsuitableSystemError(
+                "the plant is unstable, or has more than one integrator; expected one whose "
+                "response to a planned input stays in range"
+            )
+        theta = np.concatenate([[self.model.dead_time], parameters_from_poles(moving)])
+        slow = np.full(poles.size - moving.size, -SLOWEST / (samples * self.dt), dtype=complex)
+        return theta, self.model.numerator, KnownFactor(slow)
+
+
+def quantities(
+    model: PlausibleModel, dt: float, wanted: Sequence[Wanted]
+) -> Callable[[PlausibleModel], FloatArray]:
+    """Function of a model: what is wanted of it; that of loops with the PI of the first model.
+
+    The phase is that of the model in degrees at the crossover of the first one's loop, from there.
+    """
+    loops = "phase" in wanted or "Ms" in wanted
+    omega = grid(model, dt) if loops else np.ones(1)
+    controller = controller_response(*robust_pi(model, dt), omega, dt) if loops else omega + 0j
+    own = model_response(model, omega)
+    below = np.flatnonzero(np.abs(controller * own) < 1)
+    crossing = int(below[0]) if below.size else omega.size - 1
+
+    def gain(one: PlausibleModel) -> float:
+        return float(one.numerator[0] / np.prod(-one.poles[one.poles != 0]).real)
+
+    def phase(one: PlausibleModel) -> float:
+        turned = model_response(one, omega[crossing : crossing + 1]) / own[crossing]
+        return float(np.degrees(np.angle(turned[0])))
+
+    def largest(one: PlausibleModel) -> float:
+        return float(largest_sensitivity(controller * model_response(one, omega)))
+
+    every: dict[Wanted, Callable[[PlausibleModel], float]] = {
+        "dead_time": lambda one: one.dead_time,
+        "gain": gain,
+        "phase": phase,
+        "Ms": largest,
+    }
+    return lambda one: np.array([every[each](one) for each in wanted])

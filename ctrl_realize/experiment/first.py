@@ -1,0 +1,125 @@
+"""What is known before a test: a model, others that are plausible, the noise, earlier records."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from scipy.signal import lfilter
+
+from ..data import Record
+from ..data.given import as_records
+from ..delayed import DelayedStateSpace
+from ..design import ProcessModel
+from ..errors import UnsuitableSystemError
+from ..identification import OutputErrorFit, identify
+from ..numerics.arrays import FloatArray
+from ..numerics.engine.plausible_models import PlausibleModel
+from ..numerics.engine.static_gain import INTEGRATOR
+from ..numerics.signals.noise import correlation_time, winsorised_sigma
+from ..numerics.signals.noise_model import noise_lags, whitening_filter
+from .bound import Bound, Experiment, Noise
+
+_OTHERS = 4  # of the plausible models every fourth stands for all: time
+
+
+@dataclass(frozen=True, eq=False)
+class Known:
+    """Model, plausible others, sample time, noise and records, as far as they are known."""
+
+    model: PlausibleModel
+    others: tuple[PlausibleModel, ...] = ()
+    dt: float | None = None
+    noise: Noise | None = None
+    tests: tuple[Experiment, ...] = ()
+    level: float = 0.0
+
+
+def known_from(given: Any, options: dict[str, Any]) -> Known:
+    """Read a model, or fit the records.
+
+    Raises
+    ------
+    UnsuitableSystemError
+        A model that was not fitted by the output-error fit; options beside a model.
+    DataError
+        Neither a model nor records.
+    """
+    if isinstance(given, PlausibleModel):
+        return Known(given)
+    if isinstance(given, ProcessModel):
+        lags = np.array([lag for lag in (given.lag, given.second_lag) if lag])
+        poles = np.append(-1 / lags, np.zeros(int(given.integrating))).astype(np.complex128)
+        return Known(PlausibleModel(given.dead_time, poles, np.array([given.gain / np.prod(lags)])))
+    return known_from_fit(fitted(given, options))
+
+
+def fitted(given: Any, options: dict[str, Any]) -> OutputErrorFit:
+    """Fit of a model, or of records."""
+    system = given if isinstance(given, DelayedStateSpace) else None
+    fit = (system or identify(as_records(given), **options)).fit
+    if not isinstance(fit, OutputErrorFit) or (system is not None and options):
+        raise UnsuitableSystemError(
+            f"got {given!r}; expected records, a model of identify(record), a "
+            "design.ProcessModel, and options of identify only for records"
+        )
+    return fit
+
+
+def known_from_fit(fit: OutputErrorFit) -> Known:
+    """Take model, plausible models, records and their noise from a fit; the last noise is next."""
+    length = min(record.time[-1] - record.time[0] for record in fit.records)
+    drawn = () if fit.plausible_models is None else fit.plausible_models.models
+    others = [_integrating(one, length) for one in drawn[::_OTHERS]]
+    model = PlausibleModel(fit.dead_time, fit.poles, fit.estimate.numerator)
+    inputs = [_moved(record) for record in fit.records]
+    residuals = [fit.measured - fit.fitted]
+    if len(inputs) > 1:
+        # Step records are scaled and averaged before they are fitted.
+        followed = [Bound(model, fit.dt).response(signal) for signal in inputs]
+        residuals = [_left(*each) for each in zip(fit.records, followed, strict=True)]
+    tests = [Experiment(*each) for each in zip(inputs, map(noise_of, residuals), strict=True)]
+    return Known(
+        model,
+        tuple(one for one in others if np.sum(one.poles == 0) <= 1),
+        fit.dt,
+        tests[-1].noise,
+        tuple(tests),
+        float(np.ravel(fit.records[0].input)[0]),
+    )
+
+
+def noise_of(residual: FloatArray) -> Noise:
+    """Noise of a residual; where it is coloured, by its autoregression."""
+    polynomial = np.ones(1)
+    if correlation_time(residual) > 1:  # more than white noise scatters to
+        polynomial = whitening_filter(residual, noise_lags(residual.size))
+    left = lfilter(polynomial, [1.0], residual)[polynomial.size - 1 :]
+    return Noise(winsorised_sigma(left, 0.0), polynomial)
+
+
+def _left(record: Record, followed: FloatArray) -> FloatArray:
+    """What a model leaves of a record, beside its level and a drift."""
+    output = np.ravel(record.output)
+    seen = np.isfinite(output)
+    left, time = (output - followed)[seen], record.time[seen]
+    return np.asarray(left - np.polyval(np.polyfit(time - time[0], left, 1), time - time[0]))
+
+
+def largest_move(records: Sequence[Experiment]) -> float | None:
+    """Farthest deviation of the input in the records, with its sign."""
+    moved = np.concatenate([one.input for one in records]) if records else np.zeros(1)
+    return float(moved[np.argmax(np.abs(moved))]) or None
+
+
+def _moved(record: Record) -> FloatArray:
+    held = np.ravel(record.input)
+    return np.asarray(held - held[0])
+
+
+def _integrating(model: PlausibleModel, length: float) -> PlausibleModel:
+    """Poles that the record does not distinguish from an integrator's are 0."""
+    slow = np.abs(model.poles) * length < INTEGRATOR
+    return model._replace(poles=np.where(slow, 0.0, model.poles))

@@ -1,0 +1,256 @@
+"""Planned tests: closed forms of the bound, laws of the plans, predicted and achieved."""
+
+import numpy as np
+import pytest
+
+import ctrl_realize as cr
+from benchmarks.experiment.cases import CASES, Case, dead_time, planned, simulated
+from ctrl_realize.errors import DataError, OptionError, UnsuitableSystemError
+from ctrl_realize.experiment.bound import Bound, Experiment, Noise
+from ctrl_realize.experiment.signals import KINDS, shapes
+from ctrl_realize.numerics.engine.plausible_models import PlausibleModel
+
+GAIN, LAG, DEAD_TIME, SIGMA = 2.0, 10.0, 3.0, 0.01
+WHITE = Noise(SIGMA, np.ones(1))
+FIRST_ORDER = PlausibleModel(DEAD_TIME, np.array([-1 / LAG + 0j]), np.array([GAIN / LAG]))
+LEVEL = cr.design.ProcessModel(gain=0.2, lag=0.0, dead_time=3.0, integrating=True)
+FLOW = cr.design.ProcessModel(gain=1.2, lag=3.0, dead_time=2.0)
+ASKED = {"time": 60.0, "amplitude": 5.0, "rate": 5.0, "noise": 0.1}
+
+
+def error(signal, dt, wanted="dead_time", noise=WHITE, model=FIRST_ORDER):
+    bound = Bound(model, dt)
+    return bound.errors([Experiment(signal, noise)], bound.gradient([wanted]))[0]
+
+
+def one_step(rest, count, height=1.0):
+    return np.concatenate([np.zeros(rest), np.full(count, height)])
+
+
+def test_dead_time_of_a_first_order_step_response_sampled_densely():
+    # With x = t / T, the slopes by dead time, by the lag and by the gain are K/T exp(-x), K/T x
+    # exp(-x) and 1 - exp(-x); the level is known from a long rest. Projections by integrals over
+    # 0...X, in units of the samples T / dt.
+    reach = 12.0
+    x = np.linspace(0, reach, 400_001)
+    late, lag, gain = np.exp(-x), x * np.exp(-x), -np.expm1(-x)
+    rows = np.stack([late, lag, gain])
+    gram = np.trapezoid(rows[:, None] * rows[None], x, axis=2)
+    alone = gram[0, 0] - gram[0, 1:] @ np.linalg.solve(gram[1:, 1:], gram[1:, 0])
+    dt = 0.005
+    expected = SIGMA * LAG / GAIN / np.sqrt(alone * LAG / dt)
+    signal = one_step(100_000, round((reach * LAG + DEAD_TIME) / dt))
+    assert error(signal, dt) == pytest.approx(expected, rel=0.01)
+
+
+def test_gain_in_coloured_noise_has_the_error_of_a_mean():
+    # A settled response between two long rests: the difference of two means, of which that of AR(1)
+    # noise has the variance sigma_w^2 / (n (1 - a)^2).
+    pole, rest, count = 0.8, 20_000, 20_000
+    noise = Noise(SIGMA, np.array([1.0, -pole]))
+    found = error(one_step(rest, count), 1.0, "gain", noise)
+    expected = SIGMA / (1 - pole) * np.sqrt(1 / rest + 1 / count)
+    assert found == pytest.approx(expected, rel=0.01)
+    assert noise.sigma == pytest.approx(SIGMA / np.sqrt(1 - pole**2))
+
+
+def test_twice_the_amplitude_halves_the_error():
+    single, double = (error(one_step(100, 900, height), 0.1) for height in (1.0, 2.0))
+    assert single / double == pytest.approx(2.0)
+
+
+@pytest.mark.parametrize("count", [4, 9])
+def test_error_falls_with_the_root_of_repeated_settled_steps(count):
+    hold = 1200
+    many = np.concatenate([np.zeros(hold), *([k % 2] * hold for k in range(1, count + 1))])
+    # The first step is seen after rest, as all others after a settled response.
+    ratio = error(one_step(hold, hold), 0.1) / error(many.astype(float), 0.1)
+    assert ratio == pytest.approx(np.sqrt(count), rel=0.03)
+
+
+def test_information_of_tests_adds_up():
+    bound = Bound(FIRST_ORDER, 0.1)
+    test, gradient = (
+        Experiment(one_step(300, 900), WHITE),
+        bound.gradient(["dead_time", "gain", "Ms"]),
+    )
+    once, thrice = (bound.errors([test] * count, gradient) for count in (1, 3))
+    np.testing.assert_allclose(once / thrice, np.sqrt(3), rtol=1e-6)
+
+
+def test_phase_of_a_dead_time_alone_and_ms_are_their_derivatives():
+    gradient = Bound(FIRST_ORDER, 0.1).gradient(["dead_time", "gain", "phase", "Ms"])
+    # By dead time, logarithm of the pole, numerator: K = b / p.
+    np.testing.assert_allclose(gradient[0], [1, 0, 0], atol=1e-9)
+    np.testing.assert_allclose(gradient[1], [0, -GAIN, LAG], rtol=1e-6)
+    assert gradient[2, 0] < 0 == pytest.approx(gradient[2, 2], abs=1e-6)
+    assert gradient[3, 0] > 0  # more dead time, more sensitivity
+
+
+@pytest.mark.parametrize("returns", [False, True])
+def test_signals_keep_their_limits_and_come_back(returns):
+    found = list(shapes(701, 30.0, returns=returns))
+    assert {kind for kind, _, _ in found} - {"one step", "up and down"} == set(KINDS)
+    for kind, number, signal in found:
+        assert signal.size == 701
+        assert np.abs(signal).max() <= 1 + 1e-12
+        if returns:
+            assert signal.sum() == pytest.approx(0, abs=1e-9), (kind, number)
+
+
+def test_crest_factor_of_the_multisine_is_that_of_good_phases():
+    signal = KINDS["multisine"][0](1024, 32)
+    assert np.abs(signal).max() / np.sqrt(np.mean(signal**2)) < 1.55  # Schroeder's: 1.7
+    power = np.abs(np.fft.rfft(signal)) ** 2
+    assert np.ptp(power[1:33]) < 1e-9 * power.max() > power[33:].max() * 1e9
+
+
+def test_plan_is_better_than_one_step_as_the_issue_of_signals_says():
+    plan = cr.experiment.plan(FLOW, **{**ASKED, "time": 120.0})
+    errors = plan.table["better than one step"]
+    # Four settled steps have twice the root of one; a random binary signal has many more changes.
+    four = error_of_steps(plan, 4)
+    assert 1.8 < plan.step.std / four < 2.1
+    assert errors["random binary"] > 3.8
+
+
+def error_of_steps(plan, count):
+    rest = int(np.flatnonzero(plan.command)[0])
+    hold = (plan.time.size - rest) // count
+    up = (np.arange(plan.time.size - rest) // hold + 1) % 2
+    bound = Bound(plan.model, plan.dt)
+    test = Experiment(np.concatenate([np.zeros(rest), 5.0 * up]), plan.noise)
+    return bound.errors([test], bound.gradient(["dead_time"]))[0]
+
+
+@pytest.mark.parametrize("want", ["dead_time", "gain", "phase", "Ms"])
+def test_plan_ranks_all_candidates(want, tmp_path):
+    plan = cr.experiment.plan(FLOW, want=want, level=40.0, **ASKED)
+    scores = [one.score for one in plan.candidates]
+    assert scores[1:] == sorted(scores[1:])
+    assert scores[0] <= 1.05 * min(scores)
+    assert {*plan.table.index} == {
+        "one step", "steps", "3-2-1-1", "random binary", "multisine", "chirp", "relay"
+    }  # fmt: skip
+    assert plan.command.min() >= 40
+    assert plan.command.max() <= 45
+    assert plan.command[0] == 40
+    np.testing.assert_array_equal(plan.command, 40 + plan.chosen.input)
+    written = np.loadtxt(plan.to_csv(tmp_path / "plan.csv"), delimiter=",", skiprows=1)
+    np.testing.assert_allclose(written, np.stack([plan.time, plan.command], axis=1))
+    np.testing.assert_array_equal(np.ravel(plan.record(plan.time).input), plan.command)
+    assert "standard error" in plan.report()
+
+
+def test_longer_tests_tell_more_and_limits_of_the_output_cost():
+    plan = cr.experiment.plan(FLOW, **ASKED)
+    assert np.all(np.diff(plan.curve.best) < 0)
+    assert plan.curve.first is None
+    assert plan.curve.best[2] == pytest.approx(plan.std, rel=0.06)
+    free = max(one.excursion for one in plan.candidates)
+    limited = cr.experiment.plan(FLOW, output_limit=free / 4, **ASKED)
+    assert max(one.excursion for one in limited.candidates) <= free / 4 * (1 + 1e-9)
+    assert limited.step.std == pytest.approx(4 * plan.step.std * plan.step.excursion / free)
+
+
+def test_integrating_plant_comes_back():
+    plan = cr.experiment.plan(LEVEL, time=60, amplitude=1, rate=2, noise=0.02)
+    bound = Bound(plan.model, plan.dt)
+    for one in plan.candidates:
+        if one.kind != "relay":
+            assert one.input.sum() == pytest.approx(0, abs=1e-9)
+            held = np.concatenate([one.input, np.zeros(20)])
+            assert bound.response(held)[-1] == pytest.approx(0, abs=1e-3 * one.excursion)
+    assert plan.step.kind == "up and down"
+
+
+def test_plan_from_a_record_has_rivals_noise_and_todays_error():
+    record = simulated(Case("first order", 0.0, best=False, way="given"), PLAN, 0)
+    plan = cr.experiment.plan(record, structures=[(1, 1)])
+    again = cr.experiment.plan(cr.identify(record, structures=[(1, 1)]))
+    np.testing.assert_array_equal(plan.command, again.command)
+    fit = cr.identify(record, structures=[(1, 1)]).fit
+    length, error = plan.curve.first
+    assert length == pytest.approx(120.0)
+    assert error == pytest.approx(fit.std_given_structure, rel=0.1)
+    assert plan.noise.sigma == pytest.approx(0.02, rel=0.1)
+    one = plan.chosen
+    assert one.others[0] <= one.std <= one.others[1]
+    assert one.others[0] < one.others[1]
+    assert one.together < min(one.std, error)
+
+
+PLAN = planned(Case("first order", 0.0, best=False, way="given"))
+
+
+def test_two_step_records_have_the_noise_and_the_information_of_both():
+    case = Case("first order", 0.0, best=False, way="given")
+    first, second = (simulated(case, PLAN, seed) for seed in (0, 1))
+    alone = cr.experiment.plan(first, structures=[(1, 1)])
+    both = cr.experiment.plan([first, second], structures=[(1, 1)])
+    assert both.noise.sigma == pytest.approx(0.02, rel=0.15)
+    assert both.curve.first[0] == pytest.approx(240.0)
+    assert both.curve.first[1] == pytest.approx(alone.curve.first[1] / np.sqrt(2), rel=0.2)
+
+
+def test_achieved_beside_predicted():
+    case = Case("first order", 0.0, best=True, way="given")
+    plan = planned(case)
+    found = cr.experiment.achieved(plan, simulated(case, plan, 1), structures=[(1, 1)])
+    assert found.ratio == pytest.approx(1.0, abs=0.15)
+    assert found.std == pytest.approx(found.fit.std_given_structure, rel=0.35)
+    assert found.std_of_all > 0
+    assert "predicted standard error" in found.report()
+    louder = plan.record(
+        np.ravel(simulated(case, plan, 1).output)
+        + 0.04 * np.random.default_rng(7).standard_normal(plan.time.size)
+    )
+    more = cr.experiment.achieved(plan, louder, structures=[(1, 1)])
+    assert more.by_noise == pytest.approx(np.sqrt(5), rel=0.15)
+
+
+def test_estimates_of_the_benchmark_are_those_of_identify():
+    case = Case("first order", 0.0, best=True, way="given")
+    record = simulated(case, planned(case), 3)
+    expected = cr.identify(record, structures=[(1, 1)]).fit.dead_time
+    assert dead_time(case, record) == pytest.approx(expected, rel=1e-9)
+    assert max(CASES.values()) == 200
+
+
+def test_rounding_is_noise_of_a_twelfth_of_its_square():
+    asked = {**ASKED, "noise": None}
+    rounded = cr.experiment.plan(FLOW, resolution=0.1 * np.sqrt(12), **asked)
+    plain = cr.experiment.plan(FLOW, **ASKED)
+    assert rounded.std == pytest.approx(plain.std)
+
+
+def test_code_of_a_plan_gives_its_input(tmp_path):
+    plan = cr.experiment.plan(FLOW, level=40.0, **ASKED).using("random binary")
+    made: dict = {}
+    exec(cr.export.to_python(plan, tmp_path / "plan.py").read_text(), made)
+    block = made["test_input"]()
+    assert block.step(run=False) == 40
+    assert [block.step(run=True) for _ in plan.time] == list(plan.command)
+    assert block.step(run=True) == 40
+    text = cr.export.to_structured_text(plan, tmp_path / "plan.st").read_text()
+    assert text.count("IF at >= ") == np.count_nonzero(np.diff(plan.command)) + 1
+
+
+def test_what_is_refused():
+    refused = [
+        {"want": "poles"}, {"amplitude": None}, {"rate": None}, {"noise": None}, {"time": 2.0},
+        {"time": 1e6}, {"amplitude": 0.0}, {"amplitude": (3, -1)}, {"noise_pole": 1.0},
+        {"output_limit": 0.0},
+    ]  # fmt: skip
+    for change in refused:
+        with pytest.raises(OptionError, match=r"expected|choose"):
+            cr.experiment.plan(FLOW, **{**ASKED, **change})
+    with pytest.raises(DataError, match="expected a Record"):
+        cr.experiment.plan("heater.csv", **ASKED)
+    twice = PlausibleModel(1.0, np.zeros(2, dtype=complex), np.ones(1))
+    with pytest.raises(UnsuitableSystemError, match="integrator"):
+        cr.experiment.plan(twice, **ASKED)
+    with pytest.raises(UnsuitableSystemError, match="expected records"):
+        cr.experiment.plan(FLOW.system(0.2), **ASKED)
+    with pytest.raises(OptionError, match="choose one of"):
+        cr.experiment.plan(FLOW, **ASKED).using("knock")
