@@ -6,12 +6,13 @@ import pytest
 import ctrl_realize as cr
 from benchmarks.experiment.cases import CASES, Case, dead_time, planned, simulated
 from ctrl_realize.errors import DataError, OptionError, UnsuitableSystemError
-from ctrl_realize.experiment.bound import Bound, Experiment, Noise
+from ctrl_realize.experiment.bound import Bound, Experiment
 from ctrl_realize.experiment.signals import KINDS, shapes
+from ctrl_realize.identification.noise import NoiseModel
 from ctrl_realize.numerics.engine.plausible_models import PlausibleModel
 
 GAIN, LAG, DEAD_TIME, SIGMA = 2.0, 10.0, 3.0, 0.01
-WHITE = Noise(SIGMA, np.ones(1))
+WHITE = NoiseModel(np.empty(0), SIGMA, 0.1)
 FIRST_ORDER = PlausibleModel(DEAD_TIME, np.array([-1 / LAG + 0j]), np.array([GAIN / LAG]))
 LEVEL = cr.design.ProcessModel(gain=0.2, lag=0.0, dead_time=3.0, integrating=True)
 FLOW = cr.design.ProcessModel(gain=1.2, lag=3.0, dead_time=2.0)
@@ -47,7 +48,7 @@ def test_gain_in_coloured_noise_has_the_error_of_a_mean():
     # A settled response between two long rests: the difference of two means, of which that of AR(1)
     # noise has the variance sigma_w^2 / (n (1 - a)^2).
     pole, rest, count = 0.8, 20_000, 20_000
-    noise = Noise(SIGMA, np.array([1.0, -pole]))
+    noise = NoiseModel(np.array([pole]), SIGMA, 1.0)
     found = error(one_step(rest, count), 1.0, "gain", noise)
     expected = SIGMA / (1 - pole) * np.sqrt(1 / rest + 1 / count)
     assert found == pytest.approx(expected, rel=0.01)

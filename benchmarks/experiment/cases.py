@@ -76,11 +76,12 @@ def planned(case: Case) -> ExperimentPlan:
 def simulated(case: Case, plan: ExperimentPlan, seed: int) -> cr.Record:
     """Record of a test, simulated."""
     driving = np.random.default_rng(seed).standard_normal(plan.time.size + 500)
-    noise = plan.noise.innovation * lfilter([1.0], plan.noise.filter, driving)[500:]
+    whitening = [1.0, *-plan.noise.coefficients]
+    noise = plan.noise.std * lfilter([1.0], whitening, driving)[500:]
     output = Bound(plan.model, plan.dt).response(plan.chosen.input) + noise
     if case.way != "filtered":
         return plan.record(output)
-    clean = [lfilter(plan.noise.filter, [1.0], x)[1:] for x in (plan.command, output)]
+    clean = [lfilter(whitening, [1.0], x)[1:] for x in (plan.command, output)]
     return cr.Record(plan.time[1:], *clean)
 
 
@@ -112,7 +113,7 @@ def of_least_squares(plan: ExperimentPlan) -> float:
     slopes, own = bound.slopes(plan.chosen.input)
     inverse = np.linalg.pinv(np.concatenate([slopes, own], axis=1))[0]
     pulse = np.r_[1.0, np.zeros(plan.time.size - 1)]
-    answer: FloatArray = lfilter([1.0], plan.noise.filter, pulse)
-    pole = -plan.noise.filter[1] if plan.noise.filter.size > 1 else 0.0
+    pole = float(np.sum(plan.noise.coefficients))  # AR(1), or white
+    answer: FloatArray = lfilter([1.0], [1.0, -pole], pulse)
     covariance = toeplitz(answer) / (1 - pole**2)
-    return float(plan.noise.innovation * np.sqrt(inverse @ covariance @ inverse))
+    return float(plan.noise.std * np.sqrt(inverse @ covariance @ inverse))

@@ -20,6 +20,7 @@ from scipy.linalg import block_diag
 from scipy.signal import lfilter
 
 from ..errors import UnsuitableSystemError
+from ..identification.noise import NoiseModel
 from ..numerics.arrays import FloatArray
 from ..numerics.engine.modal import respond
 from ..numerics.engine.plausible_models import PlausibleModel
@@ -37,36 +38,14 @@ from ..numerics.loops.reference import (
 )
 
 Wanted: TypeAlias = Literal["dead_time", "gain", "phase", "Ms"]
-_REMEMBERED = 2000  # samples of the answer of a noise filter
 WANTED: tuple[Wanted, ...] = ("dead_time", "gain", "phase", "Ms")
-
-
-class Noise(NamedTuple):
-    """Noise of the output: what is left of it, standard deviation, behind the filter ``1 - a/z``.
-
-    `filter` (1 + r,) makes it white; for white noise it is 1.
-    """
-
-    innovation: float
-    filter: FloatArray
-
-    @property
-    def sigma(self) -> float:
-        """Standard deviation of the noise itself."""
-        answer = lfilter([1.0], self.filter, np.eye(1, _REMEMBERED)[0])
-        return self.innovation * float(np.linalg.norm(answer))
-
-    def whitened(self, columns: FloatArray) -> FloatArray:
-        """Columns (N, k) in units of the noise, without those that the filter does not reach."""
-        left = lfilter(self.filter, [1.0], columns, axis=0)[self.filter.size - 1 :]
-        return np.asarray(left / self.innovation)
 
 
 class Experiment(NamedTuple):
     """Input (N,), from rest, and the noise that its record will have."""
 
     input: FloatArray
-    noise: Noise
+    noise: NoiseModel
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,7 +66,7 @@ class Bound:
     def errors(self, tests: Sequence[Experiment], gradient: FloatArray) -> FloatArray:
         """Standard errors (k,) of quantities with gradients (k, p) after all tests together."""
         slopes, own = zip(
-            *([noise.whitened(part) for part in self.slopes(signal)] for signal, noise in tests),
+            *([_white(part, noise) for part in self.slopes(signal)] for signal, noise in tests),
             strict=True,
         )
         together = LocalErrors(np.concatenate(slopes), block_diag(*own))
@@ -134,6 +113,12 @@ class Bound:
         theta = np.concatenate([[self.model.dead_time], parameters_from_poles(moving)])
         slow = np.full(poles.size - moving.size, -SLOWEST / (samples * self.dt), dtype=complex)
         return theta, self.model.numerator, KnownFactor(slow)
+
+
+def _white(columns: FloatArray, noise: NoiseModel) -> FloatArray:
+    """Columns (N, k) in units of the noise, without those that its filter does not reach."""
+    left = lfilter([1.0, *-noise.coefficients], [1.0], columns, axis=0)
+    return np.asarray(left[noise.coefficients.size :] / noise.std)
 
 
 def quantities(

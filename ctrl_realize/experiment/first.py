@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from scipy.signal import lfilter
 
 from ..data import Record
 from ..data.given import as_records
@@ -15,12 +14,12 @@ from ..delayed import DelayedStateSpace
 from ..design import ProcessModel
 from ..errors import UnsuitableSystemError
 from ..identification import OutputErrorFit, identify
+from ..identification.noise import NoiseModel, noise_of
 from ..numerics.arrays import FloatArray
 from ..numerics.engine.plausible_models import PlausibleModel
 from ..numerics.engine.static_gain import INTEGRATOR
 from ..numerics.signals.noise import correlation_time, winsorised_sigma
-from ..numerics.signals.noise_model import noise_lags, whitening_filter
-from .bound import Bound, Experiment, Noise
+from .bound import Bound, Experiment
 
 _OTHERS = 4  # of the plausible models every fourth stands for all: time
 
@@ -32,7 +31,7 @@ class Known:
     model: PlausibleModel
     others: tuple[PlausibleModel, ...] = ()
     dt: float | None = None
-    noise: Noise | None = None
+    noise: NoiseModel | None = None
     tests: tuple[Experiment, ...] = ()
     level: float = 0.0
 
@@ -80,7 +79,10 @@ def known_from_fit(fit: OutputErrorFit) -> Known:
         # Step records are scaled and averaged before they are fitted.
         followed = [Bound(model, fit.dt).response(signal) for signal in inputs]
         residuals = [_left(*each) for each in zip(fit.records, followed, strict=True)]
-    tests = [Experiment(*each) for each in zip(inputs, map(noise_of, residuals), strict=True)]
+    tests = [
+        Experiment(signal, _noise_of(residual, fit.dt))
+        for signal, residual in zip(inputs, residuals, strict=True)
+    ]
     return Known(
         model,
         tuple(one for one in others if np.sum(one.poles == 0) <= 1),
@@ -91,13 +93,11 @@ def known_from_fit(fit: OutputErrorFit) -> Known:
     )
 
 
-def noise_of(residual: FloatArray) -> Noise:
-    """Noise of a residual; where it is coloured, by its autoregression."""
-    polynomial = np.ones(1)
-    if correlation_time(residual) > 1:  # more than white noise scatters to
-        polynomial = whitening_filter(residual, noise_lags(residual.size))
-    left = lfilter(polynomial, [1.0], residual)[polynomial.size - 1 :]
-    return Noise(winsorised_sigma(left, 0.0), polynomial)
+def _noise_of(residual: FloatArray, dt: float) -> NoiseModel:
+    """Noise of a residual; coloured where it is more so than white noise scatters to."""
+    if correlation_time(residual) > 1:
+        return noise_of(residual, dt)
+    return NoiseModel(np.empty(0), winsorised_sigma(residual, 0.0), dt)
 
 
 def _left(record: Record, followed: FloatArray) -> FloatArray:

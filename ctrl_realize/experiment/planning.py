@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from numbers import Real
 from typing import Any
 
@@ -15,12 +15,13 @@ from ..data import Record
 from ..delayed import DelayedStateSpace
 from ..design import ProcessModel
 from ..errors import OptionError
+from ..identification.noise import NoiseModel
 from ..identification.plausible import continuous_core
 from ..numerics.arrays import FloatArray
 from ..numerics.engine.plausible_models import PlausibleModel
 from ..numerics.engine.poles import lag_sum
 from ..numerics.state_space.sampling import sample_with_dead_time
-from .bound import WANTED, Bound, Experiment, Noise, Wanted
+from .bound import WANTED, Bound, Experiment, Wanted
 from .first import Known, known_from, largest_move
 from .result import ErrorCurve, ExperimentPlan, PlannedTest
 from .signals import KINDS, shapes
@@ -43,7 +44,7 @@ class _Setting:
 
     bounds: list[Bound]
     gradients: list[FloatArray]
-    noise: Noise
+    noise: NoiseModel
     limits: tuple[float, float]
     output_limit: float
     records: tuple[Experiment, ...]
@@ -164,6 +165,7 @@ def plan(
     )  # fmt: skip
     candidates = _candidates(setting, count)
     best = candidates[0]
+    colour = "coloured" if heard.coefficients.size else "white"
     rest = known.level if level is None else real(level, "level", "input at rest")
     return ExperimentPlan(
         time=dt * np.arange(count, dtype=np.float64),
@@ -179,7 +181,7 @@ def plan(
         choices=(
             f"errors by the Cramer-Rao bound of the model, ranked over it and {len(bounds) - 1} "
             "that are plausible",
-            f"noise {plainly(heard.sigma, 3)}, {'coloured' if heard.filter.size > 1 else 'white'}",
+            f"noise {plainly(heard.sigma, 3)}, {colour}",
         ),
     )
 
@@ -203,17 +205,19 @@ def _limits(amplitude: Any) -> tuple[float, float]:
     return (high, low) if -low > high else (low, high)
 
 
-def _noise(known: Known, noise: float | None, pole: float, resolution: float, dt: float) -> Noise:
+def _noise(
+    known: Known, noise: float | None, pole: float, resolution: float, dt: float
+) -> NoiseModel:
     rounding = not_negative(resolution, "resolution", "step of the sensor") ** 2 / 12
     if noise is None and known.noise is not None:
         heard = known.noise
-        if heard.filter.size > 1 and known.dt and abs(dt / known.dt - 1) > 1e-6:
+        if heard.coefficients.size and known.dt and abs(dt / known.dt - 1) > 1e-6:
             raise OptionError(
                 f"the noise of the records is coloured, and known at a rate of {1 / known.dt:g} "
                 "only; expected this rate, or noise and noise_pole"
             )
         # What was measured is rounded already, unless it stood still.
-        return heard._replace(innovation=max(heard.innovation, float(np.sqrt(rounding))))
+        return replace(heard, std=max(heard.std, float(np.sqrt(rounding))))
     if noise is None and not rounding:
         raise OptionError("noise=None; expected the standard deviation of the output's noise")
     sigma = not_negative(noise or 0.0, "noise", "standard deviation")
@@ -224,7 +228,7 @@ def _noise(known: Known, noise: float | None, pole: float, resolution: float, dt
         )
     # The filter passes the rounding, too.
     left = (1 - turn**2) * sigma**2 + (1 + turn**2) * rounding
-    return Noise(float(np.sqrt(left)), np.array([1.0, -turn] if turn else [1.0]))
+    return NoiseModel(np.array([turn] if turn else []), float(np.sqrt(left)), dt)
 
 
 def _candidates(setting: _Setting, count: int) -> list[PlannedTest]:

@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING
 
 from .._checks import one_of
 from .._wording import in_time, plainly
+from ..identification.noise import NoiseModel
 from ..numerics.arrays import FloatArray
 from ..numerics.engine.plausible_models import PlausibleModel
-from .bound import Experiment, Noise, Wanted
+from .bound import Experiment, Wanted
 from .command import PlannedInput, duration_in_words
 
 if TYPE_CHECKING:
@@ -106,7 +107,7 @@ class ExperimentPlan(PlannedInput):
         Input at rest.
     model : PlausibleModel
         By which the errors are predicted; a pole of an integrator is 0.
-    noise : Noise
+    noise : NoiseModel
         That the record will have.
     tests : tuple of Experiment
         Inputs and noise of the records that there are.
@@ -130,7 +131,7 @@ class ExperimentPlan(PlannedInput):
     curve: ErrorCurve
     level: float
     model: PlausibleModel
-    noise: Noise
+    noise: NoiseModel
     tests: tuple[Experiment, ...]
     kind: str
     choices: tuple[str, ...] = field(default=())

@@ -55,6 +55,12 @@ class NoiseModel(Result):
         return ct.tf([1.0, *np.zeros(self.coefficients.size)], self._denominator, self.dt)
 
     @property
+    def sigma(self) -> float:
+        """Standard deviation of the noise itself, in the unit of the output."""
+        response = lfilter([1.0], self._denominator, np.eye(1, self._memory)[0])
+        return self.std * float(np.linalg.norm(response))
+
+    @property
     def correlation_time(self) -> float:
         """Samples that count as one for means over many: 1 for white noise."""
         response = lfilter([1.0], self._denominator, np.eye(self._memory)[0])
