@@ -64,7 +64,7 @@ class Verdict:
     >>> for verdict in fit.verdicts:
     ...     print(verdict)
     dead time: good (known to 12.6 ms, 24.8 to 37.4 ms)
-    gain: good (known to 0.0058 %)
+    gain: good (known to 0.0059 %)
     tuning: good (a PI has Ms 1.49 on the model, at most 1.49 on models that fit as well)
     """
 

@@ -161,7 +161,7 @@ def focused(plant, count):
 def test_for_simulation_a_model_of_a_wrong_class_is_fitted_to_the_frequencies_of_the_input():
     # The noise is slow and lags cannot respond at once: prediction weighs the fast part of the
     # response, which no lag follows.
-    (prediction, simulation), clean = focused(ct.tf([-1.0, 1.0], [2.0, 1.0]), 100)
+    (prediction, simulation), clean = focused(ct.tf([-1.0, 1.0], [2.0, 1.0]), 200)
     first, second = (
         cr.validation.analyse_residuals(one, clean).fit_percent[0]
         for one in (prediction, simulation)

@@ -178,7 +178,7 @@ def _extrapolated(fit: OutputErrorEstimate, length: float) -> Iterator[Flag]:
     seen, ends, unseen = max(length - fit.dead_time, 0.0), "", fit.poles[:0]
     if np.abs(fit.poles).min() * length < INTEGRATOR:
         yield flagged("integrating")
-    elif (unseen := _not_died_away(fit.poles, seen)).size:
+    elif fit.numerator[0] and (unseen := _not_died_away(fit.poles, seen)).size:
         residues, gain, _ = partial_fractions(fit.poles[None], np.ones(1), fit.numerator.size)
         left = float(np.real(np.exp(fit.poles * seen) @ residues[0] @ fit.numerator))
         reached = 1 + left / (gain[0] * fit.numerator[0])

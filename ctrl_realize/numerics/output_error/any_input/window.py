@@ -141,8 +141,11 @@ def simulates_worse(weighted: SampledWindow, plain: SampledWindow) -> bool:
     That is, by more than the noise explains: where the structure is right both estimates have the
     same limit, and the weighted one is the more accurate; where it is not, the weighted one is that
     for the frequencies at which the noise is small [3]_, section 8.5, not for those of the input.
-    Likelihood ratio with as many samples as independent ones tell as much, and the charge of BIC.
+    Likelihood ratio with as many samples as independent ones tell as much, and the charge of BIC. A
+    fit that does not settle within the record follows a plant that changes, or a disturbance.
     """
+    if not _settles(plain.fit.static(plain.fit.best)):
+        return False
     before, after = (_simulated(plain.data, fit) for fit in (plain, weighted))
     independent = after.size / correlation_time(after)
     ratio = winsorised_sigma(after, 0.0) / max(winsorised_sigma(before, 0.0), SMALLEST)
