@@ -318,6 +318,8 @@ def experiment_plot(
             today = [factor * curve.first[0]], [scale * curve.first[1]]
             lines += upper.plot(*today, "D", color=style.MEASURED, label="today")
         upper.set(xlabel=f"length of the test [{unit}]", ylabel=with_unit("standard error", name))
+        for axis in (upper.xaxis, upper.yaxis):
+            style.plain_logarithms(axis)
         factor, unit = axis_time_unit(plan.duration, lower)
         drive = lower.step(factor * plan.time, plan.command, where="post", color=style.INPUT)
         lower.set(xlabel=f"time [{unit}]", ylabel=f"input: {plan.kind}")

@@ -16,6 +16,7 @@ import matplotlib as mpl
 import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.axis import Axis
 from matplotlib.figure import FigureBase
 from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter, LogLocator, MultipleLocator, NullFormatter
@@ -251,14 +252,19 @@ def decibel(magnitude: ArrayLike) -> FloatArray:
 def frequency_axis(axes: Axes, *, label: bool = True) -> None:
     """Make the x axis logarithmic in Hz with plain numbers."""
     axes.set_xscale("log")
-    low, high = axes.get_xlim()
-    # Less than two decades contain too few powers of ten for reading a frequency.
-    few = high / max(low, 1e-300) < 100
-    axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if few else (1.0,)))
-    axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-    axes.xaxis.set_minor_formatter(NullFormatter())
+    plain_logarithms(axes.xaxis)
     if label:
         axes.set_xlabel("frequency [Hz]")
+
+
+def plain_logarithms(axis: Axis) -> None:
+    """Write plain numbers at a logarithmic axis."""
+    low, high = axis.get_view_interval()
+    # Less than two decades contain too few powers of ten for reading a value.
+    few = high / max(low, 1e-300) < 100
+    axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if few else (1.0,)))
+    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    axis.set_minor_formatter(NullFormatter())
 
 
 def phase_ticks(axes: Axes) -> None:
