@@ -7,6 +7,7 @@ import numpy as np
 from .._checks import integer, not_negative, positive, real
 from ..data import Record
 from ..errors import OptionError
+from ..numerics.loops.relay import relay_loop
 from ..numerics.state_space.sampling import sample_with_dead_time
 from .control_valve import Seed
 from .plant import Plant, added_noise, recorded_plant, rounded_by
@@ -90,22 +91,24 @@ def relay_test(
             f"levels within {low:g}-{high:g} {plant.truth.units[0]}"
         )
     truth, level = plant.truth, plant.steady_state[1]
-    A, B, C, D, delay = sample_with_dead_time(*truth.matrices, plant.dt, truth.dead_time)
     rest = round(plant.pre_step_time / plant.dt)
     n = rest + int(LONGEST * (cycles + 1) * (truth.total_delay / plant.dt + 1))
-    output = level + added_noise(plant, n, np.random.default_rng(rng))
-    arrived = np.zeros(n + delay)  # change of the input, `delay` samples later
-    state, turn, up, switches = np.zeros(A.shape[0]), float(np.sign(truth.gain)), True, 0
-    for k in range(rest, n):
-        output[k] += C[0] @ state + D[0, 0] * arrived[k]
-        above = float(rounded_by(plant, output[k : k + 1])[0]) - level
-        if above > width if up else above < -width:
-            up, switches = not up, switches + 1
-        if switches > 2 * cycles:
-            held = plant.steady_state[0] + arrived[delay : delay + k]
-            return recorded_plant(plant, held, output[:k], name)
-        arrived[k + delay] = bias + (size if up else -size) * turn
-        state = A @ state + B[:, 0] * arrived[k]
+    noise = added_noise(plant, n, np.random.default_rng(rng))
+    turn = float(np.sign(truth.gain))
+
+    def seen(k: int, moved: float) -> float:
+        shown = rounded_by(plant, np.array([level + noise[rest + k] + moved]))
+        return float(shown[0]) - level
+
+    sampled = sample_with_dead_time(*truth.matrices, plant.dt, truth.dead_time)
+    levels = bias + turn * size, bias - turn * size
+    drive, moved = relay_loop(sampled, n - rest, levels, width, seen, 2 * cycles + 1)
+    if drive.size < n - rest:
+        held = plant.steady_state[0] + np.concatenate([np.zeros(rest), drive])
+        output = level + noise[: held.size]
+        output[rest:] += moved
+        return recorded_plant(plant, held, output, name)
+    switches = np.count_nonzero(np.diff(drive))
     raise OptionError(
         f"the relay has switched {switches} times in {(n - rest) * plant.dt:g} s; expected "
         f"{2 * cycles + 1}: use a larger amplitude ({size:g}), or less bias ({bias:g}) or "

@@ -20,6 +20,7 @@ from ..identification.plausible import continuous_core
 from ..numerics.arrays import FloatArray
 from ..numerics.engine.plausible_models import PlausibleModel
 from ..numerics.engine.poles import lag_sum
+from ..numerics.loops.relay import relay_loop
 from ..numerics.state_space.sampling import sample_with_dead_time
 from .bound import WANTED, Bound, Experiment, Wanted
 from .first import Known, known_from, largest_move
@@ -285,21 +286,14 @@ def _relay(setting: _Setting, count: int, middle: float, half: float) -> FloatAr
     """Output (N,) of a relay with hysteresis about the level that the model has at its middle."""
     model, noise = setting.bounds[0].model, setting.noise
     core = continuous_core(model.numerator, model.poles)
-    a, b, c, d, delay = sample_with_dead_time(
-        core.A, core.B, core.C, core.D, setting.dt, model.dead_time
-    )
+    plant = sample_with_dead_time(core.A, core.B, core.C, core.D, setting.dt, model.dead_time)
     gain = float(model.numerator[0] / np.prod(-model.poles[model.poles != 0]).real)
-    goal = 0.0 if setting.returns else gain * middle
-    width = _HYSTERESIS * noise.sigma
-    state, signal, way = np.zeros(len(a)), np.zeros(count), 1.0
-    for k in range(count):
-        late = middle + half * signal[k - delay] if k >= delay > 0 else 0.0
-        above = float(np.sign(gain * half) * (c[0] @ state + d[0, 0] * late - goal))
-        if way * above > width:
-            way = -way
-        signal[k] = way
-        state = a @ state + b[:, 0] * (late if delay else middle + half * way)
-    return signal
+    goal, turn = 0.0 if setting.returns else gain * middle, float(np.sign(gain * half))
+    levels = middle + half, middle - half
+    drive, _ = relay_loop(
+        plant, count, levels, _HYSTERESIS * noise.sigma, lambda _, moved: turn * (moved - goal)
+    )
+    return (drive - middle) / half
 
 
 def _curve(setting: _Setting, count: int, kind: str) -> ErrorCurve:
