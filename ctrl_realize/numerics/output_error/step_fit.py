@@ -260,7 +260,7 @@ def _is_noise(data: StepData, fits: WindowFit, candidate: Candidate) -> bool:
     if fits.correlation == 1.0 and candidate is fits.best:
         return True
     error = fits.window.output - fits.window.predict(fits.problem, candidate)
-    if continues(error[: data.edge], error[data.edge :]):
+    if continues(error[: data.edge], error[data.edge :], ADEQUATE):
         return True
     state = evaluate(fits.problem, candidate.structure, candidate.parameters[None])
     assert fits.window.bins is not None

@@ -63,7 +63,6 @@ def coloured_criterion(residuals: Sequence[FloatArray]) -> tuple[float, int]:
     return min(found)
 
 
-_AS_LARGE = 1.3  # standard deviations that may be equal: of 30 samples it is off by 13 %
 _WILD = 4.0  # standard deviations of which one of 16 000 Gaussian samples is beyond: cut
 _NOTHING = 1e-6  # relative size of a response that has decayed
 _SLOWEST = 0.99  # pole of noise: slower noise is a drift over 200 samples
@@ -106,12 +105,13 @@ def noise_covariance(quiet: FloatArray, longest: int) -> FloatArray:
     return np.asarray(covariance / covariance[0])
 
 
-def continues(rest: FloatArray, later: FloatArray) -> bool:
+def continues(rest: FloatArray, later: FloatArray, as_large: float) -> bool:
     """Whether a louder residual is the slow noise of a short rest, as its samples tell.
 
     A rest of a few correlation times shows part of the variance of AR(1) noise alone, but its pole
-    r, with a standard error of sqrt((1 - r^2) / n), and that of the steps ``e[k] - r e[k-1]``. A
-    misfit has a slower residual than the noise at rest. Ablation: louder noise that goes on.
+    r, with a standard error of sqrt((1 - r^2) / n), and that of the steps ``e[k] - r e[k-1]``,
+    which may be `as_large` as those at rest. A misfit has a slower residual than the noise at rest.
+    Ablation: louder noise that goes on.
     """
     centred = rest - rest.mean()
     if not centred.any() or rest.size < _SAMPLES_PER_LAG:
@@ -123,7 +123,7 @@ def continues(rest: FloatArray, later: FloatArray) -> bool:
     if pole > known + error + (1.0 + 3.0 * pole) / rest.size:
         return False
     steps = [e[1:] - pole * e[:-1] for e in (centred, later)]
-    return bool(np.std(steps[1]) <= _AS_LARGE * np.std(steps[0]))
+    return bool(np.std(steps[1]) <= as_large * np.std(steps[0]))
 
 
 def first_order_covariance(residual: FloatArray, parameters: int) -> FloatArray:

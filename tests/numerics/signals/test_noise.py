@@ -212,13 +212,15 @@ def test_the_pole_of_noise_is_found_in_what_a_polynomial_leaves_of_it():
 def test_noise_of_a_short_rest_goes_on_and_a_misfit_is_none():
     k = np.arange(250)
     misfit = 0.03 * np.exp(-k / 40) * np.sin(2 * np.pi * k / 90)
-    went_on = [continues(noise[:60], noise[60:]) for noise in (slow(310, i) for i in range(40))]
+    went_on = [
+        continues(noise[:60], noise[60:], 1.3) for noise in (slow(310, i) for i in range(40))
+    ]
     assert np.mean(went_on) >= 0.85  # two tests that 95 % pass
     for seed in range(10):
         noise = 0.004 * white(310, seed)
-        assert not continues(noise[:60], noise[60:] + misfit)
-    assert not continues(np.zeros(60), misfit)
-    assert not continues(slow(15, 0), slow(250, 1))
+        assert not continues(noise[:60], noise[60:] + misfit, 1.3)
+    assert not continues(np.zeros(60), misfit, 1.3)
+    assert not continues(slow(15, 0), slow(250, 1), 1.3)
 
 
 def test_white_noise_loses_nothing_but_degrees_of_freedom():
