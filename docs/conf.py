@@ -102,6 +102,16 @@ TABLES = {
         "python -m benchmarks.ablation --kinds measured --only ... "
         "--output docs/tables/ablation_measured_table.md",
     ),
+    "ablation_slow_noise": (
+        "docs/tables/ablation_slow_noise_table.md",
+        "python -m benchmarks.ablation --made-for 24 --only ... "
+        "--output docs/tables/ablation_slow_noise_table.md",
+    ),
+    "verdicts_measured": (
+        "docs/tables/verdicts_measured_table.md",
+        "python -m benchmarks.verdicts --measured ... "
+        "--table docs/tables/verdicts_measured_table.md",
+    ),
     "campaign": (
         "docs/tables/campaign_table.md",
         "python -m benchmarks.campaign --output docs/tables/campaign_table.md",

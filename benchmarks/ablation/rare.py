@@ -93,6 +93,13 @@ def slow_noise_in_a_short_rest(rng: Rng) -> Case:
     return plant.case(record(u, y + 0.02 * np.ptp(y) * coloured(rng, u.size, 0.98)))
 
 
+def noise_as_slow_as_the_rest(rng: Rng) -> Case:
+    """AR(1) noise with a pole at 0.9 and 2 % of the step; 40 to 120 samples of rest."""
+    plant, u = drawn(rng), step(400, int(rng.integers(40, 121)))
+    y = stepped(rng, plant, u)
+    return plant.case(record(u, y + 0.02 * np.ptp(y) * coloured(rng, u.size, 0.9)))
+
+
 def steps_of_a_converter(rng: Rng) -> Case:
     """A converter of 10 to 40 steps over the range, hardly any noise."""
     plant, u = drawn(rng), step()
@@ -230,6 +237,9 @@ MADE_FOR = {
     "unlike residual left alone": noise_of_the_response,
     "noise made white": waves_on_a_canal,
     "colour of the noise at rest": slow_noise_in_a_short_rest,
+    "noise of a short rest made white": noise_as_slow_as_the_rest,
+    "louder noise that goes on": noise_as_slow_as_the_rest,
+    "first motion in slow noise": noise_as_slow_as_the_rest,
     "chains of equal lags": tanks_in_a_row,
     "chains that still improve": tanks_in_a_row,
     "modes of diffusion": steps.wall,

@@ -74,6 +74,17 @@ def scanned(record: cr.Record, _: int) -> ct.StateSpace:
     return cr.scan_orders(impulse, 8, max_delay=10).system()
 
 
+def lags(**options: str) -> Model:
+    """Lags with dead time, whether they are adequate or not."""
+
+    def fit(record: cr.Record, _: int) -> ct.StateSpace:
+        if record.noutputs > 1:
+            raise UnfitRecordError
+        return cr.fit_output_error(record, **options)
+
+    return fit
+
+
 def nfoursid(record: cr.Record, order: int) -> ct.StateSpace:
     """N4SID of the package nfoursid."""
     import pandas as pd
@@ -129,6 +140,9 @@ def pysib(kind: str) -> Model:
 
 WAYS: dict[str, tuple[Model, Iterable[int]]] = {
     "ctrl_realize: identify": (lambda record, _: cr.identify(record), (0,)),
+    "ctrl_realize: fit_output_error": (lags(), (0,)),
+    "the same, focus='prediction'": (lags(focus="prediction"), (0,)),
+    "the same, noise='white'": (lags(noise="white"), (0,)),
     "ctrl_realize: fit_state_space": (lambda record, _: cr.fit_state_space(record), (0,)),
     "ctrl_realize: impulse_from_io, scan_orders": (scanned, (0,)),
     "nfoursid: N4SID": (nfoursid, ORDERS),

@@ -1,5 +1,8 @@
 """How often verdicts are right: `python -m benchmarks.verdicts --seeds 100 130 --store FILE`.
 
+With `--measured FOLDER` (of the measured records, which are no part of the project) the table is
+that of dead times beside the bands in which they are believed to be.
+
 Limits and marks were chosen with seeds below 100; the table is of seeds from 100 on.
 """
 
@@ -24,6 +27,7 @@ from ctrl_realize.numerics.loops.reference import (
     robust_pi,
 )
 
+from ..peers.measured import records
 from .cases import KINDS, Case, case
 
 BAND = (0.1, 0.3, 1.0)  # of the crossover: where the true response is looked for in the envelope
@@ -119,14 +123,43 @@ def table(found: list[dict[str, object]]) -> Iterator[str]:
         yield f"| {name} | {len(some)} | {' | '.join(cells)} | {100 * inside:.0f} % |"
 
 
+def measured_table(folder: Path) -> Iterator[str]:
+    """Rows of measured plants, and all together."""
+    yield "| plant | records | in band | interval meets it | good | of these in band |"
+    yield "|" + "---|" * 6
+    found: dict[str, list[tuple[bool, bool, bool]]] = {}
+    for one in records(folder):
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            fit = cr.fit_output_error(one.task.record).fit
+        low, high = fit.delay_interval
+        row = (
+            one.outside(fit.delay) == 0,
+            low <= one.band[1] and high >= one.band[0],
+            fit.verdicts[0].level == "good",
+        )
+        for name in (one.plant, "all"):
+            found.setdefault(name, []).append(row)
+    found["all"] = found.pop("all")
+    for name, some in found.items():
+        inside, meets, good = np.array(some).T
+        counts = (len(some), inside.sum(), meets.sum(), good.sum(), (good & inside).sum())
+        yield f"| {name} | {' | '.join(map(str, counts))} |"
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--seeds", type=int, nargs=2, default=(100, 125))
     parser.add_argument("--kinds", nargs="+", choices=KINDS, default=KINDS)
     parser.add_argument("--store", type=Path)
     parser.add_argument("--table", type=Path, help="write the table there")
+    parser.add_argument("--measured", type=Path, metavar="FOLDER")
     options = parser.parse_args()
-    text = "\n".join(table(rows(options.store, range(*options.seeds), options.kinds))) + "\n"
+    if options.measured is not None:
+        lines = measured_table(options.measured)
+    else:
+        lines = table(rows(options.store, range(*options.seeds), options.kinds))
+    text = "\n".join(lines) + "\n"
     if options.table is not None:
         options.table.write_text(text, encoding="utf-8")
     sys.stdout.write(text)

@@ -1,4 +1,10 @@
-"""A plant that a relay switches."""
+"""A plant that a relay switches, sample by sample: our own loop of the test of [1]_.
+
+References
+----------
+.. [1] K. J. Astrom and T. Hagglund, Automatic tuning of simple regulators with specifications on
+   phase and amplitude margins, Automatica 20 (1984) 645-651, doi:10.1016/0005-1098(84)90014-1.
+"""
 
 from __future__ import annotations
 
