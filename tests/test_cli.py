@@ -78,6 +78,39 @@ def test_the_exit_code_tells_whether_a_required_verdict_is_good(folder, tmp_path
     assert main([*good, "--overwrite", "--require", "order"]) == 2
 
 
+def test_tune_tells_the_numbers_of_the_same_calls_in_python(tmp_path, capsys):
+    record = cr.datasets.load("tclab").records[0]
+    file = save(record, tmp_path / "heater.csv")
+    words = [str(file), "--structures", "FOPDT", "--form", "siemens_pid_compact", "--kind", "PI"]
+    assert main(["tune", *words, "--rule", "amigo"]) == 0
+    said = capsys.readouterr().out
+    system = cr.identify(cr.read_record(file), structures=["FOPDT"])
+    pid = cr.design.pid(system, "amigo", "PI")
+    assert pid.report() in said
+    assert pid.as_form("siemens_pid_compact").report() in said
+    margin = f"{pid.check.margins.gain_margin:.2g} times as large"
+    assert margin in said
+    assert files_in(tmp_path) == {"heater.csv"}
+    assert main(["tune", *words, "--closed-loop-time", "1", "--rule", "amigo"]) == 2
+    assert "--closed-loop-time is an argument of simc" in capsys.readouterr().err
+
+
+def test_the_report_of_identify_has_the_controller_if_it_is_wanted(folder, tmp_path, capsys):
+    out = tmp_path / "out"
+    words = ["identify", str(folder / "step_0.csv"), "-o", str(out), *FAST]
+    assert main([*words, "--tune", "series"]) == 0
+    said, page = capsys.readouterr().out, (out / "report.html").read_text(encoding="utf-8")
+    system = cr.load_model(out / "model.json")
+    form = cr.design.pid(system).as_form("series")
+    assert form.report() in said
+    for name, value in form._rows():
+        assert f'<td class="text">{name}</td><td class="number">{value}</td>' in page
+    assert "It would be unstable if" in page
+    assert "pid = cr.design.pid(sys)" in page
+    assert main([*words, "--overwrite", "--tune", "abacus"]) == 2
+    assert "--form abacus; choose one of 'ideal'" in capsys.readouterr().err
+
+
 def test_several_records_make_a_campaign_and_a_bad_one_is_a_row(folder, tmp_path, capsys):
     files = [str(folder / name) for name in ("step_0.csv", "flat.csv", "step_1.csv", "text.csv")]
     out = tmp_path / "out"

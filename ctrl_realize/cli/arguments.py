@@ -22,7 +22,8 @@ SPELLED = {
 _MORE = {"output": ["--response"]}
 _METAVARS = {
     "rest": "INPUT OUTPUT", "band_hz": "LOW HIGH", "command_range": "CLOSED OPEN",
-    "travel_range": "CLOSED OPEN", "dead_time": "LOW HIGH",
+    "travel_range": "CLOSED OPEN", "dead_time": "LOW HIGH", "measured_range": "LOW HIGH",
+    "output_range": "LOW HIGH",
 }  # fmt: skip
 _TYPES = (
     (r"Selector|Structures|Sequence\[str", list[str]), ("Sequence|tuple", tuple[float, float]),
@@ -52,7 +53,7 @@ def options_of(file: str, function: str, left_out: str = "") -> dict[str, Any]:
     text = (pkgutil.get_data("ctrl_realize", file) or b"").decode("utf-8")
     node = next(
         part
-        for part in ast.parse(text).body
+        for part in ast.walk(ast.parse(text))
         if isinstance(part, ast.FunctionDef) and part.name == function
     )
     said = _descriptions(ast.get_docstring(node) or "")

@@ -17,7 +17,7 @@ from threadpoolctl import threadpool_limits
 from typer.main import get_command
 
 from ..errors import CtrlRealizeError
-from .signatures import compare, identify, loop, valve
+from .signatures import compare, identify, loop, tune, valve
 from .terminal import EXIT_CODES, complain, one_line, plain_warning
 
 app = typer.Typer(
@@ -28,7 +28,7 @@ app = typer.Typer(
     rich_markup_mode=None,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-for command in (identify, compare, valve, loop):
+for command in (identify, tune, compare, valve, loop):
     app.command(epilog=EXIT_CODES)(command)
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -27,6 +27,7 @@ from .manifest import Run, refuse_other_results
 from .results import Provenance, campaign_table, write_campaign_files, write_record_files
 from .staging import appearing, kept_rows, refuse_a_file
 from .terminal import complain, one_line, printable, progress, say, working
+from .tuning import Tuning
 
 _QUESTIONS = {"dead-time": "dead time", "gain": "gain", "tuning": "tuning"}
 """Questions as options -> as verdicts."""
@@ -34,22 +35,48 @@ _MANY = 12
 """Number of records from which on all cores are used."""
 
 
-def run_identify(
+def run_identify(files: list[Path], folder: Path, *, tune: str | None, **given: Any) -> int:
+    """Identify, write the results, and return the exit code."""
+    tuning = None if tune is None else Tuning({}, {"form": tune})
+    return identified(files, folder, tuning=tuning, **given)
+
+
+def run_tune(
     files: list[Path],
-    folder: Path,
+    folder: Path | None,
     *,
+    tuned: Mapping[str, Any],
+    entered: Mapping[str, Any],
     chosen: Mapping[str, Any],
-    frf: Path | None,
-    joint: bool,
-    separate: bool,
     tests: Mapping[str, Any],
     record: Mapping[str, Any],
-    response: Mapping[str, Any],
-    jobs: int | None,
-    require: list[str] | None,
+    require: Sequence[str] | None,
     run: Run,
 ) -> int:
-    """Identify, write the results, and return the exit code."""
+    """Identify one model of all records, tune, and return the exit code."""
+    return identified(
+        files, folder, chosen=chosen, joint=True, tests=tests, record=record, require=require,
+        run=run, tuning=Tuning(tuned, entered),
+    )  # fmt: skip
+
+
+def identified(
+    files: list[Path],
+    folder: Path | None,
+    *,
+    chosen: Mapping[str, Any],
+    frf: Path | None = None,
+    joint: bool = False,
+    separate: bool = False,
+    tests: Mapping[str, Any],
+    record: Mapping[str, Any],
+    response: Mapping[str, Any] | None = None,
+    jobs: int | None = None,
+    require: Sequence[str] | None,
+    run: Run,
+    tuning: Tuning | None = None,
+) -> int:
+    """Identify, and tune; results are written if there is a folder, as there is without `joint`."""
     joint = joint or "gains" in chosen
     if joint and separate:
         raise OptionError("expected --joint or --separate, got both")
@@ -58,9 +85,12 @@ def run_identify(
     required = [one_of(name, "require", tuple(_QUESTIONS)) for name in require or ()]
     settings = Settings(chosen, joint)
     how = Reading(record, tests)
+    response = response or {}
     measured = None if frf is None else read_frf(frf, **response)
     calls = calls_again(files, settings, how, run.typed, None if frf is None else (frf, response))
-    sources, task = how.sources(files), _Task(settings, measured, required, run)
+    sources, task = how.sources(files), _Task(settings, measured, required, run, tuning)
+    if folder is None:
+        return _one(task, sources, None, calls)
     if separate and len(sources) > 1:
         return _each_alone(task, sources, folder, how)
     refuse_other_results(folder, run)
@@ -80,6 +110,23 @@ class _Task:
     frf: MeasuredFRF | None
     required: list[str]
     run: Run
+    tuning: Tuning | None = None
+
+    def provenance(
+        self,
+        system: DelayedStateSpace,
+        files: Sequence[Path],
+        comparison: FRFComparison | None,
+        calls: list[tuple[str, str]],
+    ) -> Provenance:
+        """What the files say about a model, and its controller if one is wanted."""
+        tuned: dict[str, Any] = {}
+        if self.tuning is not None:
+            tuned = self.tuning.of(system)
+            terminal, (name, lines) = calls
+            calls = [terminal, (name, f"{lines}\n{self.tuning.in_python()}")]
+        report = self.run.report
+        return Provenance(files, self.frf, comparison, self.settings.given, calls, report, tuned)
 
     def judged(self, system: DelayedStateSpace) -> int:
         """Exit code by the verdicts that are required."""
@@ -91,8 +138,13 @@ class _Task:
         return 4 if missed else 0
 
 
-def _one(task: _Task, sources: list[Source], folder: Path, calls: list[tuple[str, str]]) -> int:
-    """Identify one model into a folder; return the exit code: 1 if its report was not written."""
+def _one(
+    task: _Task, sources: list[Source], folder: Path | None, calls: list[tuple[str, str]]
+) -> int:
+    """Identify one model, into a folder if there is one; return the exit code.
+
+    It is 1 if the report was not written.
+    """
     settings, frf = task.settings, task.frf
     records = [source.record() for source in sources]
     options = {**settings.choices, **({} if frf is None or not settings.joint else {"frf": frf})}
@@ -103,7 +155,9 @@ def _one(task: _Task, sources: list[Source], folder: Path, calls: list[tuple[str
         say(printable(f"{source.file}: {record!r}"))
     _say_model(system, comparison)
     files = [source.file for source in sources]
-    provenance = Provenance(files, frf, comparison, settings.given, calls, task.run.report)
+    provenance = task.provenance(system, files, comparison, calls)
+    if folder is None:
+        return task.judged(system)
     written = write_record_files(folder, system, records[0], provenance)
     return task.judged(system) if written else 1
 
@@ -140,7 +194,7 @@ def _many(
         _say_model(campaign.system, comparison)
         with appearing(output, task.run) as folder:
             files = [source.file for source in sources]
-            provenance = Provenance(files, frf, comparison, settings.given, calls, task.run.report)
+            provenance = task.provenance(campaign.system, files, comparison, calls)
             written = write_campaign_files(folder, campaign, provenance)
     names = ["model.json", "records.csv", "models/"]
     _say_what_is_written(output, names, task.run.report and written)

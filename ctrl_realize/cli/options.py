@@ -48,6 +48,12 @@ NoReport = Annotated[
     bool, _OPTION("--no-report", help="Write models and tables alone, without report and figures.")
 ]
 
+Tune = Annotated[
+    str | None,
+    _OPTION(metavar="FORM", help="Tune a PI, too, and tell what to enter in this form, such as "
+            "siemens_pid_compact; see the command tune."),
+]  # fmt: skip
+
 # how to judge a valve
 Limit = Annotated[
     list[str] | None,
@@ -86,6 +92,24 @@ GROUPS: dict[str, dict[str, Any]] = {
     },
     "response_file": {
         name: _RECORD.get(name, option) for name, option in _FREQUENCY_RESPONSE.items()
+    },
+    "tuned": {
+        "rule": Annotated[
+            str | None,
+            _OPTION(help="simc (default), lambda, imc, amigo, ziegler_nichols, cohen_coon, "
+                    "tyreus_luyben, optimal, ...; see design.pid."),
+        ],
+        "kind": Annotated[str | None, _OPTION(help="P, PI (default), PD or PID.")],
+        **options_of("design/tuning/pid.py", "pid", "method dt name"),
+    },
+    "entered": {
+        "form": Annotated[
+            str | None,
+            _OPTION(help="Form in which the numbers are entered: ideal (default), series, "
+                    "parallel, proportional_band, siemens_pid_compact, rockwell_pide_dependent, "
+                    "emerson_deltav_series, ...; see design.pid_forms."),
+        ],
+        **options_of("design/tuning/delivery.py", "as_form", "time_unit"),
     },
     "compared": options_of("frequency/compare.py", "compare_frf"),
     "measured": options_of("valves/evaluate.py", "valve_report", "limits"),

@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any, NamedTuple
 
 import control as ct
@@ -26,7 +27,7 @@ from .terminal import complain, one_line, printable, say, table, working
 
 
 class Provenance(NamedTuple):
-    """What a model was made from and compared with, and whether a report says so."""
+    """What a model was made from and compared with, its controller, and whether a report tells."""
 
     files: Sequence[Path]
     frf: ct.FrequencyResponseData | None
@@ -34,6 +35,7 @@ class Provenance(NamedTuple):
     settings: Mapping[str, Any]
     calls: Sequence[tuple[str, str]]
     with_report: bool = True
+    tuned: Mapping[str, Any] = MappingProxyType({})
 
 
 def write_record_files(
@@ -69,6 +71,7 @@ def _write_files(folder: Path, write: Callable[..., Path], provenance: Provenanc
     files = list(dict.fromkeys(provenance.files))  # several tests may be in one
     with told_if_it_fails(folder, "the model") as written:
         shown = {name: getattr(provenance, name) for name in _SHOWN}
+        shown |= provenance.tuned
         write(folder / "report.html", files=files, figures=folder / "figures", **shown)
         written.append("report.html")
     return bool(written)

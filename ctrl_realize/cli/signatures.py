@@ -29,6 +29,7 @@ def identify(
     response: o.Given,
     jobs: o.Jobs = None,
     require: o.Require = None,
+    tune: o.Tune = None,
     no_report: o.NoReport = False,
     overwrite: o.Overwrite = False,
 ) -> None:
@@ -38,7 +39,8 @@ def identify(
     campaign: the output also contains a table of their delays (records.csv), a model for each
     (models/) and a final model. A record that fails becomes a row of the table with its error. If a
     campaign is interrupted, the finished records are kept in rows/, and the same command resumes
-    from there. With --joint, or --gains own, one model is fitted to all records together.
+    from there. With --joint, or --gains own, one model is fitted to all records together. With
+    --tune, the report also has a controller, see the command tune.
 
     \b
     Examples:
@@ -48,6 +50,34 @@ def identify(
       ctrl-realize identify historian.csv -o out --missing keep --from "2025-02-01 08:00"
       ctrl-realize identify tests.csv -o out --by test --joint --gains own
       ctrl-realize identify step.csv -o out --frf frf.csv --joint
+    """  # noqa: D301  # \b keeps the lines of the examples apart
+
+
+@command(".identify_command", "run_tune")
+def tune(
+    files: o.Files,
+    folder: o.MaybeFolder = None,
+    *,
+    entered: o.Given,
+    tuned: o.Given,
+    chosen: o.Given,
+    tests: o.Given,
+    record: o.Given,
+    require: o.Require = None,
+    no_report: o.NoReport = False,
+    overwrite: o.Overwrite = False,
+) -> None:
+    """Tune a PID controller from records of its plant, and tell what to enter.
+
+    One model is identified from all records. The controller is checked on it and on the models that
+    fit the records as well; what would make the loop unstable is listed. With an output folder, the
+    report shows the closed loop with the output of the controller for all of these models.
+
+    \b
+    Examples:
+      ctrl-realize tune step.csv --form siemens_pid_compact
+      ctrl-realize tune step.csv --form emerson_deltav_series --measured-range 0 400 --kind PID
+      ctrl-realize tune tests.csv -o out --by test --rule lambda --closed-loop-time 120
     """  # noqa: D301  # \b keeps the lines of the examples apart
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import control as ct
@@ -15,6 +15,7 @@ from .._checks import check_type, positive
 from .._wording import in_time
 from ..delayed import DelayedStateSpace
 from ..design.loops.margin_result import Margins
+from ..design.loops.margins import margins
 from ..design.loops.performance import (
     controller_responses,
     lasting,
@@ -161,6 +162,7 @@ def closed_loop_plot(
     load_step: float = 1.0,
     output_limits: tuple[float, float] | None = None,
     noise_std: float = 0.0,
+    plants: Sequence[DelayedStateSpace] = (),
     ax: style.AxesLike = None,
     title: str | None = None,
 ) -> ct.ControlPlot:
@@ -185,6 +187,9 @@ def closed_loop_plot(
     noise_std : float, optional
         Standard deviation of the noise of the measured value, to see what of it arrives at the
         actuator.
+    plants : sequence of DelayedStateSpace, optional
+        Other plants, such as ``sys.fit.plausible_models.systems``: the band of their responses with
+        the first controller, without limits; those that it does not stabilize are lines.
 
     Raises
     ------
@@ -211,6 +216,9 @@ def closed_loop_plot(
     ) as axes:
         factor, unit = axis_time_unit(span, axes[2])
         time = np.arange(count) * plant.dt * factor
+        if plants:
+            first = next(iter(linear.values()))
+            _draw_others(axes, time, plants, first, (setpoint_step, load_step))
         for number, (name, controller) in enumerate(controllers.items()):
             if noise_std or output_limits or isinstance(controller, PIDAlgorithm):
                 settings = {"noise_std": noise_std, "output_limits": output_limits}
@@ -233,6 +241,34 @@ def closed_loop_plot(
         axes[3].set_xlabel(f"time [{unit}]")
         # The set-point response ends at the set-point: the corner below it is free.
         return style.finished(axes, drawn, columns=2, loc="lower right")
+
+
+def _draw_others(
+    axes: Sequence[Axes],
+    time: FloatArray,
+    plants: Sequence[DelayedStateSpace],
+    controller: Any,
+    steps: tuple[float, float],
+) -> None:
+    """Draw the band of the responses of stable loops, and the others as lines within its scale."""
+    stable = [margins(one, controller).stable for one in plants]
+    inside = [
+        _linear_signals(one, controller, time.size, steps)
+        for one, good in zip(plants, stable, strict=True)
+        if good
+    ]
+    for one, good in zip(plants, stable, strict=True):
+        if not good:
+            for where, signal in zip(
+                axes, _simulated(one, controller, time.size, steps, {}), strict=True
+            ):
+                looks = {"color": style.TRUTH, "linewidth": 0.8, "scaley": not inside}
+                where.plot(time, signal, **looks)
+    if inside:
+        for where, signals in zip(axes, zip(*inside, strict=True), strict=True):
+            low, high = np.min(signals, axis=0), np.max(signals, axis=0)
+            label = "models that fit as well" if where is axes[0] else None
+            where.fill_between(time, low, high, color=style.BAND, alpha=0.35, lw=0, label=label)
 
 
 def _linear(controller: Any) -> Any:

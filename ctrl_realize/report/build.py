@@ -16,11 +16,14 @@ from ..data import Record
 from ..data.given import as_record
 from ..data.shown_units import in_shown_units, shown_time_unit
 from ..delayed import DelayedStateSpace
+from ..design.tuning.controller import PIDController
+from ..design.tuning.forms import PIDForm
 from ..errors import UnsuitableSystemError
 from ..frequency.comparison import FRFComparison
 from ..identification.campaign.campaign import Campaign
 from ..results import ModelFit
-from .page import Page, Table, pairs, write_page
+from .controller import controller_of
+from .page import Controller, Page, Table, pairs, write_page
 from .provenance import versions
 from .sketches import (
     Sketch,
@@ -54,6 +57,8 @@ def write_identification(
     comparison: FRFComparison | None = None,
     settings: Mapping[str, Any] | None = None,
     calls: Sequence[tuple[str, str]] = (),
+    controller: PIDController | None = None,
+    form: PIDForm | None = None,
     simulated: bool = False,
     figures: str | os.PathLike[str] | None = None,
 ) -> Path:
@@ -77,6 +82,11 @@ def write_identification(
         Settings to list.
     calls : sequence of (name, text), optional
         Commands that reproduce the result.
+    controller : PIDController, optional
+        From `design.pid` for `system`: what to enter, the closed loop on all models that the data
+        do not rule out, and what would make it unstable.
+    form : PIDForm, optional
+        The parameters of `controller` as they are entered, from its `as_form`.
     simulated : bool, default False
         Whether the data are simulated, which is stated at the top.
     figures : path-like, optional
@@ -128,7 +138,14 @@ def write_identification(
         simulated=simulated,
         figures=figures,
         fit=system.fit,
+        controller=_controller(system, controller, form),
     )
+
+
+def _controller(
+    system: DelayedStateSpace, controller: PIDController | None, form: PIDForm | None
+) -> Controller | None:
+    return None if controller is None else controller_of(system, controller, form)
 
 
 def write_campaign(
@@ -141,6 +158,8 @@ def write_campaign(
     comparison: FRFComparison | None = None,
     settings: Mapping[str, Any] | None = None,
     calls: Sequence[tuple[str, str]] = (),
+    controller: PIDController | None = None,
+    form: PIDForm | None = None,
     title: str = "Campaign",
     truth: float | None = None,
     simulated: bool = False,
@@ -156,8 +175,8 @@ def write_campaign(
         Data files, for their checksums.
     records : sequence of Record, optional
         The records, for their checksums if there are no files.
-    frf, comparison, settings, calls, simulated, figures
-        As for `write_identification`; the comparison is that of ``campaign.system``.
+    frf, comparison, settings, calls, controller, form, simulated, figures
+        As for `write_identification`; comparison and controller are those of ``campaign.system``.
     title : str, optional
     truth : float, optional
         Known delay in samples of simulated data, drawn with the estimates.
@@ -211,6 +230,7 @@ def write_campaign(
             simulated=simulated,
             figures=figures,
             fit=system.fit,
+            controller=_controller(system, controller, form),
         )
 
 
@@ -296,6 +316,7 @@ def write_report(
     simulated: bool,
     figures: str | os.PathLike[str] | None,
     fit: ModelFit | None = None,
+    controller: Controller | None = None,
 ) -> Path:
     """Write a page and, if a folder is given, its figures."""
     if figures is not None:
@@ -310,6 +331,7 @@ def write_report(
         calls=calls,
         simulated=simulated,
         parameters=parameter_table(fit) if fit is not None and fit.parameters else None,
+        controller=controller,
     )
     return write_page(path, page)
 

@@ -17,7 +17,7 @@ from markupsafe import Markup
 
 from .._facts import facts
 from ..io.atomic import write_text
-from .verdict import Verdict
+from .verdict import Level, Verdict
 
 # control characters, and those that change the direction of writing, may occur in file names
 _CONTROLS = (*range(9), 11, 12, *range(14, 32), *range(127, 160))
@@ -121,6 +121,19 @@ class Table:
 
 
 @dataclass(frozen=True)
+class Controller:
+    """What to enter, the closed loop, and what would make it unsafe; from `controller_of`."""
+
+    title: str
+    level: Level
+    judgement: str
+    entered: Table
+    facts: tuple[tuple[str, str], ...]
+    unsafe: tuple[str, ...]
+    figure: PageFigure
+
+
+@dataclass(frozen=True)
 class Page:
     """Content of a report.
 
@@ -140,6 +153,8 @@ class Page:
         Whether the data are simulated, which is stated at the top.
     parameters : Table or None
         Parameters of the model, above the figures.
+    controller : Controller or None
+        A controller for the model, below its parameters.
 
     Examples
     --------
@@ -165,6 +180,7 @@ class Page:
     calls: Sequence[tuple[str, str]] = field(default=())
     simulated: bool = False
     parameters: Table | None = None
+    controller: Controller | None = None
 
 
 def pairs(

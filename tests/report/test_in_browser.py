@@ -36,10 +36,12 @@ def pages(tmp_path_factory):
         folder / "one.html", system, record, settings={"path": "/a/b" * 60},
         calls=[("In a terminal", "ctrl-realize identify " + "x" * 300)],
     )  # fmt: skip
+    pid = cr.design.pid(system)
+    tuned = report.write_identification(folder / "tuned.html", system, record, controller=pid)
     records = [valve.step_record(16.0, rng=k) for k in range(3)]
     campaign = cr.identify_campaign(records, method="scan", order=3, max_delay=80, progress=False)
     many = report.write_campaign(folder / "many.html", campaign, records=records)
-    return {"one": (one, 7), "many": (many, 5)}
+    return {"one": (one, 7), "tuned": (tuned, 8), "many": (many, 5)}
 
 
 pytestmark = [

@@ -11,6 +11,7 @@ import pytest
 import ctrl_realize as cr
 from ctrl_realize import report
 from ctrl_realize._wording import interval_in_time
+from ctrl_realize.report.controller import controller_of
 from ctrl_realize.report.provenance import record_sha256
 from ctrl_realize.report.verdict import comparison_verdict, verdict_of
 
@@ -224,3 +225,20 @@ def test_a_comparison_report_judges_by_the_error_in_the_band(tmp_path, fitted, m
     assert comparison_verdict(fitted, good).level != "poor"
     path = report.write_comparison(tmp_path / "r.html", fitted, measured, off)
     assert "disagree" in parsed(path).text
+
+
+def test_the_part_of_a_controller_lists_the_models_on_which_its_loop_is_unstable():
+    truth = cr.design.ProcessModel(gain=1.0, lag=20.0, second_lag=4.0, dead_time=3.0).system(1.0)
+    time = np.arange(160.0)
+    u = np.where(time < 20, 0.0, 1.0)
+    noise = 0.1 * np.random.default_rng(3).standard_normal(time.size)
+    system = cr.identify(cr.Record(time, u, truth.simulate(u) + noise))
+    with pytest.warns(cr.errors.ModelWarning, match="unstable"):
+        pid = cr.design.pid(system, "cohen_coon", "PID")
+    unstable = [one for one in pid.check.corners if np.isinf(one.ms)]
+    part = controller_of(system, pid)
+    assert part.level == "poor"
+    assert unstable
+    assert any(f"one of {len(unstable)} of 38 models" in reason for reason in part.unsafe)
+    assert "gain kp" in dict(part.facts)
+    assert part.figure.svg.count("<path") > 10

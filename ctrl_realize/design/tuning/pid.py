@@ -199,7 +199,7 @@ def tuned(
     if options.closed_loop_time is not None:
         if rule not in ("simc", "lambda", "imc"):
             raise OptionError(
-                f"closed_loop_time is an argument of simc, lambda and imc, not of {rule!r}"
+                f"closed_loop_time= is an argument of simc, lambda and imc, not of {rule!r}"
             )
         target = positive(options.closed_loop_time, "closed_loop_time", "time in s")
     limit = real(options.max_sensitivity, "max_sensitivity", "Ms")

@@ -1,0 +1,48 @@
+"""``ctrl-realize tune``, and ``identify --tune``: a PID controller for the identified model."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from .._checks import one_of
+from ..delayed import DelayedStateSpace
+from ..design import pid
+from ..design.tuning.entered import Scaling
+from ..design.tuning.pid import KINDS, RULES
+from ..report.controller import unsafe_if
+from .inputs import python_keywords
+from .terminal import say
+
+
+@dataclass(frozen=True)
+class Tuning:
+    """How to tune, and how the numbers are entered: arguments of `design.pid` and `as_form`."""
+
+    tuned: Mapping[str, Any]
+    entered: Mapping[str, Any]
+
+    def __post_init__(self) -> None:
+        """Check names and ranges before a model is identified."""
+        ranges = {name: self.entered.get(name) for name in ("measured_range", "output_range")}
+        Scaling(**ranges).of(self.entered.get("form", "ideal"))
+        one_of(self.tuned.get("rule", RULES[0]), "rule", RULES)
+        one_of(self.tuned.get("kind", KINDS[0]), "kind", KINDS)
+
+    def of(self, system: DelayedStateSpace) -> dict[str, Any]:
+        """Tune, say what to enter, and return controller and form for the report."""
+        controller = pid(system, **self.tuned)
+        form = controller.as_form(**self.entered)
+        say(f"\n{controller.report()}\n\n{form.report()}\n\nIt would be unstable if")
+        for reason in unsafe_if(system, controller):
+            say(f"  - {reason}")
+        return {"controller": controller, "form": form}
+
+    def in_python(self) -> str:
+        """The same as lines of Python."""
+        entered = python_keywords(self.entered).removeprefix(", ")
+        return (
+            f"pid = cr.design.pid(sys{python_keywords(self.tuned)})\n"
+            f"print(pid, pid.as_form({entered}).report())"
+        )
