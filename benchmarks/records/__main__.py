@@ -3,7 +3,8 @@
 Data are simulated; CPU time of the process, one call each. ``python -m benchmarks.records
 measured`` prints how well halves of measured records are simulated, beside rivals, and
 ``responses`` what measured frequency responses gave, ``joint`` what they gave with step records,
-``several`` what several records of a plant give together, ``statements`` what it gains to state a
+``several`` what several records of a plant give together, ``kinds`` tests of several kinds,
+``statements`` what it gains to state a
 fastest lag.
 """
 
@@ -19,7 +20,7 @@ from scipy.signal import lfilter
 
 import ctrl_realize as cr
 
-from . import joint, measured, responses, several, statements
+from . import joint, kinds, measured, responses, several, statements
 
 
 def cpu(work: Callable[[], object]) -> float:
@@ -86,6 +87,7 @@ if __name__ == "__main__":
         "measured": measured.table,
         "responses": responses.table,
         "joint": joint.table,
+        "kinds": kinds.table,
         "several": several.table,
         "statements": statements.table,
     }

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -16,6 +17,17 @@ from .imperfections import band_limited_noise, slow_disturbance
 from .instruments import held_input
 from .linear import response_to_changes
 from .truth import PlantTruth
+
+
+class _Noise(Protocol):
+    """What a plant takes from the noise model of a fit."""
+
+    dt: float
+
+    @property
+    def sigma(self) -> float: ...
+
+    def draw(self, n: int, rng: Seed = None) -> FloatArray: ...
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,6 +59,8 @@ class Plant:
         a lag.
     resolution : float or None
         Step of the sensor's converter, in units of the output; None does not round.
+    drawn_noise : NoiseModel or None
+        Noise of a measured record in place of `noise` and `disturbance`, see `disturbed_by`.
 
     Examples
     --------
@@ -70,10 +84,43 @@ class Plant:
     disturbance_time: float
     resolution: float | None
     labels: tuple[str, str]
+    drawn_noise: _Noise | None = None
 
     def __repr__(self) -> str:
         dead_time = f"{self.truth.dead_time:g} s = {self.truth.delay:g} samples"
         return f"<Plant (simulated {self.truth.plant}): dead time {dead_time}>"
+
+    def disturbed_by(self, noise: _Noise) -> Plant:
+        """Return the plant with the noise of a measured record in place of its own.
+
+        Parameters
+        ----------
+        noise : NoiseModel
+            As `fit.noise_model` of that record, of the sample time of the plant.
+
+        Returns
+        -------
+        Plant
+
+        Raises
+        ------
+        OptionError
+            Another sample time.
+
+        Examples
+        --------
+        >>> import ctrl_realize as cr
+        >>> measured = cr.identify(cr.bench.heater().step_record(rng=1)).fit.noise_model
+        >>> tank = cr.bench.tank().disturbed_by(measured)
+        >>> tank.step_record(rng=2)
+        <Record 'tank': 260 samples of 1 s, 1 input, 1 output>
+        """
+        if abs(noise.dt - self.dt) > 1e-6 * self.dt:
+            raise OptionError(
+                f"noise has a sample time of {noise.dt:g} s, the plant {self.dt:g} s; expected the "
+                f"same: make the plant with dt={noise.dt:g}"
+            )
+        return replace(self, noise=noise.sigma, disturbance=0.0, drawn_noise=noise)
 
     def step_record(
         self, amplitude: float | None = None, rng: Seed = None, *, name: str = ""
@@ -158,6 +205,8 @@ class Plant:
 
 def added_noise(plant: Plant, n_samples: int, rng: np.random.Generator) -> FloatArray:
     """Draw what is added to the output of a plant: disturbance and noise of the sensor."""
+    if plant.drawn_noise is not None:
+        return plant.drawn_noise.draw(n_samples, rng)
     slow = slow_disturbance(n_samples, plant.disturbance, plant.disturbance_time, plant.dt, rng)
     return slow + band_limited_noise(n_samples, plant.noise, rng, limited=False)
 

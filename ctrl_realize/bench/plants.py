@@ -253,5 +253,5 @@ def _plant(
     return Plant(
         truth=PlantTruth(chain(parts, gain), dead_time, numbers["dt"], kind.units, name),
         labels=kind.labels, steady_state=kind.steady_state, amplitude=kind.amplitude,
-        input_range=(0.0, 100.0), resolution=resolution, **numbers,
+        input_range=(0.0, 100.0), resolution=resolution, drawn_noise=None, **numbers,
     )  # fmt: skip

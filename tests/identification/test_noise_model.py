@@ -57,3 +57,16 @@ def test_white_noise_has_no_coefficients():
     assert noise.correlation_time == 1
     assert noise.system.dcgain() == 1
     assert "white" in noise.report()
+
+
+def test_a_plant_is_disturbed_by_the_noise_of_a_fit(fit):
+    plant = cr.bench.tank(dt=0.5, resolution=None)
+    noisy = plant.disturbed_by(fit.noise_model)
+    held = np.full(20_000, plant.steady_state[0])
+    drawn = noisy.record(held, rng=1).output.ravel()
+    assert np.std(drawn) == pytest.approx(fit.noise_model.sigma, rel=0.1)
+    innovations = lfilter([1.0, *-fit.noise_model.coefficients], [1.0], drawn - drawn.mean())
+    assert np.std(innovations) == pytest.approx(fit.noise_model.std, rel=0.02)
+    assert cr.bench.relay_test(noisy, rng=1).n_samples > 100
+    with pytest.raises(cr.errors.OptionError, match=r"sample time of 0.5 s, the plant 1 s"):
+        cr.bench.tank().disturbed_by(fit.noise_model)

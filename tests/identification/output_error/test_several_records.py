@@ -213,3 +213,18 @@ def test_records_that_differ_widen_the_interval_to_their_last_visible_onset_at_m
     assert "records_differ" in {flag.code for flag in fit.flags}
     # Each moves visibly, by five standard deviations, 6 s after the step.
     assert fit.interval[0] <= 3.0 <= fit.interval[1] <= 12.0
+
+
+def test_tests_of_several_kinds_add_up_to_one_interval():
+    # a mean of both once ended at the second edge of the relay: gain 0.04 for 0.9
+    plant = cr.bench.heater(noise=0.05, disturbance=0.0, resolution=None)
+    step, relay = plant.step_record(rng=1), cr.bench.relay_test(plant, 10.0, rng=2)
+    alone = [cr.identify(test, structures="SOPDT").fit for test in (step, relay)]
+    both = cr.identify([step, relay], structures="SOPDT").fit
+    # Information matrices of independent records add up (Ljung 1999, section 7.4), and so at least
+    # does what is left of them for one parameter; here lags and gain are known better as well.
+    least = np.sum([fit.std_given_structure**-2 for fit in alone]) ** -0.5
+    assert 0.3 * least < both.std_given_structure < least
+    assert both.interval[0] <= 20.0 <= both.interval[1]
+    assert both.gain_interval[0] <= 0.9 <= both.gain_interval[1]
+    assert both.gain == pytest.approx(0.9, rel=0.01)
