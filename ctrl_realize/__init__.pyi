@@ -26,7 +26,9 @@ from .delayed import DelayedStateSpace as DelayedStateSpace
 from .delayed import DelaySystem as DelaySystem
 from .delayed import delay as delay
 from .delayed import delayed_ss as delayed_ss
+from .delayed import exp as exp
 from .delayed import interconnect as interconnect
+from .design import extend_control as extend_control
 from .errors import CtrlRealizeError as CtrlRealizeError
 from .errors import CtrlRealizeWarning as CtrlRealizeWarning
 from .frequency import compare_frf as compare_frf

@@ -9,7 +9,7 @@ import pytest
 
 import ctrl_realize as cr
 
-MOST = 33  # names that a user learns
+MOST = 36  # names that a user learns
 
 MODULES = """
 actuators bench data datasets design errors export frequency identification io paper plots report
@@ -20,7 +20,8 @@ PROMISED = """
 Record ImpulseResponse MeasuredFRF compare read_record read_frf detect_step
 unit_step impulse_from_step impulse_from_io impulse_from_frf fit_frf realize estimate_delay
 fit_output_error fit_state_space scan_orders identify Campaign identify_campaign DelayTracker
-DelayedStateSpace DelaySystem delay delayed_ss interconnect save_model load_model
+DelayedStateSpace DelaySystem delay exp delayed_ss interconnect extend_control save_model
+load_model
 stepped_sine_frf spectral_frf compare_frf
 CtrlRealizeError CtrlRealizeWarning
 """

@@ -1,6 +1,8 @@
 # What the module offers, loaded when it is first asked for.
 
 from .delay_line import DelayLineController as DelayLineController
+from .extension import ControlExtension as ControlExtension
+from .extension import extend_control as extend_control
 from .loops.delay_robustness import delay_robustness as delay_robustness
 from .loops.delay_robustness_result import DelayRobustness as DelayRobustness
 from .loops.gang_of_four import gang_of_four as gang_of_four

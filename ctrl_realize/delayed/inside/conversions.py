@@ -9,7 +9,7 @@ import numpy as np
 from scipy.linalg import expm
 
 from ..._checks import integer, positive
-from ...errors import DelayRangeError, ModelWarning, UnsuitableSystemError, warn_caller
+from ...errors import DelayRangeError, ModelWarning, OptionError, UnsuitableSystemError, warn_caller
 from ...numerics.arrays import FloatArray
 from ...numerics.internal_delays import form as forms
 from ...numerics.internal_delays.form import DelayForm
@@ -128,6 +128,24 @@ class InsideConversions(DelayOperators):
         made = self._joined(form, step, *names)
         if not all(held):
             self._state_error(made, step)
+        return made
+
+    def sample(
+        self, Ts: float, method: str = "zoh", *, name: str | None = None, **settings: Any
+    ) -> Any:
+        """Sample with a zero-order hold, for `control.sample_system`; see `to_discrete`.
+
+        Raises
+        ------
+        OptionError
+            Another method: poles of a bilinear transformation are no samples of a dead time.
+        """
+        if method != "zoh":
+            raise OptionError(
+                f"method={method!r}; expected 'zoh': the response of a dead time is sampled exactly"
+            )
+        made = self.to_discrete(Ts)
+        made.update_names(name=name or f"{self.name}$sampled")
         return made
 
     def _sampled_single(self, core: DelayForm, tau: float, step: float) -> Any:

@@ -8,7 +8,7 @@ import control as ct
 import numpy as np
 
 from ..._checks import positive, real
-from ...errors import DelayRangeError
+from ...errors import DelayRangeError, UnsuitableSystemError
 from ...numerics.state_space.sampling import split_dead_time
 from ..operators import ENDS
 from .checks import not_rational
@@ -104,3 +104,41 @@ def delay(dead_time: float, dt: float | None = None, *, name: str | None = None)
         return TransferDelay(ct.ss([], [], [], 1.0, 0), **names)
     core = ct.StateSpace([], [], [], np.array([[0.0, 1.0], [1.0, 0.0]]), 0)
     return TransferDelay(core, [tau], **names)
+
+
+def exp(system: Any) -> Any:
+    """Dead time as in a textbook: ``exp(-tau * s)`` with the transfer function ``s``.
+
+    Parameters
+    ----------
+    system : control.TransferFunction
+        -tau s, of one input and one output, in continuous time.
+
+    Returns
+    -------
+    TransferDelay
+        As `delay` makes it.
+
+    Raises
+    ------
+    UnsuitableSystemError
+        Anything else.
+    DelayRangeError
+        A lead: tau < 0.
+
+    Examples
+    --------
+    >>> import control as ct
+    >>> import ctrl_realize as cr
+    >>> s = ct.tf("s")
+    >>> 2 / (10 * s + 1) * cr.exp(-4.3 * s)
+    <TransferDelay: u -> y, order 1, internal delay 4.3 s, continuous>
+    """
+    if isinstance(system, ct.TransferFunction) and system.issiso() and not system.dt:
+        num, den = (np.trim_zeros(p[0][0], "f") for p in (system.num, system.den))
+        if num.size == 2 and den.size == 1 and num[1] == 0:
+            return delay(-num[0] / den[0])
+    raise UnsuitableSystemError(
+        f"got exp of {system!r}; expected -tau * s with s = ct.tf('s') and a dead time tau in s, "
+        "such as exp(-0.3 * s); in discrete time use delay(tau, dt)"
+    )
