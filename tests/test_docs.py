@@ -9,7 +9,6 @@ from importlib import import_module
 from pathlib import Path
 from string import Formatter
 
-import numpy as np
 import pytest
 
 import ctrl_realize as cr
@@ -252,21 +251,13 @@ def test_docstrings_of_everything_public_are_those_of_numpydoc(reference):
 
 
 def test_the_lines_of_the_readme_run(tmp_path, monkeypatch):
-    valve = cr.bench.valve(pre_step_time=0.5, hold=1.5)
-    step = valve.step_record(16.0, rng=5)
-    table = np.stack([step.time, step.input, step.output], axis=1)
-    header = "time_s,input,output"
-    np.savetxt(tmp_path / "valve_16mA_05.csv", table, delimiter=",", header=header, comments="")
-    frequency = np.geomspace(0.1, 13, 40)
-    response = valve.truth.frf(frequency).frdata[0, 0]
-    table = np.stack([frequency, response.real, response.imag], axis=1)
-    header = "frequency_hz,real,imag"
-    np.savetxt(tmp_path / "frf.csv", table, delimiter=",", header=header, comments="")
     monkeypatch.chdir(tmp_path)
     scope: dict = {}
     for block in re.findall(r"```python\n(.*?)```", (ROOT / "README.md").read_text(), re.S):
         exec(block, scope)
-    assert scope["sys"].fit.interval[0] < valve.truth.dead_time < scope["sys"].fit.interval[1]
+    truth = cr.datasets.info("simulated_valve").dead_time_band[0]
+    low, high = scope["sys"].fit.interval
+    assert low < truth < high
 
 
 def test_every_source_that_the_code_names_is_on_the_page_of_references():

@@ -56,7 +56,7 @@ def judged(name: str, noise: str, seed: int) -> dict[str, tuple[float, bool, flo
             warnings.simplefilter("ignore")
             fit = cr.identify(data).fit
         low, high = fit.interval
-        true = truth.total_delay
+        true = truth.dead_time
         least, most = fit.gain_interval
         found[kind] = (
             (fit.dead_time - true) / fit.dt,

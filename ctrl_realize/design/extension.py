@@ -152,10 +152,10 @@ def _left_to_the_other(original: Call) -> Call:
 
 def _with_delays(original: Call) -> Call:
     @wraps(original)
-    def method(self: Any, other: Any = 1, *more: Any) -> Any:
+    def method(self: Any, other: Any = 1, *more: Any, **settings: Any) -> Any:
         if isinstance(other, DelayOperators) and not isinstance(self, DelayOperators):
-            return getattr(_delayed(self, other), original.__name__)(other, *more)
-        return original(self, other, *more)
+            return getattr(_delayed(self, other), original.__name__)(other, *more, **settings)
+        return original(self, other, *more, **settings)
 
     return method
 

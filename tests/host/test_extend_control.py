@@ -142,6 +142,7 @@ def test_plain_systems_do_not_notice():
     calls = {
         "product": lambda: (PI * plain).num_array[0, 0],
         "feedback": lambda: ct.feedback(PI, plain).poles(),
+        "positive feedback": lambda: ct.ss(plain).feedback(np.array([[0.5]]), sign=1).poles(),
         "step": lambda: ct.step_response(ct.ss(plain), 10).outputs,
         "locus": lambda: ct.root_locus_map(plain, [1.0, 2.0]).loci,
         "gang": lambda: ct.gangof4_response(plain, PI, OMEGA).complex,
