@@ -255,7 +255,7 @@ def test_the_lines_of_the_readme_run(tmp_path, monkeypatch):
     scope: dict = {}
     for block in re.findall(r"```python\n(.*?)```", (ROOT / "README.md").read_text(), re.S):
         exec(block, scope)
-    truth = cr.datasets.info("simulated_valve").dead_time_band[0]
+    truth = cr.datasets.load("simulated_valve").info.dead_time_band[0]
     low, high = scope["sys"].fit.interval
     assert low < truth < high
 
