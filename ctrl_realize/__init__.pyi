@@ -49,6 +49,7 @@ from .identification import impulse_from_step as impulse_from_step
 from .identification import realize as realize
 from .identification import scan_orders as scan_orders
 from .identification import unit_step as unit_step
+from .interactive.widget import app as app
 from .io import load_model as load_model
 from .io import read_frf as read_frf
 from .io import read_record as read_record

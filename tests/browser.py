@@ -1,5 +1,6 @@
 """A headless Chromium without any other program: the DevTools protocol through two pipes."""
 
+import base64
 import json
 import os
 import select
@@ -36,6 +37,7 @@ class Browser:
         self._folder, self._size, self._dark = folder, (width, height), dark
         self._number, self._rest, self._session = 0, b"", ""
         self._events: list[dict[str, Any]] = []
+        self._tabs: list[str] = []
 
     def __enter__(self) -> Self:
         # Chromium reads from descriptor 3 and writes to 4.
@@ -55,16 +57,24 @@ class Browser:
             stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL,
         )  # fmt: skip
         try:
-            page = self._ask("Target.createTarget", url="about:blank")["targetId"]
-            attached = self._ask("Target.attachToTarget", targetId=page, flatten=True)
-            self._session = attached["sessionId"]
-            for domain in ("Page", "Runtime", "Log"):
-                self._ask(f"{domain}.enable")
-            self.show(*self._size, dark=self._dark)
+            self.tab(0)
         except BaseException:
             self._stop()
             raise
         return self
+
+    def tab(self, number: int) -> None:
+        """Go on in a tab, in a new one if it is not there yet."""
+        if number == len(self._tabs):
+            self._session = ""
+            page = self._ask("Target.createTarget", url="about:blank")["targetId"]
+            attached = self._ask("Target.attachToTarget", targetId=page, flatten=True)
+            self._tabs.append(attached["sessionId"])
+            self._session = self._tabs[number]
+            for domain in ("Page", "Runtime", "Log", "Network"):
+                self._ask(f"{domain}.enable")
+            self.show(*self._size, dark=self._dark)
+        self._session = self._tabs[number]
 
     def __exit__(self, *_: object) -> None:
         self._session = ""
@@ -116,6 +126,7 @@ class Browser:
 
     def show(self, width: int, height: int, *, dark: bool = False) -> None:
         """Give the window another size, and the colours of another preference."""
+        self._size = (width, height)
         self._ask(
             "Emulation.setDeviceMetricsOverride",
             width=width, height=height, deviceScaleFactor=1, mobile=True,
@@ -123,9 +134,10 @@ class Browser:
         scheme = {"name": "prefers-color-scheme", "value": "dark" if dark else "light"}
         self._ask("Emulation.setEmulatedMedia", features=[scheme])
 
-    def open(self, page: Path) -> None:
-        """Load a file, and wait until it is there."""
-        failed = self._ask("Page.navigate", url=page.resolve().as_uri()).get("errorText")
+    def open(self, page: Path | str) -> None:
+        """Load a file or an address, and wait until it is there."""
+        url = page if isinstance(page, str) else page.resolve().as_uri()
+        failed = self._ask("Page.navigate", url=url).get("errorText")
         if failed:
             raise RuntimeError(f"{page}: {failed}")
         while not any(event.get("method") == "Page.loadEventFired" for event in self._events):
@@ -139,6 +151,33 @@ class Browser:
         if "exceptionDetails" in answer:
             raise RuntimeError(answer["exceptionDetails"].get("exception", {}).get("description"))
         return answer["result"].get("value")
+
+    def wait(self, script: str) -> Any:
+        """Run a script again and again until it returns something true, and return that."""
+        until = time.monotonic() + PATIENCE
+        while time.monotonic() < until:
+            found = self.run(script)
+            if found:
+                return found
+            time.sleep(0.02)
+        raise TimeoutError(f"not so within {PATIENCE:g} s: {script}")
+
+    def picture(self, file: Path, *, whole: bool = False, scale: float = 1.0) -> None:
+        """Save what the window shows, or the whole page, as PNG."""
+        size = self._ask("Page.getLayoutMetrics")["cssContentSize"]
+        clip = {"clip": {"x": 0, "y": 0, "width": self._size[0], "height": size["height"],
+                         "scale": scale}}  # fmt: skip
+        more = {"captureBeyondViewport": True, **clip} if whole else {}
+        data = self._ask("Page.captureScreenshot", format="png", **more)["data"]
+        file.write_bytes(base64.b64decode(data))
+
+    def requested(self) -> list[str]:
+        """Addresses that were asked for since the last call."""
+        self.run("return 0;")
+        wanted = "Network.requestWillBeSent"
+        found = [e["params"]["request"]["url"] for e in self._events if e.get("method") == wanted]
+        self._events = [e for e in self._events if e.get("method") != wanted]
+        return found
 
     def click(self, selector: str) -> None:
         """Click on the first element that fits, as a hand would."""
@@ -159,12 +198,19 @@ class Browser:
             self._ask("Input.dispatchKeyEvent", type="keyDown", key=key, **more)
             self._ask("Input.dispatchKeyEvent", type="keyUp", key=key, **more)
 
-    def drag(self, start: tuple[int, int], end: tuple[int, int]) -> None:
-        """Drag with the mouse from one point of the window to another."""
+    def drag(self, *places: tuple[float, float], release: bool = True) -> None:
+        """Drag with the mouse from the first of some points of the window to the last."""
+        start, *others = places
         self._mouse("mouseMoved", *start)
         self._mouse("mousePressed", *start)
-        self._mouse("mouseMoved", *end, held=True)
-        self._mouse("mouseReleased", *end)
+        for place in others:
+            self._mouse("mouseMoved", *place, held=True)
+        if release:
+            self.release(*places[-1])
+
+    def release(self, x: float, y: float) -> None:
+        """Let go of the mouse's button."""
+        self._mouse("mouseReleased", x, y)
 
     def _mouse(self, kind: str, x: float, y: float, *, held: bool = False) -> None:
         pressed = kind != "mouseMoved"

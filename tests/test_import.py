@@ -9,7 +9,7 @@ import pytest
 
 import ctrl_realize as cr
 
-MOST = 36  # names that a user learns
+MOST = 37  # names that a user learns
 
 MODULES = """
 actuators bench data datasets design errors export frequency identification io paper plots report
@@ -22,7 +22,7 @@ unit_step impulse_from_step impulse_from_io impulse_from_frf fit_frf realize est
 fit_output_error fit_state_space scan_orders identify Campaign identify_campaign DelayTracker
 DelayedStateSpace DelaySystem delay exp delayed_ss interconnect extend_control save_model
 load_model
-stepped_sine_frf spectral_frf compare_frf
+stepped_sine_frf spectral_frf compare_frf app
 CtrlRealizeError CtrlRealizeWarning
 """
 

@@ -29,6 +29,7 @@ FLOORS = [
     {"valves", "datasets"},
     {"plots", "export"},
     {"report"},
+    {"interactive"},
     {"cli"},
     {"__main__", "__init__"},
 ]

@@ -17,6 +17,7 @@ from threadpoolctl import threadpool_limits
 from typer.main import get_command
 
 from ..errors import CtrlRealizeError
+from .signatures import app as app_command
 from .signatures import compare, identify, loop, tune, valve
 from .terminal import EXIT_CODES, complain, one_line, plain_warning
 
@@ -28,7 +29,7 @@ app = typer.Typer(
     rich_markup_mode=None,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-for command in (identify, tune, compare, valve, loop):
+for command in (identify, tune, compare, valve, loop, app_command):
     app.command(epilog=EXIT_CODES)(command)
 
 

@@ -12,7 +12,8 @@ from typing import Annotated
 import typer
 
 from . import options as o
-from .files import command
+from .files import check_files, command
+from .loading import loading
 
 
 @command(".identify_command", "run_identify")
@@ -155,3 +156,24 @@ def loop(
       ctrl-realize loop trend.csv -o loop
       ctrl-realize loop trend.csv -o loop --input op --output-column pv --process flow
     """  # noqa: D301  # \b keeps the lines of the examples apart
+
+
+def app(files: o.MaybeFiles = None, *, no_browser: o.NoBrowser = False, port: o.Port = 0) -> None:
+    """Open a page on this machine: drag dead time, lags and gain, and see the loop that they give.
+
+    The page is served to this machine alone, under an address with a token; nothing is loaded from
+    elsewhere, and nothing leaves the machine. Data are read, models fitted and controllers tuned by
+    the functions behind the other commands; the page shows the lines of Python that do the same.
+
+    \b
+    Examples:
+      ctrl-realize app
+      ctrl-realize app step.csv frf.csv
+      ctrl-realize app work.json --no-browser
+    """  # noqa: D301  # \b keeps the lines of the examples apart
+    paths = files or []
+    check_files(paths)
+    with loading():
+        from ..interactive.server import serve
+        from .terminal import say
+    serve(paths, say=say, browser=not no_browser, port=port)

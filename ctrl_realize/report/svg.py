@@ -128,14 +128,12 @@ def envelope(
     edges = np.linspace(scale[0], scale[-1], stretches + 1)[1:-1]
     starts = np.unique(np.concatenate([[0], np.searchsorted(scale, edges)]))
     starts = starts[starts < x.size]
-    kept = []
-    for start, stop in zip(starts, [*starts[1:], x.size], strict=True):
-        values = y[start:stop]
-        if np.isnan(values).all():
-            kept.append(start)
-            continue
-        kept += sorted({start + int(np.nanargmin(values)), start + int(np.nanargmax(values))})
-    chosen = np.unique(np.concatenate([[0], kept, [x.size - 1]])).astype(int)
+    section = np.repeat(np.arange(starts.size), np.diff([*starts, x.size]))
+    kept = [starts[np.isnan(np.fmin.reduceat(y, starts))]]  # sections that are gaps
+    for reduce in (np.fmin.reduceat, np.fmax.reduceat):
+        at = np.flatnonzero(y == reduce(y, starts)[section])
+        kept.append(at[np.unique(section[at], return_index=True)[1]])
+    chosen = np.unique(np.concatenate([[0], *kept, [x.size - 1]])).astype(int)
     return x[chosen], y[chosen]
 
 

@@ -15,6 +15,7 @@ from importlib import import_module
 
 PAGES: dict[str, tuple[str, ...]] = {
     "identify": ("tutorial", "howto/trust_delay", "howto/choose_order"),
+    "app": ("howto/app",),
     "identify_campaign": ("howto/several_records", "howto/cluster"),
     "Campaign": ("howto/several_records",),
     "identification.CampaignRow": ("howto/several_records",),

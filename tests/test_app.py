@@ -1,0 +1,343 @@
+"""The session behind the app: commands in, drawing data out."""
+
+import base64
+import json
+
+import numpy as np
+import pytest
+
+import ctrl_realize as cr
+from ctrl_realize.interactive.session import Session
+from tests.app_records import messy_csv, step_record
+
+
+def opened(name: str, content: bytes, **more):
+    return {"do": "open", "name": name, "content": base64.b64encode(content).decode(), **more}
+
+
+def finished(session: Session):
+    """Compute all that the view needs, as a page does."""
+    answer = session.apply({"do": "view"})
+    while answer["view"]["pending"]:
+        answer = session.apply({"do": "compute"})
+        assert "error" not in answer
+    return answer["view"]
+
+
+def panel(view, part, key):
+    return next(one for one in view[part]["panels"] if one["key"] == key)
+
+
+def layer(drawn, look):
+    return next(one for one in drawn["layers"] if one["look"] == look)
+
+
+@pytest.fixture(scope="module")
+def fitted():
+    session = Session()
+    session.add_record(step_record())
+    return session, finished(session)
+
+
+def test_the_curve_over_the_dead_time_is_the_profile_of_the_fit(fitted):
+    _, view = fitted
+    fit = cr.identify(step_record()).fit
+    curve = layer(panel(view, "model", "criterion"), "model")
+    dead_time, misfit = fit.estimate.profile
+    # in s, the unit of the panel
+    np.testing.assert_allclose(curve["x"], dead_time, rtol=0, atol=1e-9)
+    np.testing.assert_allclose(curve["y"], misfit, rtol=0, atol=1e-9)
+    band = layer(panel(view, "model", "criterion"), "band")
+    assert (band["low"], band["high"]) == pytest.approx(fit.interval, abs=1e-9)
+
+
+@pytest.mark.parametrize("name", ["dead_time", "lag_1", "gain"])
+def test_a_dragged_model_is_the_closed_form_with_that_value(fitted, name):
+    session, _ = fitted
+    fit = cr.identify(step_record()).fit
+    values = {one.name: one.value for one in fit.parameters}
+    moved = {name: 1.3 * values[name]}
+    drag = session.apply({"do": "drag", "values": moved})["drag"]
+    now = values | moved
+    line = drag["lines"]["response"]
+    since = np.maximum(np.array(line["x"]) - 3 - now["dead_time"], 0)
+    base = fit.fitted[0]
+    expected = base + 10 * now["gain"] * -np.expm1(-since / now["lag_1"])
+    # seven digits are drawn; the hold makes no difference for a step at a sample
+    np.testing.assert_allclose(line["y"], expected, rtol=0, atol=2e-5)
+    assert drag["misfit"]["residual"] > 1.1 * drag["misfit"]["best"]
+
+
+def test_a_drag_says_whether_the_record_allows_the_dead_time(fitted):
+    session, _ = fitted
+    low, high = cr.identify(step_record()).fit.interval
+    for value, allowed in ((0.9 * low, False), ((low + high) / 2, True), (1.1 * high, False)):
+        drag = session.apply({"do": "drag", "values": {"dead_time": value}})["drag"]
+        assert drag["misfit"]["allowed"] is allowed
+        assert ("outside of what the record allows" in drag["misfit"]["text"]) is not allowed
+
+
+def test_a_known_parameter_is_that_of_the_fit_and_can_be_freed():
+    session = Session()
+    session.add_record(step_record())
+    finished(session)
+    session.apply({"do": "known", "name": "dead_time", "value": 1.3})
+    view = finished(session)
+    known = cr.identification.ProcessStructure("P1D", fixed={"dead_time": 1.3})
+    expected = cr.identify(step_record(), structures=known).fit
+    shown = {one["name"]: one for one in view["model"]["parameters"]}
+    assert shown["dead_time"]["value"] == 1.3
+    assert shown["dead_time"]["known"]
+    assert shown["lag_1"]["value"] == expected.parameters[2].value
+    assert view["model"]["misfit"]["residual"] > view["model"]["misfit"]["best"]
+    session.apply({"do": "known", "name": "dead_time", "value": None})
+    assert session.state["model"]["known"] == {}
+
+
+COMMANDS = [
+    opened("log.csv", messy_csv()),
+    {"do": "compute"},
+    {"do": "structure", "structure": [1, 1]},
+    {"do": "compute"},
+    {"do": "drag", "values": {"dead_time": 50.0}},
+    {"do": "known", "name": "lag_1", "value": 81.0},
+    {"do": "compute"},
+    {"do": "tune", "rule": "lambda", "limits": [-5, 5]},
+    {"do": "compute"},
+    {"do": "compute"},
+    {"do": "slide", "speed": 0.8},
+    {"do": "strike", "start": 700.0, "stop": 740.0},
+    {"do": "range", "start": 20.0, "stop": 1000.0},
+    {"do": "undo"},
+    {"do": "undo"},
+    {"do": "redo"},
+    {"do": "undo"},
+    {"do": "nonsense"},
+    {"do": "known", "name": "lag_7", "value": 1.0},
+    {"do": "write", "what": "script"},
+    {"do": "write", "what": "st"},
+    {"do": "write", "what": "work"},
+]  # fmt: skip
+
+
+def test_the_same_commands_give_the_same_json():
+    first, second = (
+        [json.dumps(session.apply(one)) for one in COMMANDS] for session in (Session(), Session())
+    )
+    assert first == second
+    assert [k for k, one in enumerate(first) if '"error"' in one[:40]] == [17, 18]
+
+
+def test_the_lines_of_python_give_the_same_numbers(tmp_path, capsys):
+    path = tmp_path / "log.csv"
+    path.write_bytes(messy_csv())
+    session = Session()
+    session.add_file(path)
+    for command in (
+        {"do": "units", "output": "K"},
+        {"do": "strike", "start": 700.0, "stop": 740.0},
+        {"do": "shift", "shift": 6.0},
+        {"do": "range", "start": 20.0, "stop": 1000.0},
+        {"do": "rest", "input": 20.0, "output": 50.0, "start": 120.0},
+        {"do": "structure", "structure": [1, 1]},
+    ):
+        assert "error" not in session.apply(command)
+    finished(session)
+    session.apply({"do": "known", "name": "gain", "value": 0.61})
+    session.apply({"do": "tune", "speed": 0.7, "form": "siemens_pid_compact"})
+    view = finished(session)
+    names: dict = {}
+    exec(view["script"], names)
+    fit = names["system"].fit
+    assert names["record"].input_units + names["record"].output_units == ("%", "K")
+    shown = {one["name"]: one["value"] for one in view["model"]["parameters"]}
+    assert {one.name: one.value for one in fit.parameters} == shown
+    form = names["pid"].as_form("siemens_pid_compact")
+    assert [list(row) for row in form._rows()] == [list(r) for r in view["loop"]["numbers"]["rows"]]
+    assert form.title in capsys.readouterr().out
+
+
+def test_saved_work_opens_as_it_was():
+    session = Session()
+    session.add_record(step_record())
+    session.apply({"do": "range", "start": 1.0, "stop": 25.0})
+    view, saved = finished(session), session.saved()
+    other = Session()
+    assert "error" not in other.apply(opened("work.json", saved.encode()))
+    again = finished(other)
+    for part in ("state", "data", "model", "loop", "script"):
+        assert json.dumps(again[part]) == json.dumps(view[part])
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (lambda text: text[: len(text) // 2], "truncated"),
+        (lambda text: text.replace('"used": true', '"used": false'), "checksum"),
+        (lambda text: text.replace('"schema": 1', '"schema": 7'), "schema 7"),
+    ],
+)
+def test_saved_work_that_was_damaged_is_refused(change, said):
+    session = Session()
+    session.add_record(step_record())
+    answer = Session().apply(opened("work.json", change(session.saved()).encode()))
+    assert said in answer["error"]
+    assert answer["view"]["state"]["records"] == []
+
+
+def test_a_file_that_cannot_be_read_is_a_sentence_and_changes_nothing(fitted):
+    session, _ = fitted
+    before = json.dumps(session.state)
+    answer = session.apply(opened("picture.csv", b"\x89PNG\r\n\x1a\n" + bytes(range(256))))
+    assert answer["error"].startswith("picture.csv")
+    assert json.dumps(session.state) == before
+
+
+def test_columns_that_are_not_told_by_their_names_are_asked_for():
+    rows = "\n".join(f"{k},{k % 7},{int(k > 30)},{k * 0.1}" for k in range(100))
+    session = Session()
+    answer = session.apply(opened("plain.csv", f"one,two,three,four\n{rows}".encode()))
+    listed = answer["view"]["data"]
+    assert listed["records"][0]["bad"]
+    assert "time" in listed["records"][0]["notes"][0]
+    assert [one["name"] for one in listed["preview"]["columns"]] == ["one", "two", "three", "four"]
+    chosen = {"time": 0, "input": 2, "output": 3}
+    answer = session.apply({"do": "read", "options": chosen})
+    assert answer["view"]["data"]["preview"]["taken"] == chosen
+    assert not answer["view"]["data"]["records"][0]["bad"]
+
+
+def test_undo_takes_back_one_change_after_the_other():
+    session = Session()
+    session.add_record(step_record())
+    states = [json.dumps(session.state)]
+    for command in (
+        {"do": "strike", "start": 5.0, "stop": 6.0},
+        {"do": "range", "start": 2.0, "stop": 20.0},
+        {"do": "tune", "kind": "PID", "rule": "amigo"},
+    ):
+        session.apply(command)
+        states.append(json.dumps(session.state))
+    for expected in states[-2::-1]:
+        session.apply({"do": "undo"})
+        assert json.dumps(session.state) == expected
+    for expected in states[1:]:
+        session.apply({"do": "redo"})
+        assert json.dumps(session.state) == expected
+
+
+def test_records_are_layers_and_fitted_together():
+    session = Session()
+    session.add_record(step_record(seed=1))
+    session.add_record(step_record(seed=2))
+    session.apply({"do": "structure", "structure": [1, 1]})
+    view = finished(session)
+    drawn = panel(view, "data", "record-output")
+    assert sum(one["look"] == "plausible" for one in drawn["layers"]) == 1
+    both = cr.identify([step_record(seed=1), step_record(seed=2)], structures=[(1, 1)]).fit
+    shown = {one["name"]: one["value"] for one in view["model"]["parameters"]}
+    assert shown["dead_time"] == both.dead_time
+    session.apply({"do": "use", "index": 0, "used": False})
+    alone = cr.identify(step_record(seed=2), structures=[(1, 1)]).fit
+    view = finished(session)
+    assert {one["name"]: one["value"] for one in view["model"]["parameters"]}[
+        "dead_time"
+    ] == alone.dead_time
+
+
+def test_margins_on_plausible_plants_are_those_of_the_check():
+    record = step_record(noise=0.3)
+    session = Session()
+    session.add_record(record)
+    session.apply({"do": "tune", "speed": 0.9})
+    view = finished(session)
+    system = cr.identify(record)
+    options = view["script"].rpartition("closed_loop_time=")[2].partition(")")[0]
+    with pytest.warns(cr.CtrlRealizeWarning):
+        check = cr.design.pid(system, closed_loop_time=float(options)).check
+    shown = dict(map(tuple, view["loop"]["margins"]))
+    assert float(shown["Ms"]) == pytest.approx(check.margins.ms, rel=5e-3)  # three digits
+    worst = float(shown["Ms on plausible plants"].removeprefix("at most "))
+    # on a grid of frequencies
+    assert worst == pytest.approx(check.worst.ms, rel=0.01)
+    assert view["loop"]["warnings"]
+
+
+def test_plants_that_a_quick_loop_makes_unstable_are_drawn_apart():
+    record = step_record(count=120, dt=0.2, noise=1.5, seed=4)
+    session = Session()
+    session.add_record(record)
+    session.apply({"do": "tune", "speed": 1.0})
+    view = finished(session)
+    unstable = dict(map(tuple, view["loop"]["margins"]))["unstable plants"]
+    count = int(unstable.partition(" ")[0])
+    assert 0 < count < 39
+    drawn = panel(view, "loop", "output-set-point")
+    assert len(layer(drawn, "bad")["many"]) == count
+    assert len(layer(drawn, "plausible")["many"]) == 39 - count
+
+
+def test_noise_at_the_actuator_is_that_of_a_simulated_loop(fitted):
+    _, view = fitted
+    system = cr.identify(step_record())
+    pid = cr.design.pid(system, closed_loop_time=float(
+        view["script"].rpartition("closed_loop_time=")[2].partition(")")[0]))  # fmt: skip
+    loop = cr.design.simulate_loop(
+        system, pid, 40_000, setpoint_step=0.0, noise_std=system.fit.noise_model.std
+    )
+    told = float(view["loop"]["noise"].partition(" by ")[2].partition(" ")[0])
+    # of 40 000 samples, of which many follow one another, the std is known to 2 %
+    assert told == pytest.approx(np.std(loop.output[2000:]), rel=0.03)
+
+
+def test_limits_of_the_output_are_kept(fitted):
+    session = Session()
+    session.add_record(step_record())
+    session.apply({"do": "tune", "limits": [-0.5, 1.9]})
+    view = finished(session)
+    for key in ("output-set-point", "output-load"):
+        drawn = layer(panel(view, "loop", key), "model")["y"]
+        assert -0.5 <= min(drawn) <= max(drawn) <= 1.9
+
+
+def test_a_planned_test_shows_the_interval_that_it_will_give(fitted):
+    session = Session()
+    session.add_record(step_record(count=150, dt=0.2, noise=0.2))
+    session.apply({"do": "plan", "want": "dead_time", "time": 15.0})
+    view = finished(session)
+    plan = cr.experiment.plan(
+        cr.identify(step_record(count=150, dt=0.2, noise=0.2)), want="dead_time", time=15.0
+    )
+    half = (view["plan"]["interval"]["high"] - view["plan"]["interval"]["low"]) / 2
+    assert half == pytest.approx(1.96 * plan.chosen.together, rel=1e-3)  # 1.95996 deviations
+    written = session.apply({"do": "write", "what": "plan"})["written"]
+    assert base64.b64decode(written["content"]).startswith(b"time_s,command")
+
+
+def test_a_measured_response_is_drawn_beside_the_model():
+    frequency = np.geomspace(0.01, 1, 30)
+    s = 2j * np.pi * frequency
+    response = 0.6 * np.exp(-1.2 * s) / (2 * s + 1)
+    columns = np.stack([frequency, np.abs(response), np.degrees(np.angle(response))], axis=1)
+    rows = [",".join(map(str, row)) for row in columns.tolist()]
+    text = "frequency_hz,magnitude,phase_deg\n" + "\n".join(rows)
+    other = Session()
+    other.add_record(step_record())
+    other.apply({"do": "structure", "structure": [1, 1]})
+    assert "error" not in other.apply(opened("sweep.csv", text.encode()))
+    assert finished(other)["data"]["frf"] == "sweep.csv"
+    figures = {one["key"]: one["svg"] for one in other.apply({"do": "figures"})["figures"]}
+    assert set(figures) == {"residuals", "plausible", "frf"}
+    assert all("<svg" in one for one in figures.values())
+
+
+@pytest.mark.parametrize(
+    ("what", "text"),
+    [
+        ("report", b"<!DOCTYPE html>"), ("model", b'"ctrl_realize model"'), ("c", b"_step("),
+        ("st", b"FUNCTION_BLOCK"), ("python", b"class "), ("matlab", b"pid2("),
+    ],
+)  # fmt: skip
+def test_what_is_written_is_what_its_name_says(fitted, what, text):
+    written = fitted[0].apply({"do": "write", "what": what})["written"]
+    assert text in base64.b64decode(written["content"])
