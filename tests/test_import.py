@@ -9,7 +9,7 @@ import pytest
 
 import ctrl_realize as cr
 
-MOST = 37  # names that a user learns
+MOST = 36  # names that a user learns
 
 MODULES = """
 actuators bench data datasets design errors export frequency identification io paper plots report
