@@ -1,4 +1,4 @@
-"""The command line: ``ctrl-realize identify``, ``tune``, ``compare``, ``valve`` and ``loop``."""
+"""The command line: ``look``, ``identify``, ``tune``, ``compare``, ``valve`` and ``loop``."""
 
 from __future__ import annotations
 

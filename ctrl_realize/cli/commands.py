@@ -18,7 +18,7 @@ from typer.main import get_command
 
 from ..errors import CtrlRealizeError
 from .signatures import app as app_command
-from .signatures import compare, identify, loop, tune, valve
+from .signatures import compare, identify, look, loop, tune, valve
 from .terminal import EXIT_CODES, complain, one_line, plain_warning
 
 app = typer.Typer(
@@ -29,7 +29,7 @@ app = typer.Typer(
     rich_markup_mode=None,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-for command in (identify, tune, compare, valve, loop, app_command):
+for command in (look, identify, tune, compare, valve, loop, app_command):
     app.command(epilog=EXIT_CODES)(command)
 
 

@@ -57,8 +57,8 @@ def command(module: str, function: str) -> Callable[[Callable[..., None]], Calla
             for group in groups:
                 options = {name: values.pop(name) for name in GROUPS[group]}
                 values[group] = given(**options)
-            folder, overwrite = values["folder"], values.pop("overwrite")
-            report = not values.pop("no_report")
+            folder, overwrite = values.get("folder"), values.pop("overwrite", False)
+            report = not values.pop("no_report", False)
             named = [value for name, value in values.items() if name != "folder"]
             several = [value if isinstance(value, list) else [value] for value in named]
             paths = [path for each in several for path in each if isinstance(path, Path)]

@@ -16,6 +16,23 @@ from .files import check_files, command
 from .loading import loading
 
 
+@command(".look_command", "run_look")
+def look(
+    file: Annotated[Path, typer.Argument(help="Record: CSV, TSV, LVM, .xlsx, .mat, .npz, ...")],
+    *,
+    record: o.Given,
+) -> None:
+    """Show which column of a file is taken as what, and the record that it gives.
+
+    With the options of the other commands that say otherwise. What was guessed is told on stderr.
+
+    \b
+    Examples:
+      ctrl-realize look log.csv
+      ctrl-realize look log.csv --input valve --output-column level --time-unit ms
+    """  # noqa: D301  # \b keeps the lines of the examples apart
+
+
 @command(".identify_command", "run_identify")
 def identify(
     files: o.Files,

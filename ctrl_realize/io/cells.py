@@ -9,18 +9,32 @@ from typing import Literal
 
 from .._facts import facts
 from ..errors import FileFormatError
+from .units import stands_alone
 
 DELIMITERS = ("\t", ";", "|", ",", " ")
+_GROUPS = {"": "", ",": ",", ".": r"\.", "'": "['’]", " ": "[ \xa0\u202f]"}
+"""Thousands separators, as patterns."""
+
+
+def _number(decimal: str, group: str) -> re.Pattern[str]:
+    """Pattern of a number; each text matches in one way only, or time grows with its length."""
+    whole = rf"(?:\d{{1,3}}(?:{group}\d{{3}})+|\d+)" if group else r"\d+"
+    ends = r"\.\d*" if decimal == "." else r",\d+"
+    return re.compile(rf"[+-]?({whole}({ends})?|[{decimal}]\d+)([eE][+-]?\d+)?")
+
+
 NUMBER = {
-    # Each text matches in one way only: with two ways, time grows with the square of its length.
-    ".": re.compile(r"[+-]?(\d+(\.\d*)?|\.\d+)([eE][+-]?\d+)?"),
-    ",": re.compile(r"[+-]?(\d+(,\d+)?|,\d+)([eE][+-]?\d+)?"),
+    decimal + mark: _number(decimal, group)
+    for mark, group in _GROUPS.items()
+    for decimal in ".,"
+    if mark != decimal
 }
+"""Patterns of numbers by notation: decimal sign, then the separator of thousands if any."""
 _CLOCK = r"\d{1,3}:\d{2}(:\d{2})?([.,]\d+)?( ?[AaPp]\.?[Mm]\.?)?( ?(Z|UTC|[+-]\d{2}:?\d{2}))?"
 _MONTH = r"[^\W\d_]{3,9}\.?"
 _DATE = rf"(\d{{1,4}}[-/.]\d{{1,2}}[-/.]\d{{1,4}}\.?|\d{{1,2}}[-/. ]{_MONTH}[-/. ]\d{{2,4}})"
 _TIME = re.compile(rf"{_CLOCK}|{_DATE}([ T]+{_CLOCK})?")
-_PERCENT = re.compile(r"(?P<number>[+-]?[\d.,]+([eE][+-]?\d+)?) ?%")
+_MEASURED = re.compile(r"([+-]?[\d.,]+(?:[eE][+-]?\d+)?)[ \xa0]?([^\W\d]\S{0,7}|[%°]\S{0,3})")
 _THOUSANDS = re.compile(r"[+-]?[1-9]\d{0,2},\d{3}")
 _WORDS = facts("io/words.toml")
 MISSING = frozenset(_WORDS["cells"]["missing"])
@@ -54,33 +68,36 @@ def refuse_thousands(path: Path, rows: list[list[str]], delimiter: str) -> None:
     ``"1,234"`` between commas, or together with ``999`` in its column: this is ambiguous. One cell
     like ``0,123``, ``12,5`` or ``1234,567`` anywhere shows that they are decimals.
     """
-    numbers = [[cell for cell in row if NUMBER[","].fullmatch(cell)] for row in rows]
-    commas = [cell for row in numbers for cell in row if "," in cell]
-    if not commas or not all(_THOUSANDS.fullmatch(cell) for cell in commas):
+    commas = {cell for row in rows for cell in row if "," in cell and NUMBER[","].fullmatch(cell)}
+    if not commas or not all(map(_THOUSANDS.fullmatch, commas)):
         return
-    columns = zip(*(row for row in rows if len(row) == len(rows[0])), strict=True)
     mixed = any(
-        any("," in cell for cell in column)
-        and any(cell.isdecimal() and len(cell) <= 3 for cell in column)
-        for column in columns
+        commas.intersection(column) and any(one.isdecimal() and len(one) <= 3 for one in column)
+        for column in zip(*(row for row in rows if len(row) == len(rows[0])), strict=True)
     )
     if delimiter == "," or mixed:
         raise FileFormatError(
-            f"{path}: {commas[0]!r} may be {commas[0].replace(',', '.')} or "
-            f"{commas[0].replace(',', '')}; give decimal=',' if the comma is the decimal "
-            "mark; otherwise write the numbers without thousands separators"
+            f"{path}: {min(commas)!r} may be {min(commas).replace(',', '.')} or "
+            f"{min(commas).replace(',', '')}; give decimal=',' if the comma is the decimal "
+            "mark, thousands=',' if it separates thousands"
         )
 
 
-def without_percent(cell: str) -> str:
-    """Return the number of a cell such as ``12.5 %``; other cells as they are."""
-    found = _PERCENT.fullmatch(cell)
-    return found["number"] if found else cell
+def measured(cell: str) -> tuple[str, str]:
+    """Number and unit of a cell such as ``12.5 %`` or ``61.0 °C``; other cells have no unit."""
+    found = _MEASURED.fullmatch(cell)
+    return (found[1], found[2]) if found and stands_alone(found[2]) else (cell, "")
 
 
-def kind_of(cell: str, decimal: str) -> Literal["number", "time", "missing", "text"]:
+def number_of(text: str, notation: str) -> float:
+    """Value of a text that matches the pattern of a notation."""
+    plain = "".join(text.split()).replace("’", "'").replace(notation[1:] or " ", "")
+    return float(plain.replace(",", "."))
+
+
+def kind_of(cell: str, notation: str) -> Literal["number", "time", "missing", "text"]:
     """Return the kind of a cell."""
-    if NUMBER[decimal].fullmatch(without_percent(cell)):
+    if NUMBER[notation].fullmatch(measured(cell)[0]):
         return "number"
     if cell.lower() in _NO_VALUES:
         return "missing"

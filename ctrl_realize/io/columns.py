@@ -8,7 +8,7 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 
 from ..errors import DataError, OptionError
-from .cells import NUMBER, without_percent
+from .cells import kind_of
 from .tables import Table
 from .units import split_unit
 
@@ -111,8 +111,7 @@ def holds_numbers(table: Table, index: int) -> bool:
     cells = table.columns[index].first(100)
     if cells.dtype.kind in "biufc":
         return True
-    first = [without_percent(str(cell).strip()) for cell in cells]
-    return any(NUMBER[table.decimal].fullmatch(cell) for cell in first)
+    return any(kind_of(str(cell).strip(), table.decimal) == "number" for cell in cells)
 
 
 def has_header(table: Table) -> bool:

@@ -16,7 +16,9 @@ _MOST_JOINED = 10
 """Largest number of lines of a quoted cell; a quote that is not closed by then is a stray one."""
 
 _LINE = re.compile(r"([^\r\n]*)(\r\n|\n|\r|$)")
-_STARTERS = frozenset(DELIMITERS) - {" "}
+_START = rf"(^|[{''.join(DELIMITERS).strip(' ')}\r\n]) *"
+_QUOTED = re.compile(rf'{_START}"(?:[^"]|"")*"(?!")')
+_OPEN = re.compile(rf'{_START}"')
 
 
 @dataclass(frozen=True)
@@ -72,13 +74,5 @@ def _joined(lines: list[Line], skip: int, text: str) -> list[Line]:
 
 
 def _stays_open(line: str) -> bool:
-    """Whether a quoted cell is not closed within a line."""
-    inside, begins = False, True
-    for place, letter in enumerate(line):
-        if letter == '"':
-            # a quote inside a cell is doubled, and one in an unquoted cell is a character
-            inside = not inside and (begins or line[place - 1 : place] == '"')
-            begins = False
-        elif not inside:
-            begins = letter in _STARTERS or letter in "\r\n" or (begins and letter == " ")
-    return inside
+    """Whether a quoted cell is not closed within a line; a quote inside a cell is doubled."""
+    return bool(_OPEN.search(_QUOTED.sub(r"\1", line)))

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import os
 from dataclasses import replace
+from importlib import import_module
+from typing import cast
 
 from ..errors import FileFormatError
 from .checks import read_head, usable_file
 from .containers.excel import is_workbook, sheet_as_text
 from .tables import Table
 from .text.delimited import read_delimited
-from .text.source import TextSource
+from .text.source import TextSource, keyed_as_table
 from .text_options import TextOptions
 
 _NOT_READABLE = {
@@ -22,6 +24,14 @@ _NOT_READABLE = {
     b"\x80\x04\x95": "a Python pickle: these can run code when read and are refused",
     b"%PDF": "a PDF document",
 }
+_READERS = {
+    "npz:read_npz": (b"PK\x03\x04", b"\x93NUMPY"),
+    "parquet:read_parquet": (b"PAR1",),
+    "tdms:read_tdms": (b"TDSm",),
+    "mat:read_hdf5": (b"\x89HDF",),
+    "mat:read_mat": (b"MATLAB 5.0 MAT-file", b"MATLAB 7.3 MAT-file"),
+}
+"""Readers by the first bytes of a file; each needs its own heavy library, loaded on demand."""
 
 
 def read_table(
@@ -51,7 +61,6 @@ def read_table(
     ------
     MissingFileError, FileFormatError, DataError
     """
-    # each reader needs its own heavy library, which is loaded on demand
     file = usable_file(path, max_bytes)
     head = read_head(file, 128)
     for mark, what in _NOT_READABLE.items():
@@ -61,27 +70,9 @@ def read_table(
         sheet = sheet_as_text(file, variable, max_bytes)
         plain = replace(options, delimiter="\t", decimal=".", encoding="utf-8", comment=None)
         return read_delimited(sheet, plain)
-    if head.startswith((b"PK\x03\x04", b"\x93NUMPY")):
-        from .containers.npz import read_npz
-
-        return read_npz(file, variable=variable, max_bytes=max_bytes)
-    if head.startswith(b"PAR1"):
-        from .containers.parquet import read_parquet
-
-        return read_parquet(file, max_bytes=max_bytes)
-    if head.startswith(b"TDSm"):
-        from .containers.tdms import read_tdms
-
-        return read_tdms(file, variable=variable, max_bytes=max_bytes)
-    if head.startswith(b"\x89HDF"):
-        from .containers.mat import read_hdf5
-
-        return read_hdf5(file, variable=variable, max_bytes=max_bytes)
-    if (
-        head.startswith((b"MATLAB 5.0 MAT-file", b"MATLAB 7.3 MAT-file"))
-        or file.suffix.lower() == ".mat"
-    ):
-        from .containers.mat import read_mat
-
-        return read_mat(file, variable=variable, max_bytes=max_bytes)
-    return read_delimited(TextSource(file), options)
+    kind = next((kind for kind, marks in _READERS.items() if head.startswith(marks)), "")
+    if kind or file.suffix.lower() == ".mat":
+        module, name = (kind or "mat:read_mat").split(":")
+        reader = getattr(import_module(f".containers.{module}", __package__), name)
+        return cast("Table", reader(file, variable=variable, max_bytes=max_bytes))
+    return read_delimited(keyed_as_table(TextSource(file)), options)

@@ -14,16 +14,16 @@ import numpy as np
 
 from .._checks import one_of, positive
 from ..data import Record
+from ..data.samples import Samples
 from ..errors import DataError, OptionError, TimeAxisError
 from .checks import MAX_BYTES
 from .columns import Selector, find_columns
 from .read import read_table
-from .signals.advice import explained, tell_counters
+from .signals.advice import explained
 from .signals.long_format import long_table, tags_as_columns
 from .signals.names import choose_columns
 from .signals.quality import Rules, rules_of
 from .signals.samples import (
-    Samples,
     check_part,
     labels_of,
     long_samples,
@@ -52,6 +52,7 @@ def read_record(
     time_zone: str | None = None,
     delimiter: str = "auto",
     decimal: str = "auto",
+    thousands: str | None = "auto",
     encoding: str = "auto",
     comment: str | None = "auto",
     header: bool | Literal["auto"] = "auto",
@@ -59,7 +60,7 @@ def read_record(
     variable: str | None = None,
     start: Any = None,
     stop: Any = None,
-    missing: Literal["refuse", "keep", "hold"] = "refuse",
+    missing: Literal["auto", "refuse", "keep", "hold"] = "auto",
     na_values: str | float | Sequence[str | float] | None = None,
     quality: str | int | None = "auto",
     good: str | float | Sequence[str | float] | None = None,
@@ -104,6 +105,8 @@ def read_record(
         Column separator, such as ``,`` or ``;`` or tab; ``"auto"``: detected.
     decimal : str, optional
         Decimal sign, ``.`` or ``,``; ``"auto"``: detected.
+    thousands : str or None, optional
+        Separator of thousands, such as ``,`` in ``1,234.5``; ``"auto"``: detected.
     encoding : str, optional
         Encoding of text; ``"auto"``: detected.
     comment : str or None, optional
@@ -119,12 +122,14 @@ def read_record(
         First time to use, in s or as a date.
     stop : float, str or datetime, optional
         Last time to use, in s or as a date.
-    missing : {"refuse", "keep", "hold"}, optional
-        Bad cells, gaps and irregular times are refused, kept as missing samples, or kept with an
-        input that holds its last value meanwhile. Bad cells have no value (empty, ``NaN``, ``Bad``,
-        ``I/O Timeout``, ...), or a bad quality; times are irregular if their stamps repeat, too.
-        ``"hold"`` is for inputs that were only stored when they changed, as historians do; with
-        gaps and irregular stamps it is always done, see `Record.from_samples`.
+    missing : {"auto", "refuse", "keep", "hold"}, optional
+        Bad cells, gaps and irregular times are kept as missing samples and told, refused, kept, or
+        kept with an input that holds its last value meanwhile. Bad cells have no value (empty,
+        ``NaN``, ``Bad``, ``I/O Timeout``, ...), or a bad quality; times are irregular if their
+        stamps repeat, too. ``"auto"`` holds an input that has the same value behind a gap, and
+        refuses a gap in time in which it moved. ``"hold"`` is for inputs that were only stored when
+        they changed, as historians do; with gaps and irregular stamps it is always done, see
+        `Record.from_samples`.
     na_values : str, float or sequence of them, optional
         Further words and numbers without a value, such as -9999.
     quality : str or int, optional
@@ -135,8 +140,9 @@ def read_record(
         Good qualities. Default: all but ``Bad...`` and the bad codes of OPC DA (below 64), OPC UA
         (bit 31), Ignition (500, ...) and AVEVA PI (states such as 246).
     wrap : float, optional
-        Number of values of a counter that starts again, whose turns are joined. Such as 4096 for
-        12 bits or 360 for an angle; the turns of the output are joined as by `numpy.unwrap`.
+        Number of values of a counter that starts again, such as 4096 for 12 bits or 360 for an
+        angle; the turns of the output are joined as by `numpy.unwrap`. Default: if the output jumps
+        as a counter does, which is told; 0: it is none.
     resample : bool, optional
         Resample jittering samples onto a uniform time axis, see `Record.resampled`.
     rest : (float, float), optional
@@ -251,11 +257,12 @@ class _Reading(SimpleNamespace):
 
     def __init__(self, **given: Any) -> None:
         super().__init__(**given)
+        self.treatment = one_of(self.missing, "missing", ("auto", "refuse", "keep", "hold"))
         if self.dt is not None:
             positive(self.dt, "dt", "sample time in s")
-        if self.wrap is not None:
+        if self.wrap:
             positive(self.wrap, "wrap", "number of values of a counter")
-        if self.treatment != "refuse" and self.resample:
+        if self.treatment not in ("refuse", "auto") and self.resample:
             raise OptionError(
                 f"missing={self.missing!r} and resample=True exclude each other: expected one of "
                 "them"
@@ -267,12 +274,6 @@ class _Reading(SimpleNamespace):
         _ = self.text, self.rules  # which are checked as well
 
     @property
-    def treatment(self) -> str:
-        """How missing samples are treated."""
-        treatment: str = one_of(self.missing, "missing", ("refuse", "keep", "hold"))
-        return treatment
-
-    @property
     def clock(self) -> Clock:
         """How to read time."""
         return Clock(self.time_unit, self.time_format, self.time_zone)
@@ -281,47 +282,49 @@ class _Reading(SimpleNamespace):
     def text(self) -> TextOptions:
         """How to read text."""
         return TextOptions(
-            self.delimiter, self.decimal, self.encoding, self.comment, self.header, self.skip_rows
+            self.delimiter,
+            self.decimal,
+            self.encoding,
+            self.comment,
+            self.header,
+            self.skip_rows,
+            self.thousands,
         )
 
     @cached_property
     def rules(self) -> Rules:
         """What counts as a missing sample."""
-        return rules_of(self.treatment != "refuse", self.na_values, self.quality, self.good)
+        kept = self.treatment != "refuse" and not self.resample
+        return rules_of(kept, self.na_values, self.quality, self.good)
 
 
 def _record(table: Table, how: _Reading, name: str, taken: Sequence[int] = ()) -> Record:
     """Make a record of a table; columns that are `taken` are no signals."""
-    samples, labels, dated = _samples(table, how, taken)
+    samples, labels = _samples(table, how, taken)
     labels["name"] = name
-    if how.wrap is not None:
-        samples = samples.joined(how.wrap)
-    else:
-        tell_counters(table.path, samples)
+    samples, treatment = samples.without_turns(table.path, how.wrap), how.treatment
     try:
-        record = samples.record(
-            labels, keep=how.rules.keep, holds=how.treatment == "hold", resample=how.resample
-        )
+        if treatment == "auto" and not how.resample:
+            samples, treatment = samples.as_found(table.path)
+        record = samples.record(labels, treatment=treatment, resample=how.resample)
     except TimeAxisError as error:
-        raise TimeAxisError(explained(error, table, samples, dated)) from error
+        raise TimeAxisError(explained(error, table, samples)) from error
     except DataError as error:
         raise DataError(f"{table.path}: {error}") from error
     return record if how.rest is None else record.with_baseline(*how.rest)
 
 
-def _samples(
-    table: Table, how: _Reading, taken: Sequence[int]
-) -> tuple[Samples, dict[str, Any], bool]:
-    """Samples, their labels, and whether the clock shows dates of no known zone."""
+def _samples(table: Table, how: _Reading, taken: Sequence[int]) -> tuple[Samples, dict[str, Any]]:
+    """Samples and their labels."""
     long = long_table(table, how.time, (how.input, how.output))
     if long is not None:
-        axis = time_axis(table, long.time, how.clock)
+        axis = time_axis(table, long.time, how.clock, long.date)
         tags = tags_as_columns(table, long)
         parts = choose_columns(tags, None, how.input, how.output, 1.0)
         span = span_of(how.start, how.stop, axis)
         samples = long_samples(table, long, parts, axis, span, how.rules)
         check_part(table.path, span, samples.time, axis)
-        return samples, labels_of(tags, parts, axis.unit), axis.may_be_set
+        return samples, labels_of(tags, parts, axis.unit)
     taken = [*taken, *how.rules.columns(table)]
     parts = choose_columns(table, how.time, how.input, how.output, how.dt, taken)
     axis, rows = wide_axis(table, parts, how.clock)
@@ -329,7 +332,7 @@ def _samples(
     inside = (axis.seconds >= span[0]) & (axis.seconds <= span[1])
     check_part(table.path, span, axis.seconds[inside], axis)
     samples = wide_samples(table, parts, axis.seconds[inside], rows[inside], how.rules)
-    return samples, labels_of(table, parts, axis.unit), axis.may_be_set
+    return samples, labels_of(table, parts, axis.unit)
 
 
 def _tests(

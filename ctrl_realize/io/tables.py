@@ -11,9 +11,11 @@ import numpy as np
 
 from ..errors import DataError
 from ..numerics.arrays import BoolArray, FloatArray
-from .cells import BAD_VALUES, MISSING, NUMBER, STATES, without_percent
+from .cells import BAD_VALUES, MISSING, NUMBER, STATES, measured, number_of
 
 _NOTHING = np.empty(0)
+_LONGEST_WORD = 60
+"""Letters of the longest word in place of a value."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,6 +36,12 @@ class Column:
     unit: str
     cells: np.ndarray[Any, np.dtype[Any]]
 
+    @property
+    def told_unit(self) -> str:
+        """Unit of the header, or of the first cell."""
+        cells = [] if self.unit else self.first(1)
+        return measured(str(cells[0]).strip())[1] if len(cells) else self.unit
+
     def first(self, count: int) -> np.ndarray[Any, np.dtype[Any]]:
         """Return the first cells."""
         return self.cells[:count]
@@ -50,7 +58,7 @@ class Table:
     constants : mapping of str to float
         Single numbers beside the columns (``dt`` in ``.npz`` and ``.mat``).
     decimal : str
-        Decimal sign of cells that are still text.
+        Notation of cells that are still text, see `cells.NUMBER`.
     place : callable
         Describes a row for a message: ``"line 17"``.
     """
@@ -154,49 +162,59 @@ class Table:
     def _parsed(
         self, index: int, keep_missing: bool, words: frozenset[str], ignored: BoolArray | None
     ) -> FloatArray:
-        pattern = NUMBER[self.decimal]
-        cells = [str(cell).strip() for cell in self.columns[index].cells]
-        empty = MISSING | BAD_VALUES | {word.strip().lower() for word in words}
-        positions = self._positions(cells, empty)
-        values = np.empty(len(cells))
-        for row, text in enumerate(cells):
-            missing = text.lower() in empty
-            if (missing and keep_missing) or (ignored is not None and ignored[row]):
-                values[row] = np.nan
-                continue
-            number = positions.get(text.lower()) or without_percent(text)
-            if missing or not pattern.fullmatch(number):
-                self._refuse(index, row, text, missing=missing)
-            values[row] = float(number.replace(",", "."))
-        self._check_percents(index, cells, values)
-        return values
+        import pandas as pd
 
-    def _check_percents(self, index: int, cells: list[str], values: FloatArray) -> None:
-        """Refuse a column whose numbers have two units; a zero is the same in both."""
-        marked = np.array([cell.endswith("%") for cell in cells], dtype=bool)
-        plain = np.isfinite(values) & (values != 0) & ~marked
-        if marked.any() and plain.any():
+        # cells that are equal are read once
+        texts = [str(cell).strip() for cell in self.columns[index].cells]
+        place, kinds = pd.factorize(np.array(texts, dtype=object))
+        low = [kind[:_LONGEST_WORD].lower() for kind in kinds]
+        missing = MISSING | BAD_VALUES | {word.strip().lower() for word in words}
+        empty = np.array([word in missing for word in low], dtype=bool)
+        positions = self._positions(set(low) - missing)
+        parts = [measured(positions.get(word, kind)) for word, kind in zip(low, kinds, strict=True)]
+        good = np.array([NUMBER[self.decimal].fullmatch(one) for one, _ in parts], dtype=bool)
+        good &= ~empty
+        bad = ~(good | empty)[place] if keep_missing else ~good[place]
+        if ignored is not None:
+            bad &= ~ignored
+        if bad.any():
+            row = int(np.argmax(bad))
+            self._refuse(index, row, kinds[place[row]], missing=bool(empty[place[row]]))
+        values = np.full(len(kinds), np.nan)
+        values[good] = [number_of(parts[k][0], self.decimal) for k in np.flatnonzero(good)]
+        found = values[place] if ignored is None else np.where(ignored, np.nan, values[place])
+        self._check_units(index, np.array([unit for _, unit in parts], dtype=object)[place], found)
+        return np.asarray(found)
+
+    def _check_units(
+        self, index: int, units: np.ndarray[Any, np.dtype[Any]], values: FloatArray
+    ) -> None:
+        """Refuse a column whose numbers have two units; a zero is the same in all."""
+        seen = np.isfinite(values) & (values != 0)
+        kinds = sorted(set(units[seen]), reverse=True)
+        if len(kinds) > 1:
+            first, other = (np.flatnonzero(seen & (units == kind)) for kind in kinds[:2])
             shown = " and ".join(
-                f"{cells[row]!r} ({self.place(row)})"
-                for row in (int(np.argmax(marked)), int(np.argmax(plain)))
+                f"{str(self.columns[index].cells[at[0]])!r} ({self.place(int(at[0]))})"
+                for at in (first, other)
             )
+            name = "a percent sign" if kinds[0] == "%" else f"the unit {kinds[0]!r}"
             raise DataError(
-                f"{self.path}: {self.title(index)} has {np.sum(marked)} cells with a percent sign "
-                f"and {np.sum(plain)} without, such as {shown}; expected one unit in all of them "
-                "(in a spreadsheet: one number format for the column)"
+                f"{self.path}: {self.title(index)} has {first.size} cells with {name} and "
+                f"{other.size} without, such as {shown}; expected one unit in all of them (in a "
+                "spreadsheet: one number format for the column)"
             )
 
     @staticmethod
-    def _positions(cells: list[str], empty: frozenset[str]) -> Mapping[str, str]:
+    def _positions(found: set[str]) -> Mapping[str, str]:
         """Numbers of the positions of a switch, if the cells hold nothing else."""
-        found = {cell.lower() for cell in cells} - empty
         return STATES if found and found <= STATES.keys() else {}
 
     def _refuse(self, index: int, row: int, text: str, *, missing: bool) -> NoReturn:
         what = "a value is missing" if missing else "is not a number"
         advice = "; try decimal=',' or '.'" if "," in text or "." in text else ""
         if "," in text and "." in text:
-            advice = "; write it without thousands separators"
+            advice = f"; thousands={min(',.', key=text.find)!r} if it separates thousands"
         if missing:
             advice = "; missing='keep' keeps gaps in a record"
         elif not advice and not any(letter.isdigit() for letter in text):

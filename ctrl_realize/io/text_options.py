@@ -8,6 +8,7 @@ from .._checks import integer
 from ..errors import OptionError
 
 _IN_NUMBERS = {"delimiter": frozenset("0123456789eE"), "comment": frozenset("0123456789eE.,+-")}
+_THOUSANDS = ("", ",", ".", "'", " ")
 
 
 @dataclass(frozen=True)
@@ -20,19 +21,29 @@ class TextOptions:
     comment: str | None = "auto"
     header: bool | str = "auto"
     skip_rows: int = 0
+    thousands: str | None = "auto"
+
+    @property
+    def notations(self) -> list[str]:
+        """Notations of numbers that are tried, see `cells.NUMBER`."""
+        decimals = ".," if self.decimal == "auto" else self.decimal
+        marks = _THOUSANDS if self.thousands == "auto" else (self.thousands or "",)
+        return [sign + mark for mark in marks for sign in decimals if mark != sign]
 
     def __post_init__(self) -> None:
-        for name, value in (
-            ("delimiter", self.delimiter),
-            ("decimal", self.decimal),
-            ("encoding", self.encoding),
-        ):
-            if not isinstance(value, str):
-                raise OptionError(f"{name}={value!r}; expected text, such as 'auto'")
+        for name in ("delimiter", "decimal", "encoding"):
+            if not isinstance(getattr(self, name), str):
+                raise OptionError(f"{name}={getattr(self, name)!r}; expected text, such as 'auto'")
         if self.delimiter != "auto" and (len(self.delimiter) != 1 or self.delimiter in "\r\n\"'"):
             raise OptionError(f"delimiter={self.delimiter!r} must be one character or 'auto'")
         if self.decimal not in ("auto", ".", ","):
             raise OptionError(f"decimal={self.decimal!r} must be '.', ',' or 'auto'")
+        known = (*_THOUSANDS, "auto", None)
+        if self.thousands not in known or self.thousands == self.decimal != "auto":
+            raise OptionError(
+                f"thousands={self.thousands!r}; expected ',', '.', ' ' or \"'\", another sign than "
+                "the decimal one, 'auto' or None"
+            )
         comment: object = self.comment
         if comment not in ("auto", None) and not (isinstance(comment, str) and len(comment) == 1):
             raise OptionError(f"comment={self.comment!r} must be one character, None or 'auto'")

@@ -8,8 +8,9 @@ from typing import Any, NamedTuple, NoReturn
 import numpy as np
 
 from .._wording import ASSUMED
-from ..errors import DataError, OptionError
+from ..errors import DataError, DataWarning, OptionError, warn_caller
 from ..numerics.arrays import FloatArray
+from ..numerics.signals.counters import clock_change
 from .columns import holds_numbers
 from .tables import Table
 from .text.dates import have_offset, in_utc, stamps_of
@@ -23,9 +24,10 @@ _TICKS = {"ms": 1e3, "us": 1e6, "ns": 1e9}
 # years 2000 to 2060 in days, as counted by Excel and by MATLAB's datenum
 _DAY_COUNTS = ((36526.0, 58440.0), (730486.0, 752400.0))
 # 12:34, 12:34.5, 12:34:56 and 12:34:56.789
-_CLOCK = r"(\d{1,3}):(\d{2}(?:\.\d*)?)(?::(\d{2}(?:\.\d*)?))?"
-# seconds in each number of a clock, by the unit of the first
-_FACTORS = {"h": (3600, 60, 1), "min": (60, 1, 0)}
+_SHORT = r"\d{1,3}:\d{2}(\.\d*)?"
+_CLOCK = rf"{_SHORT}|\d{{1,3}}:\d{{2}}:\d{{2}}(\.\d*)?"
+_PART = re.compile(r"(?<=:\d\d)[,;:](?=\d{3,}$)")
+"""Sign before a part of a second, as some controllers write it."""
 _FIRST = {"hh:mm": "h", "h:mm": "h", "h:min": "h", "mm:ss": "min", "m:ss": "min", "min:s": "min"}
 _HALF_AN_HOUR = 1 / 48
 _AS_STATED = 0.01  # relative difference of the usual step from the sample time in the header
@@ -43,11 +45,6 @@ class TimeAxis(NamedTuple):
     doubt: str = ""
     unit: str = ""
     zone: str | None = None
-
-    @property
-    def may_be_set(self) -> bool:
-        """Whether the column has dates and times of a clock that may be put forward and back."""
-        return self.start is not None and self.zone is None
 
 
 class Clock(NamedTuple):
@@ -84,7 +81,7 @@ def time_axis(table: Table, index: int, clock: Clock, date: int | None = None) -
     unit, time_format, zone = clock
     if cells.dtype.kind in "mM":
         return _since_first(table, index, cells, zone)
-    named = table.columns[index].unit or unit_named(table.columns[index].name)
+    named = table.columns[index].told_unit or unit_named(table.columns[index].name)
     if time_format is not None or not holds_numbers(table, index):
         unit_used = named if unit == "auto" else unit
         stamps, doubt = _parsed_dates(table, index, time_format, unit_used, date)
@@ -92,19 +89,14 @@ def time_axis(table: Table, index: int, clock: Clock, date: int | None = None) -
         return _since_first(table, index, stamps, shown)._replace(doubt=doubt, zone=zone)
     if zone is not None:
         _refuse_zone(table, index, zone)
-    unknown = unit == "auto" and not named
-    if unknown:
-        _check_epoch(table, index, cells)
     if unit == "auto":
-        unit = named or _stated_unit(table, index)
+        unit = named or _epoch_unit(table, index) or _stated_unit(table, index)
     used = checked_time_unit(unit or "s")
     if cells.dtype.kind in "iu" and cells.size and int(np.max(cells)) > _EXACT_INTEGERS:
         # nanoseconds since 1970 do not fit into a double, but their differences do
         values = (cells - cells[0]).astype(np.float64)
     else:
         values = table.numbers(index)
-        if unknown:
-            _check_day_count(table, index, values)
     return TimeAxis(to_seconds(values, used), unit=used if unit else ASSUMED)
 
 
@@ -127,36 +119,30 @@ def _stated_unit(table: Table, index: int) -> str:
     )
 
 
-def _check_epoch(table: Table, index: int, cells: np.ndarray[Any, Any]) -> None:
-    """Refuse a clock in ms or finer since 1970 that would be taken for seconds."""
-    try:
-        first = float(cells[0])
-    except (ValueError, TypeError, OverflowError):
-        return  # reported with its line when the whole column is read
-    units = [unit for unit, ticks in _TICKS.items() if _YEAR_1990 <= first / ticks < _YEAR_2100]
-    if units:
-        raise OptionError(
-            f"{table.path}: {table.title(index)} begins at {first:.6g}, which looks like a "
-            f"clock of {units[0]} since 1970; give time_unit={units[0]!r}, or time_unit='s' "
-            "if it is not"
-        )
+def _epoch_unit(table: Table, index: int) -> str:
+    """Unit of a clock in ms or finer since 1970, or in days as in a spreadsheet; otherwise empty.
 
-
-def _check_day_count(table: Table, index: int, values: FloatArray) -> None:
-    """Refuse dates in days, as in a spreadsheet, that would be taken for seconds.
-
-    A clock in seconds may have such numbers too, but then its steps are round.
+    A clock in seconds may have such numbers of days too, but then its steps are round.
     """
-    if not any(low <= values[0] < high for low, high in _DAY_COUNTS):
-        return
-    step = float(values[-1] - values[0]) / max(values.size - 1, 1)
-    if not 0 < step < _HALF_AN_HOUR or abs(float(f"{step:.3g}") / step - 1) < 1e-5:
-        return
-    raise OptionError(
-        f"{table.path}: {table.title(index)} begins at {values[0]:.9g} and runs in steps of "
-        f"{step:.6g}, which looks like dates in days (Excel, datenum); give time_unit='day', "
-        "or time_unit='s' if it is not"
-    )
+    values = table.numbers(index)
+    first = float(values[0]) if values.size else 0.0
+    units = [unit for unit, ticks in _TICKS.items() if _YEAR_1990 <= first / ticks < _YEAR_2100]
+    if not units and any(low <= first < high for low, high in _DAY_COUNTS):
+        step = float(values[-1] - values[0]) / max(values.size - 1, 1)
+        if 0 < step < _HALF_AN_HOUR and abs(float(f"{step:.3g}") / step - 1) >= 1e-5:
+            units = ["day"]
+    if units:
+        since = (
+            "days since 1900 or 0 (Excel, datenum)"
+            if units == ["day"]
+            else f"{units[0]} since 1970"
+        )
+        warn_caller(
+            f"{table.path}: {table.title(index)} begins at {first:.9g} and is taken for {since}; "
+            "time_unit= says otherwise, such as 's'",
+            DataWarning,
+        )
+    return units[0] if units else ""
 
 
 def _refuse_zone(table: Table, index: int, zone: str) -> NoReturn:
@@ -184,6 +170,18 @@ def _since_first(
             stamps = in_utc(stamps, zone)
         except (DataError, OptionError) as error:
             raise type(error)(f"{table.path}: {table.title(index)}: {error}") from error
+    elif stamps.dtype.kind == "M":
+        order = -1 if stamps[0] > stamps[-1] else 1  # historians list the newest sample first
+        row, hours = clock_change(stamps[::order])
+        if hours:
+            place = table.place(row if order == 1 else stamps.size - 1 - row)
+            warn_caller(
+                f"{table.path}: {table.title(index)}: the clock is taken to be set "
+                f"{'back' if hours < 0 else 'forward'} by an hour for summer time at {place}; "
+                "time_zone= says otherwise, such as 'UTC'",
+                DataWarning,
+            )
+            stamps = stamps - (np.arange(stamps.size) >= row)[::order] * np.timedelta64(hours, "h")
     seconds = np.asarray((stamps - stamps[0]) / np.timedelta64(1, "ns") / 1e9, dtype=np.float64)
     return TimeAxis(seconds, stamps[0] if stamps.dtype.kind == "M" else None, zone=zone)
 
@@ -191,7 +189,7 @@ def _since_first(
 def _parsed_dates(
     table: Table, index: int, time_format: str | None, unit: str, date: int | None
 ) -> tuple[np.ndarray[Any, Any], str]:
-    cells = [str(cell).strip() for cell in table.columns[index].cells]
+    cells = [_PART.sub(".", str(cell).strip()) for cell in table.columns[index].cells]
     if time_format is None:
         cells = [cell.replace(",", ".") for cell in cells]
     if _are_times_of_day(cells) and date is not None:
@@ -215,7 +213,7 @@ def _parsed_dates(
 
 
 def _are_times_of_day(cells: list[str]) -> bool:
-    return all(re.fullmatch(_CLOCK + r"( ?[AaPp][Mm])?", cell) for cell in cells[:3])
+    return all(re.fullmatch(rf"({_CLOCK})( ?[AaPp][Mm])?", cell) for cell in cells[:3])
 
 
 def _parsed_times_of_day(
@@ -225,41 +223,31 @@ def _parsed_times_of_day(
 
     ``12:34`` may be hours and minutes, or minutes and seconds: `unit` is that of the first number.
     """
-    parts = [re.fullmatch(_CLOCK, cell) for cell in cells]
-    for row, part in enumerate(parts):
-        if part is None:
-            raise DataError(
-                f"{table.path}: {table.title(index)}, {table.place(row)}: {cells[row][:60]!r} "
-                "is not a time of day"
-            )
-    short = next((row for row, part in enumerate(parts) if part and part[3] is None), None)
-    factors = _FACTORS.get(_FIRST.get(unit.lower(), plain_unit(unit)))
-    if short is None:
-        factors = _FACTORS["h"]
-    elif factors is None:
+    import pandas as pd
+
+    shorts = [bool(re.fullmatch(_SHORT, cell)) for cell in cells]
+    first = _FIRST.get(unit.lower(), plain_unit(unit))
+    if any(shorts) and not all(shorts):
+        raise DataError(
+            f"{table.path}: {table.title(index)} mixes times with two and three fields, such "
+            f"as {cells[shorts.index(True)]!r}"
+        )
+    if any(shorts) and first not in ("h", "min"):
         raise OptionError(
-            f"{table.path}: {table.title(index)}, {table.place(short)}: {cells[short]!r} may "
+            f"{table.path}: {table.title(index)}, {table.place(0)}: {cells[0]!r} may "
             "be hours and minutes, or minutes and seconds; give time_unit='h' or "
             "time_unit='min', the unit of the first field"
         )
-    elif any(part and part[3] is not None for part in parts):
+    ends = ("", "") if not any(shorts) else ("00:", "") if first == "min" else ("", ":00")
+    whole = pd.Series([ends[0] + cell + ends[1] for cell in cells], dtype=str)
+    stamps = pd.to_timedelta(whole, errors="coerce").to_numpy(dtype="timedelta64[ns]")
+    if np.isnat(stamps).any():
+        row = int(np.argmax(np.isnat(stamps)))
         raise DataError(
-            f"{table.path}: {table.title(index)} mixes times with two and three fields, such "
-            f"as {cells[short]!r}"
+            f"{table.path}: {table.title(index)}, {table.place(row)}: {cells[row][:60]!r} "
+            "is not a time of day"
         )
-    # in whole nanoseconds, because 0.1 s is not a binary fraction
-    stamps = np.array(
-        [
-            sum(
-                round(factor * float(number) * 1e9)
-                for factor, number in zip(factors, part.groups(default="0"), strict=True)
-            )
-            for part in parts
-            if part is not None
-        ],
-        dtype="timedelta64[ns]",
-    )
     # a clock that falls back by most of a day has passed midnight, or a full hour
-    turn = np.timedelta64(60 * factors[0] if factors[0] == 60 else 86400, "s")
+    turn = np.timedelta64(3600 if ends[0] else 86400, "s")
     turns = np.cumsum(np.diff(stamps) < -turn / 2)
-    return stamps + np.concatenate([[0], turns]) * turn
+    return np.asarray(stamps + np.concatenate([[0], turns]) * turn)

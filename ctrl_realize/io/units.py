@@ -65,6 +65,12 @@ def unit_of(name: str) -> str:
     return bare_unit(_parted(name.strip())[1])
 
 
+def stands_alone(unit: str) -> bool:
+    """Whether a text is a unit and hardly anything else, as in a cell ``61.0 °C``."""
+    plain = plain_unit(unit)
+    return plain in _STANDING_ALONE or plain in _NO_TIMES or plain in _WORDS["units"]["in_cells"]
+
+
 def unit_named(name: str) -> str:
     """Return the unit of time that is a column's whole name (``millis``), or ``""``."""
     plain = plain_unit(name)
@@ -79,6 +85,8 @@ def is_no_time(unit: str) -> bool:
 def sample_time_unit(name: str) -> str:
     """Return the unit in a name such as ``SampleTime[ms]``; empty for other names."""
     base, unit = split_unit(name.rpartition(".")[2].replace("_", " "))
+    if not unit and base.lower() in _WORDS["columns"]["in_seconds"]:
+        return "s"  # as on all oscilloscopes
     return unit if base.lower() in _WORDS["columns"]["sample_time"] and unit in TIME_UNITS else ""
 
 
@@ -108,7 +116,8 @@ def is_units_line(cells: list[str]) -> bool:
     filled = [cell.strip() for cell in cells if cell.strip()]
     bracketed = [cell[0] in "[({<" and cell[-1] in "])}>" for cell in filled]
     known = [plain_unit(cell) in _STANDING_ALONE for cell in filled]
-    return bool(filled) and (all(bracketed) or any(known))
+    alone = [stands_alone(one) or one.lower() in _WORDS["columns"]["counter"] for one in filled]
+    return bool(filled) and (all(bracketed) or any(known) or all(alone))
 
 
 def to_seconds(values: FloatArray, unit: str) -> FloatArray:

@@ -372,7 +372,7 @@ def test_a_sheet_is_read_like_a_text_table(tmp_path):
     sheet.cell(7, 4).value = "Bad"
     sheet.parent.save(path)
     with pytest.raises(DataError, match="column 'Istwert', row 7: 'Bad': a value is missing"):
-        read_record(path)
+        read_record(path, missing="refuse")
     assert read_record(path, missing="keep").n_missing == 1
     sheet.parent.copy_worksheet(sheet)
     sheet.parent.save(path)

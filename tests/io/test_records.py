@@ -161,7 +161,7 @@ def test_jitter_is_refused_and_resampled_on_request(tmp_path):
     times = np.arange(50.0) + 0.2 * np.sin(np.arange(50.0))
     file.write_text(table(header="t,u,y", columns=(times, times, 2 * times)))
     with pytest.raises(TimeAxisError, match=r"a\.csv.*resample=True"):
-        read_record(file)
+        read_record(file, missing="refuse")
     record = read_record(file, resample=True)
     # linear signals are interpolated exactly, up to the six digits in the file
     np.testing.assert_allclose(record.output, 2 * record.time, atol=1e-4)
@@ -214,7 +214,7 @@ def test_a_bad_row_is_named(tmp_path, row, error, match):
     file = tmp_path / "a.csv"
     file.write_text("t,u,y\n0,0,1\n0.5,0,1\n" + row + "1.5,0,1\n2,0,1\n2.5,0,1\n3,0,1\n")
     with pytest.raises(error, match=match):
-        read_record(file)
+        read_record(file, missing="refuse")
 
 
 @pytest.mark.parametrize(
@@ -259,7 +259,7 @@ def test_missing_values_can_be_kept(tmp_path):
     assert_array_equal(record.input, [0, np.nan, 1, 1, 1])
     assert_array_equal(record.output, [1, 2, np.nan, np.nan, 5])
     with pytest.raises(DataError, match="line 3: '': a value is missing; missing='keep'"):
-        read_record(file)
+        read_record(file, missing="refuse")
     with pytest.raises(OptionError, match="missing='drop'"):
         read_record(file, missing="drop")
     with pytest.raises(OptionError, match="missing='keep' and resample=True"):
@@ -363,7 +363,7 @@ def test_measured_time_stamps_that_are_not_uniform_are_refused_with_the_place(sh
         columns = {} if chosen is None else {"input": chosen[0], "output": chosen[1]}
         columns = {name: names.split() for name, names in columns.items()}
         with pytest.raises(TimeAxisError, match=r"\(line \d+\): time"):
-            read_record(file, **columns)
+            read_record(file, **columns, missing="refuse")
 
 
 def test_a_stray_quote_that_swallows_lines_is_told(tmp_path):
@@ -449,8 +449,10 @@ def test_a_clock_since_1970_or_in_days_is_not_taken_for_seconds(tmp_path, kind):
     file = tmp_path / "logger.csv"
     lines = "\n".join(f"{cell(k)},0,{k}" for k in range(5)) + "\n"
     file.write_text("time,u,y\n" + lines)
-    with pytest.raises(OptionError, match=f"looks like .*; give time_unit='{unit}'"):
-        read_record(file)
+    taken = "days since" if unit == "day" else f"{unit} since 1970"
+    with pytest.warns(DataWarning, match=f"is taken for {taken}.*time_unit= says otherwise"):
+        assert read_record(file).dt == pytest.approx(dt, rel=1e-4)
+    assert read_record(file, time_unit="s").dt != pytest.approx(dt, rel=1e-4)
     assert read_record(file, time_unit=unit).dt == pytest.approx(dt, rel=1e-4)  # nine decimals
     file.write_text(f"{header},u,y\n" + lines)
     assert read_record(file).dt == pytest.approx(dt, rel=1e-4)
@@ -503,7 +505,7 @@ def test_bad_cells_are_named_by_their_line_and_only_where_they_are_used(tmp_path
     assert read_record(file).n_samples == 4
     file.write_text("# bench\n\nt,u,y\n0,0,1\n\n# restart\n1,0,bad\n2,0,1\n3,0,1\n4,0,1\n")
     with pytest.raises(DataError, match="line 7: 'bad'"):
-        read_record(file)
+        read_record(file, missing="refuse")
     # decimal commas between commas: nobody can tell
     file.write_text("t,u,y\n0,0,1,5,2,5\n0,1,1,5,2,5\n0,2,1,5,2,5\n")
     with pytest.raises(FileFormatError, match=r"line 1 .* has 3 cells, the lines below have 6"):

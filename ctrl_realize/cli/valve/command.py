@@ -27,7 +27,7 @@ def run_valve(
     run: Run,
 ) -> int:
     """Measure, write the results, and return the exit code."""
-    how = Reading(valve_test, tests)
+    how = Reading({"missing": "refuse", **valve_test}, tests)
     bounds = _limits(limit or ())
     options = {**measured, **({"limits": bounds} if bounds else {})}
     refuse_other_results(folder, run)

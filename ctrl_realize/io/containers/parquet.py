@@ -42,7 +42,7 @@ class LateColumn(Column):
         return self._load(count)  # type: ignore[attr-defined, no-any-return]
 
 
-def read_parquet(path: Path, *, max_bytes: float) -> Table:
+def read_parquet(path: Path, *, max_bytes: float, variable: str | None = None) -> Table:
     """Find the columns of a Parquet file; their cells are read on demand.
 
     All columns together may take `max_bytes`, and at most a thousand times the size of the file:

@@ -11,15 +11,16 @@ from ...errors import DataError
 from ..columns import Selector, holds_numbers, named
 from ..tables import Column, Table
 from ..units import unit_of
-from .names import NAMES
+from .names import NAMES, clocks_of, dates_of
 
 _MOST_TAGS = 1000
 
 
 class LongTable(NamedTuple):
-    """A long table: columns of time, tag and value, and the rows of each tag."""
+    """A long table: columns of time, its date and values, and the rows of each tag."""
 
     time: int
+    date: int | None
     value: int
     rows: dict[str, np.ndarray[tuple[int], np.dtype[np.intp]]]
 
@@ -34,7 +35,7 @@ def long_table(
     """
     tags = [k for k in named(table, NAMES["tag"]) if not holds_numbers(table, k)]
     values = named(table, NAMES["value"])
-    clocks = named(table, NAMES["time"]) or named(table, NAMES["date"])
+    clocks = clocks_of(table) or named(table, NAMES["date"])
     if isinstance(time, str):
         clocks = [k for k, one in enumerate(table.columns) if one.name == time]
     names = {column.name for column in table.columns}
@@ -45,7 +46,10 @@ def long_table(
     found = list(dict.fromkeys(cells.tolist()))
     if len(found) > _MOST_TAGS:
         raise DataError(f"{table.path} has {len(found)} tags; the limit is {_MOST_TAGS}")
-    return LongTable(clocks[0], values[0], {tag: np.flatnonzero(cells == tag) for tag in found})
+    date = next(iter(dates_of(table, clocks[0])), None)
+    return LongTable(
+        clocks[0], date, values[0], {tag: np.flatnonzero(cells == tag) for tag in found}
+    )
 
 
 def tags_as_columns(table: Table, long: LongTable) -> Table:

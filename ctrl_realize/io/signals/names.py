@@ -10,7 +10,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..._facts import facts
-from ...errors import DataError, OptionError
+from ...errors import DataError, DataWarning, OptionError, warn_caller
+from ...numerics.arrays import FloatArray
+from ...numerics.signals.jumps import moves_in_steps
 from ..columns import (
     Selector,
     ambiguous,
@@ -23,7 +25,7 @@ from ..columns import (
     plain_name,
 )
 from ..tables import Table
-from ..units import is_no_time, sample_time_unit, to_seconds
+from ..units import TIME_UNITS, is_no_time, plain_unit, sample_time_unit, to_seconds
 
 NAMES = {key: frozenset(words) for key, words in facts("io/words.toml")["columns"].items()}
 """Names of columns by what they hold, and the last parts of tags, such as ``TIC101_PV``."""
@@ -62,13 +64,13 @@ def choose_columns(
         raise OptionError("expected time= or dt=, got both")
     inputs = [] if input is None else find_columns(table, input, "input")
     outputs = [] if output is None else find_columns(table, output, "output")
-    clock = None if time is None else find_column(table, time, "time")
-    step = dt
+    clock, step = None if time is None else find_column(table, time, "time"), dt
     if clock is None and dt is None:
         clock, step = _guessed_clock(table, [*inputs, *outputs, *taken])
     # with dt= given, a time column in the file is still not a signal
-    clocks = (_clocks(table, taken) if clock is None else [clock]) + _dates(table, clock, taken)
-    known = [*clocks, *taken]
+    clocks = clocks_of(table, taken, every=True) if clock is None else [clock]
+    clocks += dates_of(table, clock, taken)
+    known = [*clocks, *taken, *clocks_of(table, [*clocks, *inputs, *outputs, *taken], every=True)]
     inputs = inputs or _signals(table, "input", [*known, *outputs])
     outputs = outputs or _signals(table, "output", [*known, *inputs])
     rest = [
@@ -76,11 +78,21 @@ def choose_columns(
         for k in range(len(table.columns))
         if k not in (*known, *inputs, *outputs) and holds_numbers(table, k)
     ]
+    if not inputs and not outputs and not has_header(table) and len(rest) == 2:
+        inputs, outputs, rest = rest[:1], rest[1:], []
     if len(rest) > 1:
         setpoints = named(table, NAMES["setpoint"]) + _tagged(table, NAMES["setpoint_tag"], known)
-        rest = [k for k in rest if k not in setpoints]
-    if not inputs and not outputs and not has_header(table) and len(rest) == 2:
-        inputs, outputs = rest[:1], rest[1:]
+        rest = [k for k in rest if k not in setpoints and _moves(table, k)]
+    if not inputs and len(rest) > 1:
+        stepping = moves_in_steps([_values(table, k) for k in rest])
+        inputs = [] if stepping is None else [rest.pop(stepping)]
+        if inputs and (outputs or len(rest) == 1):
+            outputs = outputs or rest
+            warn_caller(
+                f"{table.path}: {table.title(inputs[0])} is taken as input, since it moves in "
+                f"steps, and {table.title(outputs[0])} as output; input= and output= say otherwise",
+                DataWarning,
+            )
     elif len(rest) == 1 and bool(inputs) != bool(outputs):
         inputs, outputs = inputs or rest, outputs or rest
     for signal, found in (("input", inputs), ("output", outputs)):
@@ -98,7 +110,10 @@ def choose_columns(
 
 def _signals(table: Table, kind: str, taken: Sequence[int]) -> list[int]:
     """Columns of a signal by their names: whole names first, then the last part of a tag."""
+    other = {"input": "output", "output": "input"}[kind]
     found = named(table, NAMES[kind], taken) or _tagged(table, NAMES[f"{kind}_tag"], taken)
+    if not found and _tagged(table, NAMES[f"{other}_tag"], ()):
+        found = _tagged(table, NAMES["either_tag"], taken)
     families = {family(table.columns[k].name) for k in found}
     # channels have one name with numbers; two different names of a loop are two candidates
     if len(families) > 1 and families & (NAMES["input_tag"] | NAMES["output_tag"]):
@@ -117,12 +132,46 @@ def _tagged(table: Table, tags: Iterable[str], taken: Iterable[int]) -> list[int
     return found if len(found) == 1 else []
 
 
-def _clocks(table: Table, taken: Iterable[int]) -> list[int]:
-    found = named(table, NAMES["time"], taken)
-    return [k for k in found if not is_no_time(table.columns[k].unit)]
+def clocks_of(table: Table, taken: Iterable[int] = (), *, every: bool = False) -> list[int]:
+    """Columns of time by their names or units: those with dates before others, and `every` one."""
+    told = [k for k in named(table, NAMES["time"], taken) if not is_no_time(table.columns[k].unit)]
+    found = [k for k in told if table.columns[k].name != "T" or _runs(table, k)] or [
+        k
+        for k, one in enumerate(table.columns)
+        if k not in set(taken) and plain_unit(one.unit) in TIME_UNITS and _runs(table, k)
+    ]
+    if every or not found:
+        return found
+    found = [k for k in found if not holds_numbers(table, k)] or found
+    first, *more = [table.columns[k] for k in found]
+    # each signal may have its own column of the same time
+    same = all(first.name == one.name and np.array_equal(first.cells, one.cells) for one in more)
+    return found[:1] if same else found
 
 
-def _dates(table: Table, clock: int | None, taken: Iterable[int]) -> list[int]:
+def _runs(table: Table, index: int) -> bool:
+    """Whether a column that may be a temperature increases as a time does."""
+    steps = np.diff(_values(table, index))
+    usual = float(np.median(steps)) if steps.size else 0.0
+    return bool(usual > 0 and steps.min() >= 0 and steps.max() <= 3 * usual)
+
+
+def _moves(table: Table, index: int) -> bool:
+    """Whether a column may be a signal: it counts no rows, and is not constant."""
+    told = {plain_name(table.columns[index].name), plain_unit(table.columns[index].unit)}
+    return not told & NAMES["counter"] and len(set(_values(table, index).tolist())) > 1
+
+
+def _values(table: Table, index: int) -> FloatArray:
+    """Numbers of a column without missing ones; none if it has other cells."""
+    try:
+        values = table.numbers(index, keep_missing=True)
+    except DataError:
+        return np.empty(0)
+    return values[~np.isnan(values)]
+
+
+def dates_of(table: Table, clock: int | None, taken: Iterable[int] = ()) -> list[int]:
     """Columns of dates beside that of time."""
     used = {*taken, *([] if clock is None else [clock])}
     return [k for k in named(table, NAMES["date"], used) if not holds_numbers(table, k)]
@@ -130,7 +179,7 @@ def _dates(table: Table, clock: int | None, taken: Iterable[int]) -> list[int]:
 
 def _guessed_clock(table: Table, taken: Sequence[int]) -> tuple[int | None, float | None]:
     """Time column by name, otherwise the sample time in the file, otherwise the first column."""
-    clocks = _clocks(table, taken) or _dates(table, None, taken)
+    clocks = clocks_of(table, taken) or dates_of(table, None, taken)
     if len(clocks) == 1:
         return clocks[0], None
     if len(clocks) > 1:

@@ -1,19 +1,17 @@
-"""Samples of input and output with their time stamps, and the record that they make."""
+"""Samples of input and output with their time stamps, from the columns of a table."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from ...data import Record
 from ...data.resampling import MIN_SAMPLES
+from ...data.samples import Samples
 from ...errors import DataError, OptionError
 from ...numerics.arrays import FloatArray
-from ...numerics.signals.time_axis import axis_fault
 from ..columns import check_lengths
 from ..tables import Table
 from ..text.dates import in_utc
@@ -22,65 +20,6 @@ from ..units import plain_unit
 from .long_format import LongTable
 from .names import Parts
 from .quality import Rows, Rules
-
-
-@dataclass(frozen=True, eq=False)
-class Samples:
-    """Input and output with the stamps of each, as they stand in a file.
-
-    ``input_time`` is None where the samples of the input are those of the output.
-    """
-
-    time: FloatArray
-    input: FloatArray
-    output: FloatArray
-    input_time: FloatArray | None
-    place: Callable[[int], str]
-
-    def record(self, labels: dict[str, Any], *, keep: bool, holds: bool, resample: bool) -> Record:
-        """Make a record: as it is, with gaps on a finer time axis, or interpolated."""
-        if resample:
-            return Record.resampled(self.time, self.at_outputs(), self.output, **labels)
-        if not keep:
-            return Record(self.time, self.at_outputs(), self.output, **labels)
-        time, input, output = self.time, self.input, self.output
-        if self.input_time is None:
-            # a stamp that comes twice was stored twice, or corrected: the later one holds
-            last = np.r_[np.diff(time) != 0, True]
-            time, input, output = time[last], input[..., last], output[..., last]
-            if axis_fault(time) is None and not (holds and np.isnan(input).any()):
-                return Record(time, input, output, missing="keep", **labels)
-        return Record.from_samples(time, input, output, input_time=self.input_time, **labels)
-
-    def joined(self, period: float) -> Samples:
-        """Return the samples with the turns of counters among the outputs joined.
-
-        Raises
-        ------
-        OptionError
-            The range of the outputs is longer than a turn.
-        """
-        output = np.array(self.output)
-        rows = [row[~np.isnan(row)] for row in np.atleast_2d(output)]
-        fitting = [row.size > 0 and np.ptp(row) <= period for row in rows]
-        if not any(fitting):
-            raise OptionError(
-                f"wrap={period:g}: the output runs from {np.nanmin(output):g} to "
-                f"{np.nanmax(output):g}; expected the number of values of its counter, such as 4096"
-            )
-        for row, joins in zip(np.atleast_2d(output), fitting, strict=True):
-            if joins:
-                row[~np.isnan(row)] = np.unwrap(row[~np.isnan(row)], period=period)
-        return replace(self, output=output)
-
-    def at_outputs(self) -> FloatArray:
-        """Input at the stamps of the output; it holds its value between its own."""
-        if self.input_time is None:
-            return self.input
-        last = np.searchsorted(self.input_time, self.time, side="right") - 1
-        held = np.array(self.input[..., np.maximum(last, 0)])
-        held[..., last < 0] = np.nan  # before its first sample it is unknown
-        return held
 
 
 def wide_axis(table: Table, parts: Parts, clock: Clock) -> tuple[TimeAxis, Rows]:
@@ -226,14 +165,10 @@ def labels_of(table: Table, parts: Parts, time_unit: str) -> dict[str, Any]:
         labels[argument] = names if unique else None
         default = [letter] if len(chosen) == 1 else [f"{letter}[{k}]" for k in range(len(chosen))]
         for name, k in zip(names if unique else default, chosen, strict=True):
-            unit = table.columns[k].unit or ("%" if _is_percent(table.columns[k].first(1)) else "")
+            unit = table.columns[k].told_unit
             if plain_unit(unit):
                 units[name] = unit
     return labels | {"units": units}
-
-
-def _is_percent(cells: np.ndarray[Any, np.dtype[Any]]) -> bool:
-    return bool(cells.size) and isinstance(cells[0], str) and cells[0].strip().endswith("%")
 
 
 def _stacked(rows: Sequence[FloatArray]) -> FloatArray:

@@ -17,11 +17,11 @@ from ...errors import DataError, OptionError
 
 Stamps = np.ndarray[Any, np.dtype[np.datetime64]]
 
-_DATE = re.compile(
-    r"(?P<a>\d{1,4})(?P<mark>[-/. ])(?P<b>\d{1,2}|[^\W\d_]{3,9})\.?[-/. ](?P<c>\d{2,4})\.?"
-    r"(?:[ T]+(?P<clock>\d.*))?"
-)
-_CLOCK = re.compile(r"\d{1,2}:\d{2}(?P<seconds>:\d{2}(?P<part>\.\d+)?)?(?P<half> [AP]M)?")
+_DATES = ("%d-%m-%Y", "%m-%d-%Y", "%d-%m-%y", "%m-%d-%y", "%Y-%m-%d", "%d-%b-%Y", "%d-%b-%y")
+"""Dates with another sign in place of the hyphen; with points the day is before the month."""
+_CLOCKS = (
+    "", " %H:%M", " %H:%M:%S", " %H:%M:%S.%f", " %I:%M %p", " %I:%M:%S %p", " %I:%M:%S.%f %p",
+)  # fmt: skip
 _HALF = re.compile(r" ?([AaPp])\.?[Mm]\.?$")
 _MONTHS = {"mrz": "mar", "mär": "mar", "mai": "may", "okt": "oct", "dez": "dec"}
 """German months whose first three letters are not those of the English names."""
@@ -53,21 +53,21 @@ def stamps_of(cells: list[str], time_format: str | None) -> Dates:
     if time_format is not None:
         return Dates(_parsed(cells, time_format), time_format)
     stamps = _parsed(cells, "ISO8601")
-    first = next((cell for cell in cells if cell), "")
-    if not np.isnat(stamps).all() or not _DATE.fullmatch(_plain(first)):
+    if not np.isnat(stamps).all():
         return Dates(stamps, "ISO 8601")
     plain = [_plain(cell) for cell in cells]
-    formats = _formats(plain)
-    if not formats:
-        return Dates(stamps, "ISO 8601")
-    read = [_in_format(plain, one) for one in formats]
-    if len(read) == 1:
-        return Dates(read[0], formats[0])
+    first = next((cell for cell in plain if cell), "")
+    found = {form: _in_format(plain, form) for form in _formats(first)}
+    bad = {form: int(np.isnat(read).sum()) for form, read in found.items()}
+    formats = [form for form in found if bad[form] == min(bad.values())]
+    read = [found[form] for form in formats]
+    if len(formats) < 2:
+        return Dates(read[0], formats[0]) if formats else Dates(stamps, "ISO 8601")
     doubt = (
-        f"{first!r} may be written as day and month or as month and day; give "
+        f"{cells[plain.index(first)]!r} may be written as day and month or as month and day; give "
         f"time_format={formats[0]!r} or {formats[1]!r}"
     )
-    if _same_times(*read):
+    if np.array_equal(*(one - one[0] for one in read)):
         return Dates(read[0], formats[0], doubt)
     regular = [_is_regular(one) for one in read]
     if sum(regular) != 1:
@@ -120,49 +120,22 @@ def have_offset(cell: str) -> bool:
 
 
 def _plain(cell: str) -> str:
-    """Cell with single blanks, AM or PM in capital letters and a decimal point."""
-    text = _HALF.sub(lambda half: f" {half[1].upper()}M", " ".join(cell.split()))
-    return re.sub(r"(?<=\d),(?=\d+( |$))", ".", text)
+    """Cell with single blanks, English months, AM or PM, and a decimal point."""
+    text = _HALF.sub(lambda half: f" {half[1].upper()}M", " ".join(cell.replace(", ", " ").split()))
+    text = re.sub(r"[^\W\d_]{3,9}\.?(?=[-/. ]+\d)", _month, text)
+    return re.sub(r"(?<=\d),(?=\d+( |$))", ".", re.sub(r"(?<=\d)T(?=\d)", " ", text))
 
 
-def _formats(cells: list[str]) -> list[str]:
-    """Formats that the cells may have: one, or two if day and month cannot be distinguished."""
-    found = [match for match in map(_DATE.fullmatch, cells) if match]
-    first = found[0]
-    clock = _clock_format(first["clock"])
-    if clock is None:
-        return []
-    mark, year = first["mark"], "%Y" if len(first["c"]) == 4 else "%y"
-    if len(first["a"]) == 4:
-        dates = [f"%Y{mark}%m{mark}%d"]
-    elif not first["b"].isdecimal():
-        dates = [f"%d{mark}%b{mark}{year}"]
-    else:
-        day_first, month_first = f"%d{mark}%m{mark}{year}", f"%m{mark}%d{mark}{year}"
-        if mark == "." or any(int(match["a"]) > 12 for match in found):
-            dates = [day_first]
-        elif any(match["b"].isdecimal() and int(match["b"]) > 12 for match in found):
-            dates = [month_first]
-        else:
-            dates = [day_first, month_first]
-    return [date + clock for date in dates]
-
-
-def _clock_format(clock: str | None) -> str | None:
-    if clock is None:
-        return ""
-    match = _CLOCK.fullmatch(clock)
-    if match is None:
-        return None
-    hour = " %I:%M" if match["half"] else " %H:%M"
-    seconds = ":%S" if match["seconds"] else ""
-    return hour + seconds + (".%f" if match["part"] else "") + (" %p" if match["half"] else "")
+def _formats(cell: str) -> list[str]:
+    """Formats that a cell may have: several, if day and month cannot be distinguished."""
+    mark = re.sub(r"\w", "", cell)[:1]
+    dates = [one.replace("-", mark) for one in _DATES if mark != "." or not one.startswith("%m")]
+    forms = [date + clock for date in dates for clock in _CLOCKS]
+    return [form for form in forms if not np.isnat(_parsed([cell], form)).any()]
 
 
 def _in_format(cells: list[str], form: str) -> Stamps:
     """Stamps in a format; a part of a second may be there or not."""
-    cells = [re.sub(r"[^\W\d_]{3,9}\.?(?=[-/. ]+\d)", _month, cell) for cell in cells]
-    cells = [re.sub(r"T(?=\d)", " ", cell) for cell in cells]
     stamps = _parsed(cells, form)
     other = form.replace(".%f", "") if "%f" in form else form.replace("%S", "%S.%f")
     left = np.isnat(stamps)
@@ -184,10 +157,6 @@ def _parsed(cells: list[str], form: str) -> Stamps:
     except (ValueError, TypeError) as error:
         raise OptionError(f"time_format={form!r} is not a time format: {error}") from error
     return np.array(stamps.dt.tz_localize(None).to_numpy(), dtype="datetime64[ns]")
-
-
-def _same_times(one: Stamps, two: Stamps) -> bool:
-    return bool(np.array_equal(one - one[0], two - two[0], equal_nan=False))
 
 
 def _is_regular(stamps: Stamps) -> bool:

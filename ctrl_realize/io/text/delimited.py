@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from ...errors import DataWarning, FileFormatError
-from ..cells import NUMBER, split_line
+from ..cells import NUMBER, number_of, split_line
 from ..tables import Column, Table
 from ..text_options import TextOptions
 from .sniff import TextLayout, sniff
@@ -75,7 +75,8 @@ def _parse(source: TextSource, layout: TextLayout) -> Any:
             frame = pd.read_csv(
                 file,
                 sep=separator,
-                decimal=layout.decimal,
+                decimal=layout.decimal[0],
+                thousands=layout.decimal[1:] or None,
                 header=None,
                 comment=layout.comment,
                 # numbers are ASCII in all encodings here; a wrong character in a name is harmless
@@ -107,7 +108,7 @@ def _check_parsed(path: Path, layout: TextLayout, frame: Any) -> None:
         parsed = frame.iloc[0, column]
         same = str(parsed).strip() == cell or not pattern.fullmatch(cell)
         if not same and not isinstance(parsed, str):
-            same = float(parsed) == float(cell.replace(",", "."))
+            same = float(parsed) == number_of(cell, layout.decimal)
         if not same:
             raise FileFormatError(
                 f"{path}: line {layout.first_line + 1} is the first data line, and its cell "
@@ -149,8 +150,8 @@ def _cut_last_line(source: TextSource, layout: TextLayout) -> str:
         return f"it ends in {last[-1][:20]!r} and has no line end"
     # written with a fixed number of decimals, except here: 27.02 of 27.0223
     ends = [row[-1] for row in before if pattern.fullmatch(row[-1])]
-    decimals = {len(end.partition(layout.decimal)[2]) for end in ends}
-    written = len(last[-1].partition(layout.decimal)[2])
+    decimals = {len(end.partition(layout.decimal[0])[2]) for end in ends}
+    written = len(last[-1].partition(layout.decimal[0])[2])
     if len(ends) >= 3 and len(decimals) == 1 and written < min(decimals):
         return f"it ends in {last[-1]!r}, with fewer decimals than all others and no line end"
     return ""

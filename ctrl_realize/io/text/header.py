@@ -5,11 +5,11 @@ from __future__ import annotations
 import math
 import re
 from dataclasses import dataclass
-from itertools import pairwise
+from itertools import pairwise, zip_longest
 from pathlib import Path
 
 from ...errors import FileFormatError
-from ..cells import DELIMITERS, FILLED, NUMBER, kind_of, split_line
+from ..cells import DELIMITERS, FILLED, NUMBER, kind_of, number_of, split_line
 from ..checks import MAX_NAME
 from ..units import bare_unit, is_units_line, sample_time_unit, unit_of
 
@@ -37,9 +37,10 @@ class Head:
         NaN if there are different ones.
         """
         found: dict[str, float] = {}
-        for name, value in (pair for cells in self.cells[:first] for pair in pairwise(cells)):
+        rows = [*self.cells[:first], *zip_longest(*self.cells[:first], fillvalue="")]
+        for name, value in (pair for cells in rows for pair in pairwise(cells)):
             if sample_time_unit(name) and NUMBER[self.decimal].fullmatch(value):
-                number = float(value.replace(",", "."))
+                number = number_of(value, self.decimal)
                 found[name] = number if found.get(name, number) == number else math.nan
         return found
 
@@ -53,7 +54,8 @@ class Head:
             len(cells) == self.width > 1 and kind_of(cells[0], self.decimal) == "text"
             for cells in self.cells
         ]
-        stated = [k for k in rows if keyed[k] and sample_time_unit(self.cells[k][0])]
+        keys = [cells[0] if good else "" for cells, good in zip(self.cells, keyed, strict=True)]
+        stated = [k for k in rows if keys[k].endswith("]") and sample_time_unit(keys[k])]
         middle = next((k for k in stated if self.kinds(k)[1] == "number"), None)
         if middle is None:
             return range(0)
@@ -106,7 +108,8 @@ def column_names(head: Head, first: int) -> tuple[list[str], list[str]]:
     names = texts[-1] if texts else None
     if names is not None:
         above = texts[-2] if len(texts) > 1 else None
-        if above is not None and is_units_line(names):
+        words = [cell for cell in names if kind_of(cell, head.decimal) != "number"]
+        if above is not None and is_units_line(words):
             return above, [bare_unit(cell) for cell in names]
     elif texts and len(head.cells[first - 1]) > 1:
         raise FileFormatError(
@@ -129,6 +132,8 @@ def _header_cells(head: Head, row: int, first: int) -> list[str] | None:
     ):
         # the lines of data end with a delimiter, the header does not
         return [*cells, ""]
+    if len(cells) == head.width + 1 and (first == row + 1 or not cells[-1]):
+        return cells[:-1]  # a column of remarks, of which there are none
     # names that contain blanks, above columns that are separated by blanks
     apart = re.split(r"\t+|\s{2,}", head.lines[head.rows[row]].strip())
     return apart if len(apart) == head.width else None

@@ -35,6 +35,9 @@ _SAMPLE_LINES = 60
 _FEWEST_NUMBERS = 0.3
 """Smallest fraction of the cells of a table that are numbers or times."""
 
+_CLEAR = 0.8
+"""Fraction above which another delimiter than blanks is clear."""
+
 _BOMS = (
     (codecs.BOM_UTF8, "utf-8-sig"),
     # before that of UTF-16, which is its beginning
@@ -102,7 +105,7 @@ def sniff(source: TextSource, options: TextOptions) -> TextLayout:
     first = first_data_row(head, options.header)
     names, units = ([""] * width,) * 2 if options.header is False else column_names(head, first)
     names = [re.sub(r"\s*[\r\n]\s*", " ", name)[:MAX_NAME] for name in names]
-    if decimal == "," and options.decimal == "auto":
+    if decimal == "," and options.decimal == options.thousands == "auto":
         refuse_thousands(path, cells[first:], delimiter)
     begin = found[rows[first]]
     whole = len(head_bytes) < HEAD_BYTES and len(lines) < MAX_HEAD_LINES
@@ -140,20 +143,23 @@ def _comment(lines: list[str]) -> str | None:
 
 def _delimiter_and_decimal(path: Path, sample: list[str], options: TextOptions) -> tuple[str, str]:
     delimiters = DELIMITERS if options.delimiter == "auto" else (options.delimiter,)
-    decimals = (".", ",") if options.decimal == "auto" else (options.decimal,)
+    text = " ".join(sample)
+    notations = [one for one in options.notations if not one[1:] or one[1:] in text]
     best, best_score = ("", ""), (0.0, 0.0, False)
     for delimiter in delimiters:
+        if delimiter == " " and best_score[1] > _CLEAR and best_score[2]:
+            continue  # blanks within cells, as in dates
         rows = [split_line(line, delimiter) for line in sample]
         width = Counter(map(len, rows)).most_common(1)[0][0]
-        for decimal in decimals:
-            kinds = [kind_of(cell, decimal) for row in rows if len(row) == width for cell in row]
+        for notation in notations:
+            kinds = [kind_of(cell, notation) for row in rows if len(row) == width for cell in row]
             good = sum(kind in FILLED for kind in kinds)
             filled = sum(map(len, rows)) - kinds.count("missing")
             # a single column counts only if no delimiter splits the lines into numbers
             share = round(good / max(filled, 1), 3)
             score = (round(good / len(rows), 1), share, width > 1)
             if good and share >= _FEWEST_NUMBERS and score > best_score:
-                best, best_score = (delimiter, decimal), score
+                best, best_score = (delimiter, notation), score
     if not best_score[0]:
         raise FileFormatError(
             f"{path} has no recognisable numeric columns; one of its first lines is "

@@ -3,11 +3,18 @@
 from __future__ import annotations
 
 import io
+import re
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TextIO
 
+import numpy as np
+
 from ..checks import read_head, read_tail
+
+_PAIR = re.compile(r"""(?<![\w.])([A-Za-z_]\w*)["']?\s*[:=]\s*([+-]?[\d.]+(?:[eE][+-]?\d+)?)""")
+_STAMPED = re.compile(r"^[\s\[{\"']*(\d[\d:.,/ T-]*\d)?[\s\]>,;-]*$")
+_HEAD, _MOSTLY = 4096, 0.8
 
 
 @dataclass(frozen=True)
@@ -33,8 +40,28 @@ class TextSource:
 
     def open(self, encoding: str, newline: str | None = None) -> TextIO:
         """Open the text for reading; bytes that are no characters are replaced."""
-        if self.content is None:
-            return self.path.open(encoding=encoding, errors="replace", newline=newline)
-        return io.TextIOWrapper(
-            io.BytesIO(self.content), encoding=encoding, errors="replace", newline=newline
-        )
+        raw = self.path.open("rb") if self.content is None else io.BytesIO(self.content)
+        return io.TextIOWrapper(raw, encoding=encoding, errors="replace", newline=newline)
+
+
+def keyed_as_table(source: TextSource) -> TextSource:
+    """Table of a log whose lines are names and values, such as ``10:15:30.5 -> T:23.5 U:40``.
+
+    Lines of other kinds, such as messages at the start, are left out; other texts are returned as
+    they are.
+    """
+    lines = source.head(_HEAD).decode("utf-8", "replace").splitlines()[:-1]
+    if np.mean([len(_PAIR.findall(one)) > 1 for one in lines] or [0.0]) < _MOSTLY:
+        return source
+    rows = []
+    with source.open("utf-8") as file:
+        for line in file:
+            if (first := _PAIR.search(line)) and (stamp := _STAMPED.match(line[: first.start()])):
+                rows.append({"time": stamp[1] or "", **dict(_PAIR.findall(line))})
+    if not rows:
+        return source
+    names = list(dict.fromkeys(name for row in rows for name in row))
+    if not any(row["time"] for row in rows):
+        names.remove("time")
+    text = "\n".join("\t".join(row.get(name, "") for name in names) for row in rows)
+    return TextSource(source.path, ("\t".join(names) + "\n" + text + "\n").encode(), "row")

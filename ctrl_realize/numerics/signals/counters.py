@@ -1,11 +1,14 @@
-"""Counters and angles that start again at the end of their range.
+"""Counters and angles that start again at the end of their range, and clocks that are set.
 
 Our own rule: all jumps are longer than half of the range, all other steps are short, and beside
 each jump the signal moves the other way, as a counter does that falls from its end to its start.
-`numpy.unwrap` joins the turns.
+`numpy.unwrap` joins the turns. A clock is set for summer time where, of regular stamps, one step is
+an hour too short or too long, in the first hours of a Sunday of the months in which clocks are set.
 """
 
 from __future__ import annotations
+
+from typing import Any
 
 import numpy as np
 
@@ -18,6 +21,11 @@ _FEWEST = 30  # samples of which a tenth at most are jumps
 _SEVERAL = 4  # jumps of a counter of another range; one jump of a noisy step may look alike
 _ANGLES = (2 * np.pi, 360.0)
 _BITS = tuple(2.0**bits for bits in range(8, 33))  # registers of counters: a byte to four
+_BACK, _FORWARD = (4, 10, 11), (3, 9, 10)
+"""Months, of both hemispheres."""
+_EARLY = np.timedelta64(4, "h")  # after midnight
+_REGULAR = 1 / 3  # of a step
+_HOUR = np.timedelta64(1, "h")  # by which clocks are set
 
 
 @np.errstate(over="ignore", invalid="ignore")  # the largest doubles
@@ -65,3 +73,41 @@ def counter_period(values: FloatArray) -> float | None:
     if abs(usual - period) <= slack and usual > reach:
         return float(usual)
     return float(np.round(period)) if counts and inner.size >= _SEVERAL else None
+
+
+def clock_change(stamps: np.ndarray[Any, np.dtype[np.datetime64]]) -> tuple[int, int]:
+    """Find the change of a clock that shows summer time.
+
+    Parameters
+    ----------
+    stamps : ndarray of datetime64, shape (N,)
+
+    Returns
+    -------
+    row, hours : int
+        First stamp after the change, and by how many hours the clock was set: -1, 1, or 0 for none.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from ctrl_realize.numerics.signals.counters import clock_change
+    >>> utc = np.datetime64("2025-10-26T00:00") + np.timedelta64(10, "m") * np.arange(12)
+    >>> clock_change(utc + np.timedelta64(1, "h") * (2 - (np.arange(12) >= 6)))
+    (6, -1)
+    >>> clock_change(utc)
+    (0, 0)
+    """
+    steps = np.diff(stamps) / _HOUR
+    usual = float(np.median(steps)) if steps.size else 0.0
+    odd = np.flatnonzero(np.abs(steps - usual) > _REGULAR * usual)
+    if odd.size != 1 or not usual > 0:
+        return 0, 0
+    row = int(odd[0]) + 1
+    turn = float(steps[row - 1]) - usual
+    day = stamps[row].astype("datetime64[D]")
+    month = int(stamps[row].astype("datetime64[M]").astype(int)) % 12 + 1
+    months = {-1: _BACK, 1: _FORWARD}.get(round(turn), ())
+    at_night = np.is_busday(day, weekmask="Sun") and stamps[row] - day <= _EARLY
+    if abs(turn - round(turn)) > _REGULAR * usual or not at_night or month not in months:
+        return 0, 0
+    return row, round(turn)

@@ -1,0 +1,158 @@
+"""Samples of input and output with their time stamps, and the record that they make."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..errors import DataWarning, OptionError, TimeAxisError, warn_caller
+from ..numerics.arrays import FloatArray
+from ..numerics.signals.counters import counter_period
+from ..numerics.signals.time_axis import axis_fault
+from .record import Record
+
+COARSE = 0.2
+"""Share of repeated stamps above which the clock is coarser than the sample time."""
+_APART, _FEW = 0.5, 20
+"""Share of rows with one of both signals, in a union of their stamps, and rows that tell it."""
+_LONG = 2.5
+"""Usual steps in which an input may move unseen."""
+
+
+@dataclass(frozen=True, eq=False)
+class Samples:
+    """Input and output with the stamps of each, as they stand in a file.
+
+    ``input_time`` is None where the samples of the input are those of the output.
+    """
+
+    time: FloatArray
+    input: FloatArray
+    output: FloatArray
+    input_time: FloatArray | None
+    place: Callable[[int], str]
+
+    def record(self, labels: dict[str, Any], *, treatment: str, resample: bool) -> Record:
+        """Make a record: as it is, with gaps on a finer time axis, or interpolated."""
+        if resample:
+            return Record.resampled(self.time, self.at_outputs(), self.output, **labels)
+        if treatment == "refuse":
+            return Record(self.time, self.at_outputs(), self.output, **labels)
+        time, input, output = self.time, self.input, self.output
+        if self.input_time is None:
+            # a stamp that comes twice was stored twice, or corrected: the later one holds
+            last = np.r_[np.diff(time) != 0, True]
+            time, input, output = time[last], input[..., last], output[..., last]
+            holds = treatment == "hold" and np.isnan(input).any()
+            if axis_fault(time) is None and not holds:
+                return Record(time, input, output, missing="keep", **labels)
+        return Record.from_samples(time, input, output, input_time=self.input_time, **labels)
+
+    def as_found(self, path: Path) -> tuple[Samples, str]:
+        """Samples and their treatment where none is asked for; what is missing is told.
+
+        An input holds its value through a gap if it has the same behind it; where it moved
+        meanwhile, a gap in time is refused, and a missing value stays missing.
+        """
+        fault = axis_fault(self.time)
+        lost = [np.isnan(np.atleast_2d(one)) for one in (self.input, self.output)]
+        if fault is not None and (
+            fault.kind not in ("gap", "not_uniform", "repeated")
+            or np.mean(np.diff(self.time) == 0) > COARSE
+            or np.any(np.diff(self.time) < 0)
+        ):
+            return self, "refuse"
+        if fault is None and not any(one.any() for one in lost):
+            return self, "refuse" if self.input_time is None else "keep"
+        said = "some stamps are irregular" if fault is not None else ""
+        samples = self
+        if self.input_time is None:
+            no_input, no_output = (one.all(axis=0) for one in lost)
+            if no_input.size > _FEW and np.mean(no_input != no_output) > _APART:
+                said = "input and output have their own stamps, between which the input holds"
+                samples = replace(
+                    self, time=self.time[~no_output], output=self.output[..., ~no_output],
+                    input=self.input[..., ~no_input], input_time=self.time[~no_input],
+                )  # fmt: skip
+            else:
+                samples = replace(self, input=self._held(fault is not None))
+                rows = np.flatnonzero(no_input | lost[1].any(axis=0))
+                if rows.size:
+                    first = self.place(int(rows[0]))
+                    said = f"{rows.size} samples have missing values, the first in {first}" + (
+                        f", and {said}" if said else ""
+                    )
+        if said:
+            warn_caller(
+                f"{path}: {said}; they are kept as they are (missing='refuse' refuses them)",
+                DataWarning,
+            )
+        return samples, "keep"
+
+    def _held(self, in_time: bool) -> FloatArray:
+        """Input with its values through gaps; in gaps of time it must not have moved."""
+        input = np.array(self.input)
+        long = _LONG * float(np.median(np.diff(self.time)))
+        for row in np.atleast_2d(input):
+            known = np.flatnonzero(~np.isnan(row))
+            gaps = (np.diff(known) > 1) | (np.diff(self.time[known]) > long)
+            for place in np.flatnonzero(gaps):
+                before, after = known[place : place + 2]
+                if row[before] == row[after]:
+                    row[before:after] = row[before]
+                elif in_time and self.time[after] - self.time[before] > long:
+                    raise TimeAxisError(
+                        f"there are no values between {self.time[before]:g} s and "
+                        f"{self.time[after]:g} s ({self.place(int(after))}), and the input moved "
+                        "meanwhile; missing='hold' holds its value, as a historian stores it"
+                    )
+        return input
+
+    def joined(self, period: float) -> Samples:
+        """Return the samples with the turns of counters among the outputs joined.
+
+        Raises
+        ------
+        OptionError
+            The range of the outputs is longer than a turn.
+        """
+        output = np.array(self.output)
+        rows = [row[~np.isnan(row)] for row in np.atleast_2d(output)]
+        fitting = [row.size > 0 and np.ptp(row) <= period for row in rows]
+        if not any(fitting):
+            raise OptionError(
+                f"wrap={period:g}: the output runs from {np.nanmin(output):g} to "
+                f"{np.nanmax(output):g}; expected the number of values of its counter, such as 4096"
+            )
+        for row, joins in zip(np.atleast_2d(output), fitting, strict=True):
+            if joins:
+                row[~np.isnan(row)] = np.unwrap(row[~np.isnan(row)], period=period)
+        return replace(self, output=output)
+
+    def without_turns(self, path: Path, wrap: float | None) -> Samples:
+        """Samples with the turns of counters joined; those that are found are told."""
+        if wrap is not None:
+            return self.joined(wrap) if wrap else self
+        periods = {counter_period(row) for row in np.atleast_2d(self.output)} - {None}
+        if not periods:
+            return self
+        period = min(map(float, periods))  # type: ignore[arg-type]
+        warn_caller(
+            f"{path}: the output jumps like a counter that starts again after {period:.6g}, whose "
+            "turns are joined; wrap=0 takes it as it is",
+            DataWarning,
+        )
+        return self.joined(period)
+
+    def at_outputs(self) -> FloatArray:
+        """Input at the stamps of the output; it holds its value between its own."""
+        if self.input_time is None:
+            return self.input
+        last = np.searchsorted(self.input_time, self.time, side="right") - 1
+        held = np.array(self.input[..., np.maximum(last, 0)])
+        held[..., last < 0] = np.nan  # before its first sample it is unknown
+        return held
