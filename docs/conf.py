@@ -107,6 +107,12 @@ TABLES = {
         "python -m benchmarks.ablation --made-for 24 --only ... "
         "--output docs/tables/ablation_slow_noise_table.md",
     ),
+    "ablation_nyquist": (
+        "docs/tables/ablation_nyquist_table.md",
+        "python -m benchmarks.ablation --made-for 24 --only Nyquist "
+        "--output docs/tables/ablation_nyquist_table.md",
+    ),
+    "kinds": ("docs/tables/kinds_table.md", "python -m benchmarks.records kinds"),
     "verdicts_measured": (
         "docs/tables/verdicts_measured_table.md",
         "python -m benchmarks.verdicts --measured ... "

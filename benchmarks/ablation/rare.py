@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+import ctrl_realize as cr
+from benchmarks.relay import __main__ as tests
 from benchmarks.worlds import sensors, steps
 from benchmarks.worlds.simulation import (
     DT,
@@ -233,6 +235,23 @@ WORLDS = (
     noise_of_the_response,
 )
 
+
+def relay_test(rng: Rng) -> Case:
+    """A biased relay test of a plant with a dead time of twice its lag; noise of 2 % of its swing.
+
+    The output of such a plant is exponentials from corner to corner, whose errors are of the
+    highest frequencies.
+    """
+    noise = 0.02 * tests.AMPLITUDE / 2
+    plant = tests.plant("twice a lag", noise, 0.0, 1.0)
+    width, bias = 3 * noise, 0.3 * tests.AMPLITUDE
+    test = cr.bench.relay_test(
+        plant, tests.AMPLITUDE, rng, hysteresis=width, bias=bias, cycles=tests.CYCLES
+    )
+    truth = plant.truth
+    return Case(test, truth.dead_time, truth.gain, truth.dead_time + 6.0)
+
+
 MADE_FOR = {
     "unlike residual left alone": noise_of_the_response,
     "noise made white": waves_on_a_canal,
@@ -263,5 +282,6 @@ MADE_FOR = {
     "slope that was nothing": rest_like_a_slope,
     "no dispersion where rounding is coarse": sensors.coarse,
     "estimates against a pinned likelihood": drive_with_friction,
+    "no pair at the Nyquist frequency": relay_test,
 }
 """Rules, and the world that each was made for."""

@@ -397,6 +397,10 @@ SWITCHES = (
     ),
     Switch("start from the correlation", {f"{FITS}.any_input.window:_seen": giving([])}),
     Switch(
+        "no pair at the Nyquist frequency",
+        {f"{ENGINE}.window_fit:at_nyquist": giving(False)},
+    ),
+    Switch(
         "records weighted by their noise",
         {f"{FITS}.any_input.window:_noise_levels": _alike_noise},
     ),
