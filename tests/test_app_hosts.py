@@ -7,6 +7,7 @@ import subprocess
 import sys
 import threading
 import time
+from contextlib import closing
 
 import pytest
 
@@ -19,7 +20,7 @@ from tests.app_records import messy_csv, step_record
 
 @pytest.fixture(scope="module")
 def server():
-    with Host(Session()) as host, AppServer(host) as running:
+    with closing(Host(Session())) as host, AppServer(host) as running:
         thread = threading.Thread(target=running.serve_forever)
         thread.start()
         yield running
@@ -89,7 +90,7 @@ def test_a_command_from_the_page_is_answered(server):
     status, _, text = ask(server, "command", "POST", {"do": "view", "id": "7"}, Origin=origin,
                           Sec_Fetch_Site="same-origin")  # fmt: skip
     answer = json.loads(text)
-    assert (status, answer["id"], answer["view"]["pending"]) == (200, "7", [])
+    assert (status, answer["id"], answer["view"]["pending"]) == (200, "7", "")
 
 
 @pytest.mark.parametrize("body", [["view"], "view", 7])
@@ -102,19 +103,19 @@ def test_what_is_no_command_is_refused(server, body):
 def test_long_work_is_cancelled_and_can_be_done_later():
     session = Session()
     session.add_record(step_record())
-    with Host(session) as host:
+    with closing(Host(session)) as host:
         before = json.dumps(session.state)
         answers = []
         work = threading.Thread(target=lambda: answers.append(host.answer({"do": "compute"})))
         work.start()
         while not answers and work.is_alive():
-            host.cancel()
+            host.answer({"do": "cancel"})
             time.sleep(0.05)
         work.join()
         assert answers[0]["cancelled"]
         assert answers[0]["error"].startswith("cancelled")
         assert json.dumps(session.state) == before
-        host.cancel()  # nothing is being done
+        host.answer({"do": "cancel"})  # nothing is being done
         view = host.answer({"do": "compute"})["view"]
         assert view["model"]["parameters"][1]["value"] == cr.identify(step_record()).fit.dead_time
 

@@ -11,129 +11,108 @@ import numpy as np
 
 from .._wording import in_time
 from ..delayed import DelayedStateSpace, delayed_ss
-from ..design import LoopSimulation, PIDController, simulate_loop, to_continuous
+from ..design import LoopSimulation, PIDController, simulate_loop
 from ..design.tuning.pid import TuningOptions, pid, tuned
 from ..errors import CtrlRealizeError, CtrlRealizeWarning
-from ..identification.plausible import PlausibleModels, continuous_core
-from ..numerics.arrays import FloatArray
+from ..identification import OutputErrorFit
+from ..identification.plausible import continuous_core
+from ..numerics.arrays import BoolArray, FloatArray
 from ..numerics.loops.reference import largest_sensitivity
-from .drawing import JSON, axis, band, level, line, lines, number, panel, time_axis
+from ..report.controller import unsafe_if
+from .drawing import JSON, axis, layer, line, panel, time_axis
 
 SPEEDS = {"simc": 4.0, "imc": 4.0, "lambda": 4.0, "optimal": 1.0}
 """Rules that can be made quicker or more cautious, and the ratio of their closed-loop times at the
 ends to that in the middle; for the optimal one it is Ms that changes."""
+_MIDDLE = {"lambda": 3.0}  # closed-loop time in the middle, in dead times, where it is not one
 _MS = (1.2, 2.0)
 _SAMPLES, _FEW_SAMPLES = 500, 250  # of a simulated loop, at rest and while the slider moves
-_SETTLED = 4.0  # integral times or lags, which a loop is shown for
-_POINTS = 600  # of frequency
+_SETTLED = 4.0  # integral times and dead times, which a loop is shown for
+_POINTS = 600  # of frequency, twice
 _THIN = 4  # samples of a simulated loop for each point of a curve that is one of many
+_ROOM = 0.08  # of an axis
 
 
 @dataclass(frozen=True, eq=False)
 class TunedLoop:
-    """A controller with what was said about it, and Ms with each plausible plant."""
+    """A controller with what was said about it.
+
+    `sensitivities` (1 + 39,) are Ms with the model and with each plausible plant; infinite where
+    the loop is unstable.
+    """
 
     controller: PIDController
     sensitivities: FloatArray
-    own: float
-    warnings: tuple[str, ...] = ()
-    checked: bool = True
-
-
-def rule_options(settings: Mapping[str, Any], dead_time: float) -> JSON:
-    """Keyword arguments of `pid` for the settings of a page; dead time with hold, in s."""
-    rule, speed = settings["rule"], settings["speed"]
-    options: JSON = {"rule": rule, "kind": settings["kind"]}
-    if speed is None or rule not in SPEEDS:
-        return options
-    if rule == "optimal":
-        options["max_sensitivity"] = float(f"{_MS[0] + speed * (_MS[1] - _MS[0]):.3g}")
-    else:
-        middle = dead_time * (3.0 if rule == "lambda" else 1.0)
-        options["closed_loop_time"] = float(f"{middle * SPEEDS[rule] ** (1 - 2 * speed):.3g}")
-    return options
+    warnings: tuple[str, ...]
 
 
 def middle_time(system: DelayedStateSpace) -> float:
-    """Dead time of a plant with half a sample for the hold; a sample at least."""
+    """Dead time of a plant with half a sample for the hold, in s; a sample at least."""
     return max(float(system.dead_time) + 0.5 * float(system.dt), float(system.dt))
 
 
-def tuned_loop(system: DelayedStateSpace, settings: Mapping[str, Any]) -> TunedLoop:
-    """Tune a controller and check its loop; a task, since the check takes a moment."""
-    options = rule_options(settings, middle_time(system))
-    with warnings.catch_warnings(record=True) as told:
-        warnings.simplefilter("always", CtrlRealizeWarning)
-        controller = pid(system, **options)
-    own, others = sensitivities(system, controller)
+def rule_options(settings: Mapping[str, Any], system: DelayedStateSpace) -> JSON:
+    """Keyword arguments of `pid` for the settings of a page."""
+    rule, speed = settings["rule"], settings["speed"]
+    name, value = "closed_loop_time", middle_time(system) * _MIDDLE.get(rule, 1.0)
+    if rule == "optimal":
+        name, value = "max_sensitivity", _MS[0] + speed * (_MS[1] - _MS[0])
+    value *= SPEEDS.get(rule, 1.0) ** (1 - 2 * speed)
+    quick = {name: float(f"{value:.3g}")} if rule in SPEEDS else {}
+    return {"rule": rule, "kind": settings["kind"], **quick}
+
+
+def tuned_loop(
+    system: DelayedStateSpace, settings: Mapping[str, Any], *, checked: bool = True
+) -> TunedLoop:
+    """Tune a controller; a check of its loop with margins and advice takes a moment."""
+    options, told = rule_options(settings, system), []
+    if checked:
+        with warnings.catch_warnings(record=True) as told:
+            warnings.simplefilter("always", CtrlRealizeWarning)
+            controller = pid(system, **options)
+    else:
+        rule, kind = options.pop("rule"), options.pop("kind")
+        controller, _ = tuned(system, rule, kind, TuningOptions(**options))
     said = tuple(str(one.message) for one in told)
-    return TunedLoop(controller, others, own, said)
-
-
-def sketched_loop(system: DelayedStateSpace, settings: Mapping[str, Any]) -> TunedLoop:
-    """As `tuned_loop`, at once: without the margins and the advice."""
-    options = rule_options(settings, middle_time(system))
-    rule, kind = options.pop("rule"), options.pop("kind")
-    controller, _ = tuned(system, rule, kind, TuningOptions(**options))
-    own, others = sensitivities(system, controller)
-    return TunedLoop(controller, others, own, checked=False)
-
-
-def sensitivities(system: DelayedStateSpace, controller: PIDController) -> tuple[float, FloatArray]:
-    """Ms with the model, and with each plausible plant; infinite where the loop is unstable."""
     dt = float(system.dt)
     # A crossover near half the sample rate needs steps of equal width.
     slow = np.geomspace(1e-3 / middle_time(system), np.pi / dt, _POINTS)
-    omega = np.union1d(slow, np.linspace(0.0, np.pi / dt, _POINTS)[1:])
-    z = np.exp(1j * omega * dt)
-    models = plausible(system)
-    plants = [system, *(() if models is None else models.systems)]
-    response = np.stack([np.ravel(one(z)) for one in plants]) * np.ravel(controller(z))
-    own, *others = largest_sensitivity(response)
-    return float(own), np.array(others)
+    z = np.exp(1j * dt * np.union1d(slow, np.linspace(0.0, np.pi / dt, _POINTS)[1:]))
+    response = np.stack([np.ravel(one(z)) for one in _plants(system)]) * np.ravel(controller(z))
+    return TunedLoop(controller, largest_sensitivity(response), said)
 
 
-def plausible(system: DelayedStateSpace) -> PlausibleModels | None:
-    """Models that the data do not rule out."""
-    found = None if system.fit is None else system.fit.plausible_models
-    return found if isinstance(found, PlausibleModels) else None
+def _plants(system: DelayedStateSpace) -> list[DelayedStateSpace]:
+    """The model, and those that the data do not rule out."""
+    models = None if system.fit is None else system.fit.plausible_models
+    return [system, *(() if models is None else models.systems)]
 
 
-def simulated(
-    system: DelayedStateSpace, loop: TunedLoop, settings: Mapping[str, Any], *, all_plants: bool
-) -> list[tuple[str, list[LoopSimulation]]]:
+def _simulated(
+    system: DelayedStateSpace, controller: PIDController, settings: Mapping[str, Any], whole: bool
+) -> dict[str, list[LoopSimulation]]:
     """Set-point and load steps: of the model, then of each plausible plant.
 
     Where a sample is short beside the loop, controller and plants are sampled more coarsely.
     """
-    controller, count = loop.controller, _SAMPLES if all_plants else _FEW_SAMPLES
-    slow = controller.ti if np.isfinite(controller.ti) else middle_time(system)
-    length = _SETTLED * (slow + 2 * middle_time(system)) + 4 * middle_time(system)
-    every = max(1, int(np.ceil(length / count / float(system.dt))))
-    dt = every * float(system.dt)
-    models = plausible(system)
-    plants: list[DelayedStateSpace] = [system]
-    if models is not None and all_plants:
-        plants += models.systems
-    if every > 1:
+    count, wait = _SAMPLES if whole else _FEW_SAMPLES, middle_time(system)
+    slow = controller.ti if np.isfinite(controller.ti) else wait
+    every = max(1, int(np.ceil(_SETTLED * (slow + 3 * wait) / count / float(system.dt))))
+    plants, fit = _plants(system) if whole else [system], system.fit
+    if every > 1 and isinstance(fit, OutputErrorFit):
+        dt, found = every * float(system.dt), fit.plausible_models if whole else None
         controller = controller.discretised(dt)
-        chosen = [] if models is None or not all_plants else list(models.models)
-        core, wait = to_continuous(system)
-        plants = [delayed_ss(core, dead_time=wait, dt=dt)] + [
-            delayed_ss(continuous_core(one.numerator, one.poles), dead_time=one.dead_time, dt=dt)
-            for one in chosen
-        ]
-    size = settings["setpoint"]
-    limits = settings["limits"]
-    given: JSON = {} if limits is None else {"output_limits": tuple(limits)}
-    found = []
-    for name, steps in (
-        ("set point", {"setpoint_step": size}),
-        ("load", {"setpoint_step": 0.0, "load_step": settings["load"]}),
-    ):
-        runs = [simulate_loop(one, controller, count, **steps, **given) for one in plants]
-        found.append((name, runs))
-    return found
+        parts = [(fit.estimate.numerator, fit.poles, fit.dead_time)]
+        parts += [(m.numerator, m.poles, m.dead_time) for m in (found.models if found else ())]
+        plants = [delayed_ss(continuous_core(b, p), dead_time=L, dt=dt) for b, p, L in parts]
+    more: JSON = {} if settings["limits"] is None else {"output_limits": settings["limits"]}
+    steps = {"set point": (settings["setpoint"], 0.0), "load": (0.0, settings["load"])}
+    return {
+        name: [simulate_loop(one, controller, count, setpoint_step=up, load_step=load, **more)
+               for one in plants]
+        for name, (up, load) in steps.items()
+    }  # fmt: skip
 
 
 def noise_at_actuator(system: DelayedStateSpace, controller: PIDController) -> float:
@@ -144,8 +123,7 @@ def noise_at_actuator(system: DelayedStateSpace, controller: PIDController) -> f
     noise = getattr(system.fit, "noise_model", None)
     if noise is None:
         return float("nan")
-    omega = np.linspace(0.0, np.pi, 4000)[1:]
-    z = np.exp(1j * omega)
+    z = np.exp(1j * np.linspace(0.0, np.pi, 4000)[1:])
     response = np.ravel(controller(z))
     through = response / (1 + response * np.ravel(system(z)))
     spectrum = noise.std**2 * np.abs(np.ravel(noise.system(z))) ** 2
@@ -157,95 +135,69 @@ def drawn(
     all_plants: bool = True,
 ) -> JSON:  # fmt: skip
     """Panels, margins and noise of a loop; while a slider moves, of the model alone."""
-    runs = simulated(system, loop, settings, all_plants=all_plants)
+    runs = _simulated(system, loop.controller, settings, all_plants)
     noise = noise_at_actuator(system, loop.controller)
-    unstable = ~np.isfinite(loop.sensitivities)
-    panels = [one for name, each in runs for one in _panels(name, each, unstable, settings, noise)]
+    unstable = ~np.isfinite(loop.sensitivities[1:])
+    said = f"the noise of the record moves the controller output by {noise:.4g} (std)"
     return {
-        "panels": panels,
-        "margins": _margins(loop, unstable),
-        "noise": "" if np.isnan(noise) else
-                 f"the noise of the record moves the controller output by {number(noise)} (std)",
-        "warnings": list(loop.warnings),
+        "panels": [_panel(name, part, each, unstable, settings, noise)
+                   for name, each in runs.items() for part in ("measured", "output")],
+        "margins": _margins(loop, unstable), "noise": "" if np.isnan(noise) else said,
+        "warnings": [*loop.warnings], "unsafe": [*unsafe_if(system, loop.controller)],
     }  # fmt: skip
 
 
-def _panels(
-    name: str, runs: Sequence[LoopSimulation], unstable: FloatArray, settings: Mapping[str, Any],
-    noise: float,
-) -> list[JSON]:  # fmt: skip
-    factor, across = time_axis(float(runs[0].time[-1]))
-    time = factor * runs[0].time
-    across["ends"] = [0.0, float(time[-1])]
-    found = []
-    for key, title in (("measured", "measured value"), ("output", "controller output")):
-        own = np.asarray(getattr(runs[0], key))
-        others = [np.asarray(getattr(one, key)) for one in runs[1:]]
-        ends = _view_of(own, [one for one, bad in zip(others, unstable, strict=False) if not bad])
-        far, layers = _far(ends), []
-        for look, bad, said in (
-            ("plausible", False, "plants that the record allows"),
-            ("bad", True, "unstable"),
-        ):
-            shown = [one for one, is_bad in zip(others, unstable, strict=False) if is_bad == bad]
-            if shown:
-                curves = [np.clip(one[::_THIN], *far) for one in shown]
-                layers.append(lines(time[::_THIN], curves, look, said))
-        if key == "output" and np.isfinite(noise):
-            layers.append(band(time, own - 2 * noise, own + 2 * noise, "noise", "with its noise"))
-        if key == "output" and settings["limits"] is not None:
-            layers += [level(end, "input", "limit") for end in settings["limits"]]
-        if key == "measured" and name == "set point":
-            layers.append(level(settings["setpoint"], "input", "set point"))
-        layers.append(line(time, own, "model", "model", key="model"))
-        x = dict(across)
-        y = axis(title, "", ends)
-        found.append(panel(f"{key}-{name.replace(' ', '-')}", f"{name.capitalize()}: {title}", x, y,
-                           layers))  # fmt: skip
-    return found
+def _panel(
+    name: str, part: str, runs: Sequence[LoopSimulation], unstable: BoolArray,
+    settings: Mapping[str, Any], noise: float,
+) -> JSON:  # fmt: skip
+    factor, across = time_axis(runs[0].time)
+    time, (own, *others) = factor * runs[0].time, (getattr(one, part) for one in runs)
+    stable = np.stack([own, *(y for y, bad in zip(others, unstable, strict=False) if not bad)])
+    low, high = stable.min(axis=0), stable.max(axis=0)
+    room = _ROOM * float(high.max() - low.min() or 1.0)
+    ends = float(low.min()) - room, float(high.max()) + room
+    layers = []
+    if others:
+        said = "plants that the record allows"
+        layers.append(layer("band", "band", said, x=time, low=low, high=high))
+    if others and unstable.any():
+        far = 2 * ends[0] - ends[1], 2 * ends[1] - ends[0]
+        many = np.clip(np.stack(others)[unstable], *far)[:, ::_THIN]
+        said = "plants with which it is unstable"
+        layers.append(layer("lines", "bad", said, x=time[::_THIN], many=many))
+    if part == "output" and np.isfinite(noise):
+        around = {"low": own - 2 * noise, "high": own + 2 * noise}
+        layers.append(layer("band", "noise", "with its noise", x=time, **around))
+    limits = settings["limits"] or () if part == "output" else ()
+    layers += [layer("level", "input", "limit", y=end) for end in limits]
+    layers.append(line(time, own, "model", "model"))
+    title = {"measured": "measured value", "output": "controller output"}[part]
+    y, key = axis(title, "", ends), f"{part}-{name.replace(' ', '-')}"
+    return panel(key, f"{name.capitalize()}: {title}", across, y, layers)
 
 
-def _view_of(own: FloatArray, others: Sequence[FloatArray]) -> list[float]:
-    """Ends of an axis, by the loops that are stable."""
-    every = np.concatenate([own, *others])
-    low, high = float(every.min()), float(every.max())
-    room = 0.08 * (high - low or 1.0)
-    return [low - room, high + room]
-
-
-def _far(ends: Sequence[float]) -> tuple[float, float]:
-    size = ends[1] - ends[0]
-    return ends[0] - size, ends[1] + size
-
-
-def _margins(loop: TunedLoop, unstable: FloatArray) -> list[tuple[str, str]]:
-    rows = []
-    check = loop.controller.check
-    if check is not None and check.stable:
-        found = check.margins
-        rows = [
-            ("Ms", f"{found.ms:.3g}"),
-            ("gain margin", f"{found.gain_margin:.3g}"),
-            ("phase margin", f"{found.phase_margin:.3g}°"),
-            ("delay margin", in_time(found.delay_margin, 3)),
-        ]
-    else:
-        rows = [("Ms", f"{loop.own:.3g}" if np.isfinite(loop.own) else "unstable")]
-    if loop.sensitivities.size:
-        worst = float(np.sort(loop.sensitivities)[-2])
-        rows.append(("Ms on plausible plants", f"at most {worst:.3g}" if np.isfinite(worst)
-                     else "unstable"))  # fmt: skip
-        rows.append(("unstable plants", f"{int(unstable.sum())} of {unstable.size}"))
-    return rows
+def _margins(loop: TunedLoop, unstable: BoolArray) -> list[tuple[str, str]]:
+    own, *others = loop.sensitivities
+    found = {"Ms": f"{own:.3g}" if np.isfinite(own) else "unstable"}
+    if (check := loop.controller.check) is not None:
+        sizes = check.margins
+        found["gain margin"] = f"{sizes.gain_margin:.3g}"
+        found["phase margin"] = f"{sizes.phase_margin:.3g}°"
+        found["delay margin"] = in_time(sizes.delay_margin, 3)
+    if unstable.size:
+        worst = float(np.sort(others)[-2])  # of forty, one is worse
+        said = f"at most {worst:.3g}" if np.isfinite(worst) else "unstable"
+        found["Ms on plausible plants"] = said
+        found["unstable plants"] = f"{unstable.sum()} of {unstable.size}"
+    return [*found.items()]
 
 
 def form_ranges(settings: Mapping[str, Any]) -> JSON:
     """Keyword arguments of `as_form`."""
-    return {
-        key: tuple(settings[key]) if isinstance(settings[key], list) else settings[key]
-        for key in ("measured_range", "output_range", "time_unit")
-        if settings[key] is not None
-    }
+    given = {key: settings[key] for key in ("measured_range", "output_range", "time_unit")}
+    return {key: tuple(value) if isinstance(value, list) else value
+            for key, value in given.items() if value is not None}  # fmt: skip
 
 
 def numbers_to_enter(controller: PIDController, settings: Mapping[str, Any]) -> JSON:
@@ -253,6 +205,5 @@ def numbers_to_enter(controller: PIDController, settings: Mapping[str, Any]) -> 
     try:
         form = controller.as_form(settings["form"], **form_ranges(settings))
     except CtrlRealizeError as error:
-        return {"title": "", "rows": [], "notes": [], "error": str(error)}
-    return {"title": form.title, "rows": form._rows(), "notes": [*form.notes, *form.choices],
-            "error": ""}  # fmt: skip
+        return {"rows": [], "notes": [], "error": str(error)}
+    return {"rows": form._rows(), "notes": [*form.notes, *form.choices], "error": ""}

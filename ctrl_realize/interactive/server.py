@@ -11,30 +11,17 @@ import json
 import secrets
 import webbrowser
 from collections.abc import Callable, Iterable
-from contextlib import suppress
+from contextlib import closing, suppress
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 from typing import Any
 
-from .hosting import Host, page_style, static
+from .hosting import PAGE, Host, page_part
 from .session import Session
 
 LOOPBACK = "127.0.0.1"
 MOST_BYTES = 768 * 2**20
 """Largest command: a file of half a gigabyte in base 64."""
-POLICY = (
-    "default-src 'none'; script-src 'self'; style-src 'self' 'unsafe-inline'; img-src 'self' "
-    "data:; connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
-)
-_HEADERS = {
-    "Content-Security-Policy": POLICY,
-    "X-Content-Type-Options": "nosniff",
-    "Referrer-Policy": "no-referrer",
-    "Cross-Origin-Resource-Policy": "same-origin",
-    "Cache-Control": "no-store",
-}
-_KINDS = {"html": "text/html", "js": "text/javascript", "css": "text/css",
-          "json": "application/json"}  # fmt: skip
 
 
 class AppServer(ThreadingHTTPServer):
@@ -66,73 +53,52 @@ class _Handler(BaseHTTPRequestHandler):
 
     def do_GET(self) -> None:
         """Send the page or one of its parts."""
-        if (place := self._allowed()) is None:
-            return
-        pages: dict[str, Callable[[], str]] = {
-            "": lambda: static("index.html"),
-            "app.js": lambda: static("app.js"),
-            "page.js": lambda: static("page.js"),
-            "app.css": page_style,
-        }
-        if place not in pages:
-            self._send(404, "html", "there is no such page")
-            return
-        kind = place.rpartition(".")[2] or "html"
-        self._send(200, kind, pages[place]())
+        place = self._allowed()
+        if place in PAGE["files"]:
+            self._send(200, *page_part(place))
+        elif place is not None:
+            self._send(404, "text/html", "there is no such page")
 
     def do_POST(self) -> None:
         """Carry out a command."""
         place = self._allowed(json_only=True)
-        if place is None:
-            return
         length = int(self.headers.get("Content-Length") or 0)
-        if place not in ("command", "cancel") or not 0 <= length <= MOST_BYTES:
-            self._send(404, "json", "{}")
-            return
+        if place is None:
+            return None
+        if place != "command" or not 0 <= length <= MOST_BYTES:
+            return self._send(404, "text/html", "there is no such page")
         try:
-            command = json.loads(self.rfile.read(length) or b"{}")
-            assert isinstance(command, dict)
-        except (ValueError, AssertionError, RecursionError):
-            self._send(400, "json", json.dumps({"error": "expected a command as a JSON object"}))
-            return
-        host = self.server.host
-        if place == "cancel":
-            host.cancel()
-            self._send(200, "json", "{}")
-        else:
-            self._send(200, "json", json.dumps(host.answer(command)))
+            command = json.loads(self.rfile.read(length))
+        except (ValueError, RecursionError):
+            command = None
+        if not isinstance(command, dict):
+            return self._send(400, "text/html", "expected a command, a JSON object")
+        return self._send(200, "application/json", json.dumps(self.server.host.answer(command)))
 
     def _allowed(self, json_only: bool = False) -> str | None:
         """Part of the address behind the token, or None after a refusal."""
-        port = self.server.server_address[1]
-        names = [f"{name}:{port}" for name in (LOOPBACK, "localhost")]
-        origin = self.headers.get("Origin")
+        hosts = [f"{name}:{self.server.server_address[1]}" for name in (LOOPBACK, "localhost")]
         token, _, place = self.path.partition("?")[0].lstrip("/").partition("/")
-        reasons = {
-            "another host name": self.headers.get("Host") not in names,
-            "another origin": origin is not None
-            and origin not in [f"http://{name}" for name in names],
-            "another site": self.headers.get("Sec-Fetch-Site", "none")
-            not in ("same-origin", "none"),
-            "not JSON": json_only
-            and self.headers.get_content_type() != "application/json",
-            "a wrong token": not hmac.compare_digest(
-                token.encode(), self.server.token.encode()
-            ),
-        }  # fmt: skip
-        wrong = [reason for reason, is_so in reasons.items() if is_so]
-        if not wrong:
+        said, own = self.headers, self.server.token.encode()
+        allowed = {
+            "another host name": said.get("Host") in hosts,
+            "another origin": said.get("Origin") in (None, *(f"http://{one}" for one in hosts)),
+            "another site": said.get("Sec-Fetch-Site") in (None, "none", "same-origin"),
+            "not JSON": not json_only or said.get_content_type() == "application/json",
+            "a wrong token": hmac.compare_digest(token.encode(), own),
+        }
+        if all(allowed.values()):
             return place
         self.close_connection = True  # what else the request holds is not read
-        self._send(403, "html", f"refused: {wrong[0]}")
+        wrong = next(why for why, is_so in allowed.items() if not is_so)
+        self._send(403, "text/html", f"refused: {wrong}")
         return None
 
     def _send(self, code: int, kind: str, text: str) -> None:
         content = text.encode()
         self.send_response(code)
-        self.send_header("Content-Type", f"{_KINDS[kind]}; charset=utf-8")
-        self.send_header("Content-Length", str(len(content)))
-        for name, value in _HEADERS.items():
+        own = {"Content-Type": f"{kind}; charset=utf-8", "Content-Length": str(len(content))}
+        for name, value in (own | PAGE["headers"]).items():
             self.send_header(name, value)
         self.end_headers()
         self.wfile.write(content)
@@ -161,7 +127,7 @@ def serve(
         answer = session.add_file(path)
         if "error" in answer:
             say(answer["error"])
-    with Host(session) as host, AppServer(host, port) as server:
+    with closing(Host(session)) as host, AppServer(host, port) as server:
         opened = browser and webbrowser.open(server.address)
         say(f"{'opened' if opened else 'open in a browser'}: {server.address}")
         say("Ctrl-C ends it; save the work in the page first")

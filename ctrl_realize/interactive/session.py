@@ -7,26 +7,25 @@ import hashlib
 import json
 from collections import OrderedDict
 from collections.abc import Callable, Mapping
-from contextlib import suppress
+from contextlib import AbstractContextManager, suppress
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 from .._wording import times_in
 from ..data import Record
 from ..data.shown_units import shown_time_unit
-from ..delayed import DelayedStateSpace
-from ..errors import CtrlRealizeError, DataError, FileFormatError, OptionError
-from . import loops, models, outputs, records
+from ..errors import CtrlRealizeError, DataError, FileFormatError
+from ..experiment import plan as plan_test
+from ..io.models import model_to_text
+from . import loops, model_view, models, outputs, records, saving
 from .data_view import Row, data_view
 from .drawing import JSON
-from .state import EMPTY, State, changed, checked
+from .state import State, changed, empty
 
-FORMAT, SCHEMA = "ctrl_realize work", 1
-MOST_BYTES = 512 * 2**20
 _KEPT, _MOST_UNDONE = 48, 200
-_NOT_UNDONE = ("select",)
-"""Commands that are no step for `undo`."""
+_REFUSED = (CtrlRealizeError, ArithmeticError)
 
 
 @dataclass(frozen=True)
@@ -39,14 +38,23 @@ class Task:
     arguments: tuple[Any, ...]
 
 
+class MissingError(Exception):
+    """What was asked for needs a task that has not been done."""
+
+    def __init__(self, task: Task) -> None:
+        super().__init__(task.what)
+        self.task = task
+
+
 class Session:
     """Work on records, a model and its loop, steered by commands.
 
-    A command is a dictionary with the name of what to do under ``"do"``, see `state.CHANGES`; there
-    are also ``"open"`` (a file), ``"compute"``, ``"drag"``, ``"slide"``, ``"undo"``, ``"redo"``,
-    ``"figures"``, ``"write"`` and ``"view"``. `apply` answers with JSON: the ``"view"``, or
-    ``"drag"``, ``"slide"``, ``"figures"`` or ``"written"``, and ``"error"``, a sentence, if there
-    is one. The same commands give the same answers.
+    A command is a dictionary with what to do under ``"do"``: ``"open"`` a file, ``"set"`` values of
+    a part (`state.CHECKS` lists them), ``"select"`` or ``"remove"`` a record, ``"undo"``,
+    ``"redo"``, ``"compute"`` what the view lacks, ``"drag"``, ``"slide"``, ``"figures"``,
+    ``"write"`` a file, ``"view"``. `apply` answers with JSON: the ``"view"``, or ``"drag"``,
+    ``"slide"``, ``"figures"`` or ``"written"``; and ``"error"``, a sentence, if there is one. The
+    same commands give the same answers.
 
     Examples
     --------
@@ -54,17 +62,21 @@ class Session:
     >>> from ctrl_realize.interactive.session import Session
     >>> session = Session()
     >>> session.add_record(cr.bench.valve(noise=0.01).step_record(16, rng=5))
-    >>> answer = session.apply({"do": "structure", "structure": [1, 1]})
-    >>> answer["view"]["pending"]
-    ['fitting all structures', 'fitting one structure']
+    >>> session.apply({"do": "set", "part": "model", "values": {"structure": [1, 1]}})["view"][
+    ...     "pending"
+    ... ]
+    'fitting all structures'
     """
 
     def __init__(self) -> None:
-        self.state: State = json.loads(json.dumps(EMPTY))
         self.files: dict[str, bytes] = {}
-        self._undo: list[State] = []
-        self._redo: list[State] = []
+        self._states, self._at = [empty()], 0
         self._results: OrderedDict[str, Any] = OrderedDict()
+
+    @property
+    def state(self) -> State:
+        """What the page shows, as JSON."""
+        return self._states[self._at]
 
     def add_file(self, path: str | Path) -> JSON:
         """Open a file of this machine, as the command ``"open"`` does with its content."""
@@ -74,182 +86,157 @@ class Session:
 
     def add_record(self, record: Record) -> None:
         """Take a record that there is already."""
-        content = records.given_content(records.checked_siso(record))
+        file = self._stored(records.given_content(record))
         name = record.name or "record"
-        self._change(
-            {"do": "add", "file": self._stored(content), "name": name, "options": {}, "given": True}
-        )
+        self._change({"do": "add", "file": file, "name": name, "options": {}, "given": True})
 
     def apply(self, command: Mapping[str, Any]) -> JSON:
         """Carry out a command and answer with JSON."""
-        done: JSON = {"id": command.get("id")}
-        try:
-            done |= self._applied(command)
-        except (CtrlRealizeError, OSError) as error:
-            done |= {"error": str(error)}
-        if not {"drag", "slide", "figures", "written"} & done.keys():
-            done["view"] = self.view()
-        return done
+        while isinstance(answer := self.attempt(command), Task):
+            self.store(answer, done(answer))
+            command = after(command)
+        return answer
 
-    def task(self, command: Mapping[str, Any]) -> Task | None:
-        """The long part of a command, to be done elsewhere and given to `store` before `apply`."""
-        name, task = command.get("do"), None
-        with suppress(CtrlRealizeError, ArithmeticError):  # `apply` says it
-            if name == "compute":
-                task = next(iter(self._pending()), None)
-            elif name == "figures":
-                task = self._figures()
-            elif name == "write" and command.get("what") == "report":
-                task = self._report()
-        return None if task is None or task.key in self._results else task
+    def attempt(self, command: Mapping[str, Any]) -> JSON | Task:
+        """Answer a command, or tell what has to be computed first, perhaps elsewhere.
+
+        Its result is for `store`; then the command that `after` gives is the next one.
+        """
+        answer: JSON = {"id": command.get("id")}
+        try:
+            answer |= self._answer(command)
+        except MissingError as found:
+            return found.task
+        except (*_REFUSED, OSError) as error:
+            answer["error"] = str(error)
+        if answer.keys() <= {"id", "error"}:
+            answer["view"] = self.view()
+        return answer
 
     def store(self, task: Task, result: Any) -> None:
         """Keep the result of a task, or the error that it ended with."""
         self._results[task.key] = result
-        self._results.move_to_end(task.key)
         while len(self._results) > _KEPT:
             self._results.popitem(last=False)
 
-    def saved(self) -> str:
-        """The work as text: files, state, and a checksum as in model files."""
-        content = {
-            "format": FORMAT, "schema": SCHEMA, "state": self.state,
-            "files": {key: base64.b64encode(self.files[key]).decode() for key in self._used()},
+    def view(self) -> JSON:
+        """All that a page shows of this state; what is not computed yet is None."""
+        seen: JSON = {
+            "state": self.state, "pending": "", "choices": outputs.CHOICES,
+            "can": {"undo": self._at > 0, "redo": self._at + 1 < len(self._states)},
         }  # fmt: skip
-        return json.dumps(content | {"sha256": _digest(content)}, indent=1) + "\n"
+        with self._units():
+            seen["data"] = self._data()
+            for name, part in self._parts().items():
+                seen[name] = None
+                try:
+                    seen[name] = part()
+                except MissingError as found:
+                    seen["pending"] = seen["pending"] or found.task.what
+                except _REFUSED as error:
+                    seen[name] = {"error": str(error)}
+            seen["script"] = self.script()
+        return seen
 
-    def open_saved(self, text: str) -> None:
-        """Take up work that was saved.
-
-        Raises
-        ------
-        FileFormatError
-            No such file, of a later version, edited or damaged.
-        """
-        try:
-            content = json.loads(text)
-        except (ValueError, RecursionError) as error:
-            raise FileFormatError(f"not a file of saved work, or truncated: {error}") from error
-        if not isinstance(content, dict) or content.get("format") != FORMAT:
-            raise FileFormatError(f"not a file of saved work; expected the format {FORMAT!r}")
-        if content.get("schema") != SCHEMA:
-            raise FileFormatError(
-                f"schema {content.get('schema')!r}; this version reads {SCHEMA}; update it"
-            )
-        if content.pop("sha256", None) != _digest(content):
-            raise FileFormatError("the checksum does not match: the file was edited or damaged")
-        files = {key: base64.b64decode(value) for key, value in content["files"].items()}
-        before, self.state = self.state, checked(content["state"], files)
-        self.files |= files
-        self._undo.append(before)
-        self._redo.clear()
+    def script(self) -> str:
+        """The lines of Python that do the same."""
+        known: JSON = {}
+        tuned: list[str] = []
+        with suppress(MissingError, *_REFUSED):
+            known = self._known()
+            self._get(self._tuned())
+            tuned = outputs.controller_lines(self.state["loop"], self._system())
+        return outputs.script(self.state, known, tuned)
 
     # -- commands ---------------------------------------------------------------------------------
 
-    def _applied(self, command: Mapping[str, Any]) -> JSON:
+    def _answer(self, command: Mapping[str, Any]) -> JSON:
         name = command.get("do")
-        if name == "view":
-            return {}
+        if name in ("drag", "slide"):
+            with self._units(), suppress(MissingError):  # there is nothing to drag yet
+                return {name: (self._drag if name == "drag" else self._slide)(command)}
+            return {name: None}
         if name == "compute":
-            task = next(iter(self._pending()), None)
-            if task is not None:
-                self._result(task)
-            return {}
-        if name == "drag":
-            return {"drag": self._drag(command.get("values", {}))}
-        if name == "slide":
-            return {"slide": self._slide(float(command["speed"]))}
+            for part in self._parts().values():
+                with suppress(*_REFUSED):
+                    part()
         if name == "figures":
-            return {"figures": self._result(self._figures())}
+            return {"figures": self._get(self._figures())}
         if name == "write":
-            return {"written": self._write(command)}
+            return {"written": self._write(str(command.get("what")))}
         if name == "open":
             self._open(command)
         elif name in ("undo", "redo"):
-            self._back(name)
-        else:
+            there = self._at + (1 if name == "redo" else -1)
+            self._at = min(max(there, 0), len(self._states) - 1)
+        elif name not in ("view", "compute"):
             self._change(command)
         return {}
 
     def _change(self, command: Mapping[str, Any]) -> None:
-        new = changed(self.state, command)
-        before, self.state = self.state, new
+        before = [*self._states], self._at
+        self._go_on(changed(self.state, command), kept=command["do"] != "select")
         try:
-            self._check(command)
+            with suppress(MissingError):
+                # What cannot be done with the data or the model does not become part of the state.
+                if command.get("part") == "record" and "options" not in command["values"]:
+                    self._record(command["index"])
+                if "known" in command.get("values", {}):
+                    self._known()
         except CtrlRealizeError:
-            self.state = before
+            self._states, self._at = before
             raise
-        if command["do"] not in _NOT_UNDONE and new != before:
-            self._undo = [*self._undo[-_MOST_UNDONE:], before]
-            self._redo.clear()
 
-    def _check(self, command: Mapping[str, Any]) -> None:
-        """Refuse what cannot be done with the data or the model, before it is part of the state."""
-        if command["do"] in ("range", "rest", "shift", "strike", "units"):
-            self._record(command.get("index", self.state["selected"]))
-        if command["do"] == "known" and self.state["model"]["known"]:
-            fit = models.fit_of_lags(self._free())
-            if fit is None:
-                raise OptionError("a parameter can be known in a model of lags with dead time only")
-            models.with_known(fit, self.state["model"]["known"])
-
-    def _back(self, name: str) -> None:
-        taken, given = (self._undo, self._redo) if name == "undo" else (self._redo, self._undo)
-        if taken:
-            given.append(self.state)
-            self.state = taken.pop()
+    def _go_on(self, state: State, kept: bool = True) -> None:
+        """Go to a new state, from which `undo` leads back to that before."""
+        if kept and state != self.state:
+            self._states = self._states[max(self._at - _MOST_UNDONE, 0) : self._at + 1]
+            self._at = len(self._states)
+            self._states.append(state)
+        else:
+            self._states[self._at] = state
 
     def _open(self, command: Mapping[str, Any]) -> None:
         name = str(command.get("name") or "file")
         content = base64.b64decode(command.get("content", ""))
-        if len(content) > MOST_BYTES:
-            raise FileFormatError(f"{name} has {len(content)} bytes; expected {MOST_BYTES} at most")
-        if content[:1] == b"{" and FORMAT.encode() in content[:200]:
-            self.open_saved(content.decode("utf-8", "replace"))
-            return
+        if saving.is_work(content):
+            state, files = saving.opened(content.decode("utf-8"))
+            self.files |= files
+            return self._go_on(state)
         options, reason = records.first_reading(content, name)
         given = {"file": self._stored(content), "name": name, "path": command.get("path")}
         if reason:
-            try:
+            with suppress(CtrlRealizeError):
                 records.read_response(content, name)
-            except CtrlRealizeError:
-                columns = records.preview(content, {"name": name, "options": {}})["columns"]
-                if not columns:
-                    raise FileFormatError(reason) from None
-                # a table of which the columns are not known yet: the page asks for them
-            else:
-                self._change({"do": "add_response", **given})
-                return
-        self._change({"do": "add", "options": options, **given})
+                return self._change({"do": "add_response", **given})
+            # The page asks for the columns of a table whose names do not tell them.
+            if not records.preview(content, {"name": name, "options": {}})["columns"]:
+                raise FileFormatError(reason)
+        return self._change({"do": "add", "options": options, **given})
 
-    def _drag(self, values: Mapping[str, Any]) -> JSON:
-        fit, free = (models.fit_of_lags(one) for one in (self._model(), self._free()))
-        if fit is None or free is None:
-            raise OptionError("this model has no parameters to drag")
-        with self._units():
-            return models.drag(fit, free, {str(k): float(v) for k, v in values.items()})
+    def _drag(self, command: Mapping[str, Any]) -> JSON:
+        values = {str(key): float(value) for key, value in command["values"].items()}
+        return models.drag(self._system(), self._free(), values)
 
-    def _slide(self, speed: float) -> JSON:
-        settings = self.state["loop"] | {"speed": speed}
-        system = self._model()
-        with self._units():
-            loop = loops.sketched_loop(system, settings)
-            numbers = loops.numbers_to_enter(loop.controller, settings)
-            return loops.drawn(system, loop, settings, all_plants=False) | {"numbers": numbers}
+    def _slide(self, command: Mapping[str, Any]) -> JSON:
+        settings = self.state["loop"] | {"speed": float(command["speed"])}
+        loop = loops.tuned_loop(system := self._system(), settings, checked=False)
+        numbers = loops.numbers_to_enter(loop.controller, settings)
+        return loops.drawn(system, loop, settings, all_plants=False) | {"numbers": numbers}
 
-    def _write(self, command: Mapping[str, Any]) -> JSON:
-        what = str(command.get("what"))
-        if what == "work":
-            return outputs.written("work.json", self.saved())
-        if what == "script":
-            return outputs.written("identify.py", self.script())
-        if what == "report":
-            return outputs.written("report.html", self._result(self._report()))
-        if what == "plan":
-            return outputs.plan_file(self._result(self._plan()))
-        task = self._loop_task()
-        return outputs.model_or_code(what, self._model(), lambda: self._result(task).controller,
-                                     self.state["loop"])  # fmt: skip
+    def _write(self, what: str) -> JSON:
+        texts: dict[str, tuple[str, Callable[[], str]]] = {
+            "work": ("work.json", lambda: saving.saved(self.state, self.files)),
+            "script": ("identify.py", self.script),
+            "report": ("report.html", lambda: str(self._get(self._report()))),
+            "plan": ("test.csv", lambda: outputs.plan_file(self._get(self._planned()))),
+            "model": ("model.json", lambda: model_to_text(self._system())),
+        }
+        if what in texts:
+            name, text = texts[what]
+            return outputs.written(name, text())
+        loop = self._get(self._tuned())
+        return outputs.code(what, loop.controller, self.state["loop"]["limits"])
 
     # -- what is computed -------------------------------------------------------------------------
 
@@ -258,37 +245,31 @@ class Session:
         self.files[key] = content
         return key
 
-    def _used(self) -> list[str]:
-        rows = [*self.state["records"], *([self.state["frf"]] if self.state["frf"] else [])]
-        return sorted({row["file"] for row in rows})
-
-    def _result(self, task: Task) -> Any:
+    def _get(self, task: Task, *, at_once: bool = False) -> Any:
+        """Result of a task; one that takes a while is not begun here."""
         if task.key not in self._results:
-            try:
-                self.store(task, task.call(*task.arguments))
-            except (CtrlRealizeError, ArithmeticError) as error:
-                self.store(task, error)
+            if not at_once:
+                raise MissingError(task)
+            self.store(task, done(task))
         self._results.move_to_end(task.key)
-        found = self._results[task.key]
-        if isinstance(found, Exception):
+        if isinstance(found := self._results[task.key], Exception):
             raise found
         return found
 
-    def _memo(self, what: str, given: Any, call: Callable[..., Any], *arguments: Any) -> Any:
-        return self._result(Task(what, _key(what, given), call, arguments))
+    def _now(self, *given: Any) -> Any:
+        return self._get(task_of(*given), at_once=True)
 
     def _raw(self, index: int) -> tuple[Record, list[str]]:
         row = self.state["records"][index]
-        given = {key: row.get(key) for key in ("file", "options", "given", "name")}
-        found: tuple[Record, list[str]] = self._memo(
+        given = [row[key] for key in ("file", "options", "given", "name")]
+        found: tuple[Record, list[str]] = self._now(
             "reading", given, records.read, self.files[row["file"]], row
         )
-        records.checked_siso(found[0])
         return found
 
     def _record(self, index: int) -> Record:
-        row = self.state["records"][index]
-        found: Record = self._memo("changing", row, records.edited, self._raw(index)[0], row)
+        raw, row = self._raw(index)[0], self.state["records"][index]
+        found: Record = self._now("changing", row, records.edited, raw, row)
         return found
 
     def _records(self) -> list[Record]:
@@ -297,129 +278,67 @@ class Session:
             raise DataError("no record is chosen; drop a file here, or choose one")
         return [self._record(k) for k in used]
 
-    def _fit_task(self, structure: Any, known: JSON) -> Task:
+    def _fit(self, structure: Any, known: JSON | None = None) -> Task:
+        kind = "known parameters" if known else "one structure" if structure else "all structures"
         rows = [row for row in self.state["records"] if row["used"]]
-        what = "with known parameters" if known else "one structure" if structure else (
-            "all structures")  # fmt: skip
-        return Task(
-            f"fitting {what}", _key("fit", [rows, structure, known]), models.identified,
-            (self._records(), structure, known),
-        )  # fmt: skip
+        given = self._records(), structure, known or {}
+        return task_of(f"fitting {kind}", [rows, *given[1:]], models.identified, *given)
 
-    def _table(self) -> DelayedStateSpace:
-        found: DelayedStateSpace = self._result(self._fit_task(None, {}))
-        return found
+    def _free(self) -> Any:
+        return self._get(self._fit(self.state["model"]["structure"]))
 
-    def _free(self) -> DelayedStateSpace:
-        found: DelayedStateSpace = self._result(
-            self._fit_task(self.state["model"]["structure"], {})
-        )
-        return found
-
-    def _model_task(self) -> Task:
+    def _known(self) -> JSON:
         known = self.state["model"]["known"]
-        fit = models.fit_of_lags(self._free()) if known else None
-        wanted = {} if fit is None else models.with_known(fit, known)
-        return self._fit_task(self.state["model"]["structure"], wanted)
+        return models.with_known(self._free(), known) if known else {}
 
-    def _model(self) -> DelayedStateSpace:
-        found: DelayedStateSpace = self._result(self._model_task())
-        return found
+    def _fitted(self) -> Task:
+        return self._fit(self.state["model"]["structure"], self._known())
 
-    def _loop_task(self) -> Task:
-        settings, fit = self.state["loop"], self._model_task()
-        shown = {key: settings[key] for key in ("kind", "rule", "speed")}
-        return Task("tuning", _key("loop", [fit.key, shown]), loops.tuned_loop,
-                    (self._model(), settings))  # fmt: skip
+    def _system(self) -> Any:
+        return self._get(self._fitted())
 
-    def _drawing_task(self) -> Task:
-        settings, tuned = self.state["loop"], self._loop_task()
-        shown = {key: settings[key] for key in ("limits", "setpoint", "load")}
-        return Task("simulating the loop", _key("drawing", [tuned.key, shown]), loops.drawn,
-                    (self._model(), self._result(tuned), settings))  # fmt: skip
+    def _after_fit(self, what: str, given: Any, call: Callable[..., Any], *more: Any) -> Task:
+        """Task with the model and what it is `given` besides, as JSON; `more` are arguments."""
+        return task_of(what, [self._fitted().key, given], call, self._system(), *more)
 
-    def _plan(self) -> Task:
-        wanted = {key: value for key, value in (self.state["plan"] or {}).items() if value}
-        fit = self._model_task()
-        return Task("planning a test", _key("plan", [fit.key, wanted]), outputs.planned,
-                    (self._model(), wanted))  # fmt: skip
+    def _tuned(self) -> Task:
+        settings = {key: self.state["loop"][key] for key in ("kind", "rule", "speed")}
+        return self._after_fit("tuning", settings, loops.tuned_loop, settings)
+
+    def _drawn(self) -> Task:
+        tuned, settings = self._tuned(), self.state["loop"]
+        given = [tuned.key, *(settings[key] for key in ("limits", "setpoint", "load"))]
+        loop = self._get(tuned)
+        return self._after_fit("simulating the loop", given, loops.drawn, loop, settings)
+
+    def _planned(self) -> Task:
+        wanted = {key: value for key, value in self.state["plan"].items() if value is not None}
+        return self._after_fit("planning a test", wanted, partial(plan_test, **wanted))
 
     def _figures(self) -> Task:
-        fit, frf = self._model_task(), self._frf()
-        return Task("drawing", _key("figures", [fit.key, self.state["frf"]]), outputs.figures,
-                    (self._model(), frf))  # fmt: skip
+        return self._after_fit("drawing", self.state["frf"], outputs.figures, self._frf())
 
     def _report(self) -> Task:
-        fit, script = self._model_task(), self.script()
-        return Task("writing the report", _key("report", [fit.key, script]), outputs.report,
-                    (self._model(), self._frf(), script))  # fmt: skip
+        lines, controller = self.script(), self._get(self._tuned()).controller
+        more = self._frf(), lines, controller, self.state["loop"]
+        return self._after_fit("writing the report", lines, outputs.report, *more)
 
     def _frf(self) -> Any:
         row = self.state["frf"]
-        if row is None:
-            return None
-        return self._memo("reading", row, records.read_response, self.files[row["file"]],
-                          row["name"])  # fmt: skip
-
-    def _pending(self) -> list[Task]:
-        """What the view needs and is not computed yet, in this order."""
-        if not any(row["used"] for row in self.state["records"]):
-            return []
-        steps: list[Callable[[], Task]] = [
-            lambda: self._fit_task(None, {}),
-            lambda: self._fit_task(self.state["model"]["structure"], {}),
-            self._model_task, self._loop_task, self._drawing_task,
-        ]  # fmt: skip
-        if self.state["plan"]:
-            steps.append(self._plan)
-        found: dict[str, Task] = {}
-        for number, step in enumerate(steps):
-            if found and number > 1:
-                break  # what follows needs these
-            try:
-                task = step()
-            except (CtrlRealizeError, ArithmeticError):
-                continue  # the view says it
-            if task.key not in self._results:
-                found[task.key] = task
-        return list(found.values())
+        given = row and (self.files[row["file"]], row["name"])
+        return row and self._now("reading", row, records.read_response, *given)
 
     # -- the view ---------------------------------------------------------------------------------
 
-    def _units(self) -> Any:
+    def _units(self) -> AbstractContextManager[None]:
         """Write times in the unit of the records."""
-        try:
+        with suppress(CtrlRealizeError):
             return times_in(shown_time_unit(self._records()))
-        except CtrlRealizeError:
-            return times_in("s")
+        return times_in("s")
 
-    def view(self) -> JSON:
-        """All that a page shows of this state."""
-        with self._units():
-            pending = self._pending()
-            seen: JSON = {
-                "state": self.state,
-                "can": {"undo": bool(self._undo), "redo": bool(self._redo)},
-                "pending": [one.what for one in pending],
-                "data": self._data(),
-                "choices": outputs.CHOICES,
-                "script": self.script(),
-            }
-            fitted = not any(one.what.startswith("fitting") for one in pending)
-            simulated = fitted and not any("planning" not in one.what for one in pending)
-            planned = simulated and not pending and self.state["plan"]
-            seen["model"] = self._part(self._model_view) if fitted else None
-            seen["loop"] = self._part(self._loop_view) if simulated else None
-            seen["plan"] = self._part(self._plan_view) if planned else None
-            return seen
-
-    def _part(self, view: Callable[[], JSON]) -> JSON | None:
-        if not any(row["used"] for row in self.state["records"]):
-            return None
-        try:
-            return view()
-        except (CtrlRealizeError, ArithmeticError) as error:
-            return {"error": str(error)}
+    def _parts(self) -> dict[str, Callable[[], JSON | None]]:
+        """Parts of the view that need computing, in this order."""
+        return {"model": self._model, "loop": self._loop, "plan": self._plan}
 
     def _data(self) -> JSON:
         rows: list[Row] = []
@@ -428,54 +347,47 @@ class Session:
                 rows.append((row, *self._raw(k), self._record(k)))
             except CtrlRealizeError as error:
                 rows.append((row, None, [str(error)], None))
-        selected = self.state["selected"]
-        seen = self._memo("data view", [self.state["records"], selected], data_view, rows, selected)
-        seen = dict(seen)
+        at = self.state["selected"]
+        seen: JSON = dict(self._now("data view", [self.state["records"], at], data_view, rows, at))
         if rows:
-            row = self.state["records"][selected]
-            key = {part: row.get(part) for part in ("file", "options", "given")}
-            seen["preview"] = self._memo(
-                "preview", key, records.preview, self.files[row["file"]], row
-            )
-        seen["frf"] = None if self.state["frf"] is None else self.state["frf"]["name"]
-        return seen
+            row = self.state["records"][at]
+            key, content = [row["file"], row["options"]], self.files[row["file"]]
+            seen["preview"] = self._now("preview", key, records.preview, content, row)
+        return seen | {"frf": self.state["frf"] and self.state["frf"]["name"]}
 
-    def _model_view(self) -> JSON:
-        free, task, known = self._free(), self._model_task(), self.state["model"]["known"]
-        system, given = self._model(), [task.key, self.state["model"]]
-        seen: JSON = self._memo(
-            "model view", given, models.view, system, free, self._table(), known
+    def _model(self) -> JSON:
+        table, free, known = self._get(self._fit(None)), self._free(), self.state["model"]["known"]
+        task = self._after_fit(
+            "drawing the model", known, model_view.model_view, free, table, known
         )
+        seen: JSON = self._get(task, at_once=True)
         return seen
 
-    def _loop_view(self) -> JSON:
-        settings, loop = self.state["loop"], self._result(self._loop_task())
-        numbers = loops.numbers_to_enter(loop.controller, settings)
-        drawn: JSON = self._result(self._drawing_task())
-        return drawn | {"numbers": numbers}
+    def _loop(self) -> JSON:
+        controller = self._get(self._tuned()).controller
+        numbers = loops.numbers_to_enter(controller, self.state["loop"])
+        return {**self._get(self._drawn()), "numbers": numbers}
 
-    def _plan_view(self) -> JSON:
-        return outputs.plan_view(self._result(self._plan()), self._model())
-
-    def script(self) -> str:
-        """The lines of Python that do the same."""
-        known = {}
-        if self.state["model"]["known"]:
-            with suppress(CtrlRealizeError):
-                fit = models.fit_of_lags(self._free())
-                known = {} if fit is None else models.with_known(fit, self.state["model"]["known"])
-        system = None
-        if not self._pending() and self.state["records"]:
-            with suppress(CtrlRealizeError, ArithmeticError):
-                self._result(self._loop_task())
-                system = self._model()
-        return outputs.script(self.state, known, system)
+    def _plan(self) -> JSON | None:
+        if self.state["plan"]["want"] is None:
+            return None
+        return outputs.plan_view(self._get(self._planned()), self._system())
 
 
-def _key(what: str, given: Any) -> str:
-    return hashlib.sha256(json.dumps([what, given], sort_keys=True).encode()).hexdigest()
+def done(task: Task) -> Any:
+    """Do a task; its error is a result as well."""
+    try:
+        return task.call(*task.arguments)
+    except _REFUSED as error:
+        return error
 
 
-def _digest(content: Mapping[str, Any]) -> str:
-    text = json.dumps(content, sort_keys=True, separators=(",", ":"))
-    return hashlib.sha256(text.encode()).hexdigest()
+def after(command: Mapping[str, Any]) -> Mapping[str, Any]:
+    """What is left of a command when the task that it needed is done."""
+    return {**command, "do": "view"} if command.get("do") == "compute" else command
+
+
+def task_of(what: str, given: Any, call: Callable[..., Any], *arguments: Any) -> Task:
+    """Task whose result is that of what it is `given`, as JSON."""
+    key = hashlib.sha256(json.dumps([what, given], sort_keys=True).encode()).hexdigest()
+    return Task(what, key, call, arguments)

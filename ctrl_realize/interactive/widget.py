@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Sequence
+from functools import partial
 from typing import Any
 
 from ..data import Record
 from ..errors import MissingPackageError
-from .hosting import Host, page_style, static
+from .hosting import Host, page_part
 from .session import Session
 
 
@@ -62,13 +63,13 @@ def _widget_kind() -> Any:
     class App(anywidget.AnyWidget):
         """Session behind two traits: `command` is set by the page, `answer` by Python."""
 
-        _esm = static("app.js")
+        _esm = page_part("app.js")[1]
         style = traitlets.Unicode().tag(sync=True)
         command = traitlets.Dict().tag(sync=True)
         answer = traitlets.Dict().tag(sync=True)
 
         def __init__(self, session: Session) -> None:
-            super().__init__(style=page_style())
+            super().__init__(style=page_part("app.css")[1])
             self.session = session
             self._host: Host | None = None
             self.observe(self._commanded, "command")
@@ -77,21 +78,17 @@ def _widget_kind() -> Any:
             command = change["new"]
             if self._host is None:
                 self._host = Host(self.session)
-            if command.get("do") == "cancel":
-                self._host.cancel()
-            elif self.session.task(command) is None:
-                self.answer = self._host.answer(command)
-            else:  # the kernel stays free for other commands, and for cancelling this one
-                threading.Thread(target=self._later, args=(command,), daemon=True).start()
-
-        def _later(self, command: Any) -> None:
-            assert self._host is not None
-            self.answer = self._host.answer(command)
+            answer = partial(self._host.answer, command)
+            if command.get("do") in ("compute", "figures", "write"):
+                # The kernel stays free for other commands, and for cancelling this one.
+                later = lambda: self.set_trait("answer", answer())  # noqa: E731
+                threading.Thread(target=later, daemon=True).start()
+            else:
+                self.answer = answer()
 
         def close(self) -> None:
             if self._host is not None:
-                self._host.__exit__()
-                self._host = None
+                self._host.close()
             super().close()
 
     return App

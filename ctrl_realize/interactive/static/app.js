@@ -35,6 +35,23 @@ function ticks(low, high, most) {
   return found;
 }
 
+// Smallest and largest value of what is drawn, with some room.
+function reach(layers, x0, x1) {
+  const found = [];
+  for (const one of layers) {
+    for (const values of [one.low, one.high, one.y].flat(0)) {
+      if (values === undefined || one.kind === "span") continue;
+      if (!Array.isArray(values)) found.push(values);
+      else values.forEach((value, k) => { if (value !== null && one.x[k] >= x0 && one.x[k] <= x1) found.push(value); });
+    }
+  }
+  const low = found.reduce((a, b) => Math.min(a, b), Infinity);
+  const high = found.reduce((a, b) => Math.max(a, b), -Infinity);
+  if (!found.length) return [0, 1];
+  const room = high > low ? 0.05 * (high - low) : 0.5 * (Math.abs(low) || 1);
+  return [low - room, high + room];
+}
+
 // -- one panel -----------------------------------------------------------------------------------
 
 class Plot {
@@ -56,7 +73,8 @@ class Plot {
     if (!this.holding) this.draw();
   }
 
-  at(axis, value) { return axis === "x" ? this.x(value) : this.y(value); }
+  // Where a value of a handle stands, in pixels.
+  at(one, value) { return this[one.along](one.offset + one.per_unit * value); }
 
   draw() {
     const panel = this.panel;
@@ -64,7 +82,7 @@ class Plot {
     this.height = panel.short ? 150 : Math.round(Math.min(300, Math.max(210, this.width * 0.46)));
     const [w, tall] = [this.width - PAD.left - PAD.right, this.height - PAD.top - PAD.bottom];
     const [x0, x1] = panel.x.ends;
-    const [y0, y1] = panel.y.ends;
+    const [y0, y1] = panel.y.ends ?? reach(panel.layers, x0, x1);
     this.x = (value) => PAD.left + ((value - x0) / (x1 - x0 || 1)) * w;
     this.y = (value) => PAD.top + tall - ((value - y0) / (y1 - y0 || 1)) * tall;
     this.from = { x: (px) => x0 + ((px - PAD.left) / w) * (x1 - x0),
@@ -100,7 +118,7 @@ class Plot {
       drawn.append(s("path", { d: `M${at},${PAD.top}V${bottom}` }),
         s("text", { x: at, y: bottom + 15, "text-anchor": "middle" }, short(value)));
     }
-    for (const value of ticks(...this.panel.y.ends, Math.max(2, tall / 45))) {
+    for (const value of ticks(this.from.y(PAD.top + tall), this.from.y(PAD.top), Math.max(2, tall / 45))) {
       const at = this.y(value);
       drawn.append(s("path", { d: `M${PAD.left},${at}H${PAD.left + w}` }),
         s("text", { x: PAD.left - 7, y: at + 4, "text-anchor": "end" }, short(value)));
@@ -129,7 +147,7 @@ class Plot {
     if (one.kind === "line") {
       const path = s("path", { ...look, d: this.path(one.x, one.y) });
       if (one.name && one.look === "bar") path.append(s("title", {}, one.name));
-      if (one.key === "model") this.models.push(path);
+      if (one.look === "model") this.models.push(path);
       return [path];
     }
     if (one.kind === "lines") return one.many.map((y) => s("path", { ...look, d: this.path(one.x, y) }));
@@ -166,7 +184,7 @@ class Plot {
     const drag = (event) => {
       const box = this.svg.getBoundingClientRect();
       const px = upright ? event.clientX - box.left : event.clientY - box.top;
-      this.move(state, this.from[along](px - (state.grabbed ?? 0)));
+      this.move(state, (this.from[along](px - (state.grabbed ?? 0)) - one.offset) / one.per_unit);
     };
     group.addEventListener("pointerdown", (event) => {
       if (event.button !== 0) return;
@@ -175,7 +193,7 @@ class Plot {
       group.setPointerCapture(event.pointerId);
       const box = this.svg.getBoundingClientRect();
       const here = upright ? event.clientX - box.left : event.clientY - box.top;
-      state.grabbed = here - this.at(along, state.value);
+      state.grabbed = here - this.at(one, state.value);
       this.holding = true;
     });
     group.addEventListener("pointermove", (event) => { if (group.hasPointerCapture(event.pointerId)) drag(event); });
@@ -202,22 +220,18 @@ class Plot {
   }
 
   move(state, value) {
-    const inside = Math.min(Math.max(value, Math.min(state.one.low, state.one.high)), Math.max(state.one.low, state.one.high));
-    this.place(state, inside);
+    this.place(state, Math.min(Math.max(value, state.one.low), state.one.high));
     state.changed = true;
-    this.react.moved(this.panel, state.one, this.given(state), inside - state.one.value);
+    this.react.moved(this.panel, state.one, state.value);
   }
-
-  given(state) { return (state.value - state.one.offset) / state.one.per_unit; }
 
   place(state, value, text) {
     const { one, group, words } = state;
     state.value = value;
-    const px = this.at(one.along, value);
+    const px = this.at(one, value);
     group.setAttribute("transform", one.along === "x" ? `translate(${px.toFixed(2)} 0)` : `translate(0 ${px.toFixed(2)})`);
-    const unit = one.along === "x" ? this.panel.x.unit : this.panel.y.unit;
-    const shown = one.offset ? (value - one.offset) / (one.along === "x" ? 1 : one.per_unit) : value;
-    const said = text ?? `${short(shown)} ${one.along === "x" || !one.offset ? unit : ""}`.trim();
+    const shown = one.along === "x" ? value * one.per_unit : value;
+    const said = text ?? `${short(shown)} ${one.along === "x" ? this.panel.x.unit : ""}`.trim();
     if (one.along === "x") {
       const right = px > PAD.left + 0.72 * this.box.w;
       words.setAttribute("x", right ? -12 : 12);
@@ -234,7 +248,7 @@ class Plot {
     this.holding = false;
     if (!state.changed) return;
     state.changed = false;
-    this.react.released(this.panel, state.one, this.given(state));
+    this.react.released(this.panel, state.one, state.value);
   }
 
   striking(ground) {
@@ -336,9 +350,9 @@ class App {
   }
 
   async compute() {
-    if (this.computing || this.paused || !this.view.pending.length) return;
+    if (this.computing || this.paused || !this.view.pending) return;
     this.computing = true;
-    const done = this.busy(this.view.pending[0]);
+    const done = this.busy(this.view.pending);
     const answer = await this.ask({ do: "compute" }, "long");
     done();
     this.computing = false;
@@ -434,7 +448,7 @@ class App {
   // What is still to be computed stays as it was drawn, also where it was dragged to.
   parts() {
     const { view } = this;
-    const waiting = view.pending.length > 0;
+    const waiting = Boolean(view.pending);
     this.again.hidden = !(waiting && this.paused);
     this.fill("data", () => [h("h2", {}, "Data"), ...this.data(view)]);
     const draw = {
@@ -473,7 +487,7 @@ class App {
 
   figures(panels) {
     const react = {
-      moved: (panel, one, value, by) => this.moved(panel, one, value, by),
+      moved: (panel, one, value) => this.moved(panel, one, value),
       released: (panel, one, value) => this.released(panel, one, value),
       strikes: () => this.strike,
       struck: (panel, a, b) => this.struck(panel, a, b),
@@ -510,7 +524,7 @@ class App {
     const chosen = view.state.selected;
     const rows = records.map((one, k) => h("tr", { class: k === chosen ? "best" : "" },
       h("td", {}, h("input", { type: "checkbox", checked: one.used, "data-key": `use${k}`, "aria-label": `use ${one.name}`,
-        onchange: (event) => this.change({ do: "use", index: k, used: event.target.checked }) })),
+        onchange: (event) => this.record({ used: event.target.checked }, k) })),
       h("td", { class: "name" }, h("button", { type: "button", class: "link", "data-key": `select${k}`, onclick: () => this.change({ do: "select", index: k }) }, one.name)),
       h("td", {}, one.facts, ...one.notes.map((note) => h("p", { class: one.bad ? "bad" : "under" }, note))),
       h("td", {}, h("button", { type: "button", class: "link", "aria-label": `remove ${one.name}`, onclick: () => this.change({ do: "remove", index: k }) }, "remove"))));
@@ -520,7 +534,7 @@ class App {
       h("div", { class: "scroll" }, h("table", {}, h("tbody", {}, rows))),
       view.data.frf ? h("p", { class: "under" }, `Measured frequency response: ${view.data.frf}`) : null,
       this.preview(view, preview, chosen),
-      panels.length ? h("div", { class: "buttons" }, strike, h("button", { type: "button", "data-do": "restore", onclick: () => this.change({ do: "restore" }) }, "Whole record again")) : null,
+      panels.length ? h("div", { class: "buttons" }, strike, h("button", { type: "button", "data-do": "restore", onclick: () => this.record({ range: null, rest: null, shift: 0, struck: [] }) }, "Whole record again")) : null,
       this.figures(panels),
     ];
   }
@@ -530,7 +544,8 @@ class App {
     if (!preview?.columns.length) return null;
     const { options } = state;
     const taken = preview.taken ?? {};
-    const read = (more) => this.change({ do: "read", index, options: { ...options, ...more } });
+    const read = (more) => this.record({ options: { ...options, ...more } });
+    const unit = (more) => this.record({ units: { ...state.units, ...more } });
     const roles = [["", "–"], ["time", "time"], ["input", "input"], ["output", "output"]];
     const role = (k) => ["time", "input", "output"].find((name) => taken[name] === k) ?? "";
     const heads = preview.columns.map((one, k) => h("th", { scope: "col" }, this.choice(`role${k}`, one.unit ? `${one.name} [${one.unit}]` : one.name, role(k), roles, (name) => {
@@ -548,28 +563,35 @@ class App {
         this.choice("missing", "bad cells and gaps", options.missing ?? "refuse", [["refuse", "refuse"], ["keep", "keep as missing"], ["hold", "input holds its value"]], (value) => read({ missing: value === "refuse" ? null : value })),
         this.choice("resample", "jitter", options.resample ? "true" : "", [["", "refuse"], ["true", "resample"]], (value) => read({ resample: value ? true : null })),
         this.choice("decimal", "decimal sign", options.decimal ?? "auto", [["auto", "auto"], [".", "."], [",", ","]], (value) => read({ decimal: value === "auto" ? null : value })),
-        this.field("unit-input", "unit of the input", units.input, (value) => this.change({ do: "units", index, input: value })),
-        this.field("unit-output", "unit of the output", units.output, (value) => this.change({ do: "units", index, output: value }))));
+        this.field("unit-input", "unit of the input", units.input, (input) => unit({ input })),
+        this.field("unit-output", "unit of the output", units.output, (output) => unit({ output }))));
   }
 
   struck(panel, a, b) {
     this.strike = false;
-    const factor = panel.handles[0].per_unit;
-    this.change({ do: "strike", start: Math.min(a, b) / factor, stop: Math.max(a, b) / factor });
+    const ends = [a, b].sort((p, q) => p - q).map((one) => one / panel.handles[0].per_unit);
+    const { struck } = this.view.state.records[this.view.state.selected];
+    this.record({ struck: [...struck, ends] });
   }
 
   // -- handles -----------------------------------------------------------------------------------
 
-  moved(panel, one, value, by) {
+  // What comes later moves with it.
+  moved(panel, one, value) {
     if (panel.key.startsWith("record")) return;
     const plot = this.plots.get(panel.key);
-    const later = [...plot.handles.values()].filter((other) => other.one.along === "x" && other.one.offset > one.offset);
-    if (panel.key === "start") for (const other of later) plot.place(other, other.one.value + by, other.one.text);
+    for (const other of plot.handles.values()) {
+      if (other.one.along !== "x" || !((other.start ?? other.one.offset) > one.offset)) continue;
+      other.start ??= other.one.offset;
+      other.one.offset = other.start + (value - one.value) * one.per_unit;
+      plot.place(other, other.one.value, other.one.text);
+    }
     this.drag(one.name, value);
   }
 
   drag(name, value) {
     this.follow({ do: "drag", values: { [name]: value } }, ({ drag }) => {
+      if (!drag) return;
       for (const [key, line] of Object.entries(drag.lines)) {
         const plot = this.plots.get(key);
         for (const path of plot?.models ?? []) path.setAttribute("d", plot.path(line.x, line.y));
@@ -586,25 +608,32 @@ class App {
     for (const key of ["start", "criterion"]) {
       const plot = this.plots.get(key);
       const state = plot?.handles.get("dead_time");
-      if (state && !plot.holding) plot.place(state, state.one.offset + value * state.one.per_unit);
+      if (state && !plot.holding) plot.place(state, value);
     }
   }
 
   released(panel, one, value) {
-    const index = this.view.state.selected;
-    const row = this.view.state.records[index];
+    const row = this.view.state.records[this.view.state.selected];
     if (one.name === "start" || one.name === "stop") {
-      const ends = Object.fromEntries(panel.handles.map((each) => [each.name, each.value / each.per_unit]));
-      this.change({ do: "range", index, start: ends.start, stop: ends.stop, [one.name]: value });
+      const ends = Object.fromEntries(panel.handles.map((each) => [each.name, each.value]));
+      ends[one.name] = value;
+      this.record({ range: [ends.start, ends.stop].sort((a, b) => a - b) });
     } else if (one.name === "rest") {
-      const [input, , start] = row.rest ?? [panel.rest_input ?? 0, 0, panel.step_time];
-      this.change({ do: "rest", index, input, output: value, start });
+      const [input, , start] = row.rest ?? [panel.rest_input, 0, panel.step_time];
+      this.record({ rest: [input, value, start] });
     } else if (one.name === "step") {
-      this.change({ do: "shift", index, shift: row.shift + value - one.value / one.per_unit });
-    } else {
-      this.wanted = null;
-      this.change({ do: "known", name: one.name, value });
-    }
+      this.record({ shift: row.shift + value - one.value });
+    } else this.know(one.name, value);
+  }
+
+  set(part, values, more = {}) { return this.change({ do: "set", part, values, ...more }); }
+
+  record(values, index = this.view.state.selected) { return this.set("record", values, { index }); }
+
+  know(name, value) {
+    this.wanted = null;
+    const { [name]: _, ...known } = this.view.state.model.known;
+    return this.set("model", { known: value === null ? known : { ...known, [name]: value } });
   }
 
   // -- model -------------------------------------------------------------------------------------
@@ -612,7 +641,7 @@ class App {
   modelled(view) {
     const { model } = view;
     if (model?.error) return [h("p", { class: "bad" }, model.error)];
-    if (!model) return [h("p", { class: "under" }, view.pending.length && !this.paused ? "Fitting …" : "No model yet.")];
+    if (!model) return [h("p", { class: "under" }, view.pending && !this.paused ? "Fitting …" : "No model yet.")];
     this.told = h("p", { class: "told", "aria-live": "polite" }, model.misfit?.text ?? "");
     const verdicts = h("dl", { class: "verdicts" }, model.verdicts.map((one) => h("div", { class: one.level.replace(" ", "-") },
       h("dt", {}, one.question), h("dd", {}, h("b", {}, one.level), ` ${one.sentence}`))));
@@ -644,7 +673,7 @@ class App {
       const range = h("input", { type: "range", min: String(one.low), max: String(one.high), step: "any", "data-key": `range-${one.name}`,
         "aria-label": one.label, "aria-valuetext": one.text,
         oninput: () => { if (one.name === "dead_time") this.other(Number(range.value)); this.drag(one.name, Number(range.value)); },
-        onchange: () => { this.wanted = null; this.change({ do: "known", name: one.name, value: Number(range.value) }); },
+        onchange: () => this.know(one.name, Number(range.value)),
         onkeydown: (event) => {
           const by = { ArrowRight: 1, ArrowUp: 1, ArrowLeft: -1, ArrowDown: -1 }[event.key];
           if (!by) return;
@@ -656,7 +685,7 @@ class App {
         } });
       range.value = String(one.value);
       const known = h("input", { type: "checkbox", checked: one.known, "data-key": `known-${one.name}`, "aria-label": `${one.label} is known`,
-        onchange: () => this.change({ do: "known", name: one.name, value: known.checked ? one.value : null }) });
+        onchange: () => this.know(one.name, known.checked ? one.value : null) });
       return h("tr", { "data-name": one.name }, h("td", {}, one.label), h("td", { class: "number" }, one.text), h("td", { class: "number" }, one.interval), h("td", { class: "wide" }, range), h("td", {}, h("label", { class: "check" }, known, "known")));
     });
     return h("div", { class: "scroll" }, h("table", { class: "parameters" }, h("thead", {}, h("tr", {}, ["parameter", "value and std", "95 % interval", "drag", ""].map((one) => h("th", { scope: "col" }, one)))), h("tbody", {}, rows)));
@@ -665,9 +694,9 @@ class App {
   structures(view) {
     const stated = view.state.model.structure;
     const rows = view.model.structures.map((one) => h("tr", { class: `${one.chosen ? "best" : ""} ${one.ruled_out ? "out" : ""}`, "data-structure": one.structure.join(",") },
-      h("td", {}, h("button", { type: "button", class: "link", "data-key": `structure${one.structure}`, onclick: () => this.change({ do: "structure", structure: one.structure }) }, one.name)),
+      h("td", {}, h("button", { type: "button", class: "link", "data-key": `structure${one.structure}`, onclick: () => this.set("model", { structure: one.structure, known: {} }) }, one.name)),
       h("td", { class: "number" }, one.delta_bic), h("td", { class: "number" }, one.dead_time), h("td", { class: "number" }, one.interval), h("td", { class: "number" }, one.gain)));
-    const back = stated ? h("button", { type: "button", "data-do": "choose", onclick: () => this.change({ do: "structure", structure: null }) }, "Choose from the data") : null;
+    const back = stated ? h("button", { type: "button", "data-do": "choose", onclick: () => this.set("model", { structure: null, known: {} }) }, "Choose from the data") : null;
     return h("details", { "data-key": "structures", open: true }, h("summary", {}, "Structures: click to state one"), h("div", { class: "scroll" }, h("table", {}, h("thead", {}, h("tr", {}, ["structure", "ΔBIC", "dead time", "95 % interval", "gain"].map((one, k) => h("th", { scope: "col", class: k ? "number" : "" }, one)))), h("tbody", {}, rows))), back);
   }
 
@@ -698,7 +727,7 @@ class App {
   looped(view) {
     const { loop, choices } = view;
     const given = view.state.loop;
-    const tune = (more) => this.change({ do: "tune", ...more });
+    const tune = (more) => this.set("loop", more);
     const kinds = choices.rules[given.rule];
     const range = h("input", { type: "range", min: "0", max: "1", step: "0.02", "data-key": "speed", "aria-label": "from cautious to quick", disabled: !choices.speeds.includes(given.rule),
       oninput: () => this.follow({ do: "slide", speed: Number(range.value) }, ({ slide }) => this.slid(slide)),
@@ -729,6 +758,7 @@ class App {
     this.numbers = h("div", { class: "numbers" });
     this.tell(loop);
     return [controls, this.margins, ...loop.warnings.map((one) => h("p", { class: "warning" }, one)), loop.noise ? h("p", { class: "under" }, loop.noise) : null,
+      loop.unsafe.length ? h("details", { "data-key": "unsafe" }, h("summary", {}, "It would be unstable if …"), h("ul", { class: "reasons" }, loop.unsafe.map((one) => h("li", {}, one)))) : null,
       this.figures(loop.panels), h("h3", {}, "What to enter"), form, this.numbers];
   }
 
@@ -741,10 +771,11 @@ class App {
   }
 
   slid(slide) {
+    if (!slide) return;
     this.tell(slide);
     for (const panel of slide.panels) {
       const plot = this.plots.get(panel.key);
-      const [line] = panel.layers.filter((one) => one.key === "model");
+      const [line] = panel.layers.filter((one) => one.look === "model");
       for (const path of plot?.models ?? []) path.setAttribute("d", plot.path(line.x, line.y));
     }
   }
@@ -753,12 +784,12 @@ class App {
 
   planned(view) {
     const asked = view.state.plan;
-    const time = this.field("plan_time", "length in s (empty: as the record)", asked?.time ?? "", () => {});
-    const go = (want) => this.change({ do: "plan", want, time: Number(time.querySelector("input").value) || null });
+    const time = this.field("plan_time", "length in s (empty: as the record)", asked.time ?? "", () => {});
+    const go = (want) => this.set("plan", { want, time: Number(time.querySelector("input").value) || null });
     const buttons = h("div", { class: "fields" }, time, h("div", { class: "buttons" },
-      Object.entries(view.choices.want).map(([want, words]) => h("button", { type: "button", "data-do": `plan-${want}`, "aria-pressed": String(asked?.want === want), onclick: () => go(want) }, words))));
+      Object.entries(view.choices.want).map(([want, words]) => h("button", { type: "button", "data-do": `plan-${want}`, "aria-pressed": String(asked.want === want), onclick: () => go(want) }, words))));
     const intro = h("p", { class: "under" }, "The input that tells most about …");
-    if (!asked) return [intro, buttons];
+    if (!asked.want) return [intro, buttons];
     const { plan } = view;
     if (!plan || plan.error) return [intro, buttons, h("p", { class: plan ? "bad" : "under" }, plan ? plan.error : this.paused ? "Not planned." : "Planning …")];
     return [intro, buttons, plan.interval ? h("p", { class: "told" }, plan.interval.text) : null, this.figures(plan.panels),

@@ -11,10 +11,9 @@ const model = {
 };
 
 async function post(command) {
-  const place = command.do === "cancel" ? "cancel" : "command";
   const lost = "the program does not answer: it may have ended, or the machine slept. Start it again, or reload the page";
   try {
-    const answer = await fetch(place, {
+    const answer = await fetch("command", {
       method: "POST", headers: { "Content-Type": "application/json" }, body: JSON.stringify(command),
     });
     held.answer = { id: command.id, ...(answer.ok ? await answer.json() : { error: lost }) };
