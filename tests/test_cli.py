@@ -1,5 +1,6 @@
 """The command line: what it writes, what it says, and how it ends."""
 
+import html
 import subprocess
 import sys
 from contextlib import redirect_stderr, redirect_stdout
@@ -101,12 +102,12 @@ def test_the_report_of_identify_has_the_controller_if_it_is_wanted(folder, tmp_p
     assert main([*words, "--tune", "series"]) == 0
     said, page = capsys.readouterr().out, (out / "report.html").read_text(encoding="utf-8")
     system = cr.load_model(out / "model.json")
-    form = cr.design.pid(system).as_form("series")
+    form = cr.design.pid(system, closed_loop_time="robust").as_form("series")
     assert form.report() in said
     for name, value in form._rows():
         assert f'<td class="text">{name}</td><td class="number">{value}</td>' in page
     assert "It would be unstable if" in page
-    assert "pid = cr.design.pid(sys)" in page
+    assert "pid = cr.design.pid(sys, closed_loop_time='robust')" in html.unescape(page)
     assert main([*words, "--overwrite", "--tune", "abacus"]) == 2
     assert "--form abacus; choose one of 'ideal'" in capsys.readouterr().err
 

@@ -102,7 +102,8 @@ GROUPS: dict[str, dict[str, Any]] = {
     "tuned": {
         "rule": Annotated[
             str | None,
-            _OPTION(help="simc (default), lambda, imc, amigo, ziegler_nichols, cohen_coon, "
+            _OPTION(help="simc (default: as fast as is robust), lambda, imc, amigo, "
+                    "ziegler_nichols, cohen_coon, "
                     "tyreus_luyben, optimal, ...; see design.pid."),
         ],
         "kind": Annotated[str | None, _OPTION(help="P, PI (default), PD or PID.")],

@@ -30,9 +30,15 @@ class Tuning:
         one_of(self.tuned.get("rule", RULES[0]), "rule", RULES)
         one_of(self.tuned.get("kind", KINDS[0]), "kind", KINDS)
 
+    @property
+    def asked(self) -> dict[str, Any]:
+        """Arguments of `design.pid`: without a rule, robust on all models that the data allow."""
+        own = "rule" in self.tuned or "closed_loop_time" in self.tuned
+        return {**({} if own else {"closed_loop_time": "robust"}), **self.tuned}
+
     def of(self, system: DelayedStateSpace) -> dict[str, Any]:
         """Tune, say what to enter, and return controller and form for the report."""
-        controller = pid(system, **self.tuned)
+        controller = pid(system, **self.asked)
         form = controller.as_form(**self.entered)
         say(f"\n{controller.report()}\n\n{form.report()}\n\nIt would be unstable if")
         for reason in unsafe_if(system, controller):
@@ -43,6 +49,6 @@ class Tuning:
         """The same as lines of Python."""
         entered = python_keywords(self.entered).removeprefix(", ")
         return (
-            f"pid = cr.design.pid(sys{python_keywords(self.tuned)})\n"
+            f"pid = cr.design.pid(sys{python_keywords(self.asked)})\n"
             f"print(pid, pid.as_form({entered}).report())"
         )

@@ -1,5 +1,7 @@
 """Tuning rules against their published forms, loops against brute-force simulation."""
 
+import warnings
+
 import control as ct
 import numpy as np
 import pytest
@@ -132,3 +134,25 @@ def test_table_numbers_are_those_of_brute_force_simulation(valve, kind):
         late = np.flatnonzero(np.abs(setpoint - 1) > 0.02)[-1] + 1
         assert row.settling_time == pytest.approx(late * DT, abs=1.5 * DT)
         assert row.ms == pytest.approx(cr.design.margins(plant, controller).ms)
+
+
+def test_a_robust_closed_loop_time_is_as_long_as_the_data_ask_for():
+    truth = cr.design.ProcessModel(gain=1.5, lag=42.0, second_lag=6.0, dead_time=5.0).system(1.0)
+    t = np.arange(240.0)
+    u = np.where(t < 40, 0.0, 1.0)
+    found = {}
+    for seed, expected in ((4, False), (2, True)):  # of which the usual time is not robust
+        noise = 0.05 * np.random.default_rng(seed).standard_normal(t.size)
+        sys = cr.identify(cr.Record(t, u, truth.simulate(u) + noise))
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            usual = cr.design.pid(sys)
+        robust = cr.design.pid(sys, closed_loop_time="robust")
+        found[seed] = usual, robust
+        assert bool(usual.check.flags) is expected
+        assert robust.check.worst.ms <= 2
+        assert cr.design.margins(truth * robust).ms <= 2
+    assert found[4][0].kp == found[4][1].kp
+    assert found[2][0].kp > found[2][1].kp
+    with pytest.raises(cr.errors.OptionError, match=r"rule='amigo'; expected one of simc"):
+        cr.design.pid(truth, "amigo", closed_loop_time="robust")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import warnings
 from dataclasses import dataclass, fields, replace
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -27,6 +27,10 @@ RULES = (*MODEL_RULES, *SYSTEM_RULES)
 KINDS = ("P", "PI", "PD", "PID")
 SAFE = ("amigo", "simc", "lambda")
 """Rules that are suggested if the loop of another is unstable; then the optimal PI."""
+ADJUSTED = ("simc", "lambda", "imc")
+"""Rules with a closed-loop time."""
+LONGER = (1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0, 12.0, 16.0, 24.0)
+"""Closed-loop times that are tried for a robust loop, in dead times."""
 SLOWER = (2.0, 4.0, 8.0)
 """Closed-loop times of simc, in dead times of its model, that are suggested after those."""
 
@@ -38,7 +42,7 @@ def pid(
     rule: str = "simc",
     kind: str = "PI",
     *,
-    closed_loop_time: float | None = None,
+    closed_loop_time: float | Literal["robust"] | None = None,
     max_sensitivity: float = 1.4,
     derivative_filter: float = 10.0,
     reduction: str = "optimal",
@@ -64,8 +68,10 @@ def pid(
         integrated absolute error after a load step subject to `max_sensitivity`.
     kind : {"P", "PI", "PD", "PID"}, optional
         Not every rule exists for every kind. The PID of simc is a PI for a plant with one lag.
-    closed_loop_time : float, optional
-        In s, for simc, lambda and imc.
+    closed_loop_time : float or "robust", optional
+        In s, for simc, lambda and imc. ``"robust"``: the shortest, from the default of simc up to
+        24 times it, with Ms of at most 2 on the model and on all models that its data do not rule
+        out; if there is none, that of the smallest Ms, with a warning.
     max_sensitivity : float, optional
         Ms, for the optimal rule.
     derivative_filter : float, optional
@@ -155,6 +161,8 @@ def pid(
     """
     given = locals()
     options = TuningOptions(**{one.name: given[one.name] for one in fields(TuningOptions)})
+    if options.closed_loop_time == "robust":
+        options = _robust(system, rule, kind, options)
     made, plant = tuned(system, rule, kind, options)
     check = loop_check(plant, made)
     if not check.stable or check.flags:
@@ -170,7 +178,7 @@ def pid(
 class TuningOptions:
     """Arguments of `pid` beside system, rule and kind."""
 
-    closed_loop_time: float | None = None
+    closed_loop_time: float | Literal["robust"] | None = None
     max_sensitivity: float = 1.4
     derivative_filter: float = 10.0
     reduction: str = "optimal"
@@ -197,7 +205,7 @@ def tuned(
         raise OptionError(f"derivative_filter={ratio:g}; expected td / tf in 1...100")
     target = None
     if options.closed_loop_time is not None:
-        if rule not in ("simc", "lambda", "imc"):
+        if rule not in ADJUSTED:
             raise OptionError(
                 f"closed_loop_time= is an argument of simc, lambda and imc, not of {rule!r}"
             )
@@ -232,6 +240,27 @@ def tuned(
         time_unit=units[1],
     )
     return made, exact
+
+
+def _robust(system: Any, rule: str, kind: str, options: TuningOptions) -> TuningOptions:
+    """Options with the shortest closed-loop time that is robust."""
+    made, _ = tuned(system, rule, kind, replace(options, closed_loop_time=None))
+    if made.model is None or rule not in ADJUSTED:
+        raise OptionError(
+            f"closed_loop_time='robust' with rule={rule!r}; expected one of {', '.join(ADJUSTED)}"
+        )
+    shortest = made.model.dead_time or 0.1 * made.model.lag
+    tried = []
+    for share in LONGER:
+        time = None if share == 1 else float(f"{share * shortest:.4g}")
+        changed = replace(options, closed_loop_time=time)
+        made, plant = tuned(system, rule, kind, changed)
+        check = loop_check(plant, made)
+        if not check.flags:
+            return changed
+        worst = np.inf if check.worst is None else check.worst.ms
+        tried.append((max(check.margins.ms if check.stable else np.inf, worst), changed))
+    return min(tried, key=lambda one: one[0])[1]
 
 
 def _one_that_works(system: Any, rule: str, kind: str, options: TuningOptions) -> str:
