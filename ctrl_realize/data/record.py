@@ -19,6 +19,7 @@ from .record_checks import (
     check_finite,
     check_shape,
     check_size,
+    checked_reference,
     checked_units,
     labelled,
 )
@@ -49,6 +50,9 @@ class Record(RecordConversions):
         How NaN in `input` and `output` is treated. With ``"keep"`` they are missing samples:
         `identify`, `fit_output_error` and `impulse_from_io` use the outputs that there are; the
         scans and the step functions need complete records.
+    reference : array_like, shape of the output, optional
+        Set point of the controller, in the unit of the output; NaN where it is not in force,
+        since the loop is in manual. Default: the record was not made in a loop, or nobody knows.
 
     Attributes
     ----------
@@ -88,6 +92,7 @@ class Record(RecordConversions):
         "name",
         "output",
         "output_labels",
+        "reference",
         "time",
         "units",
     )
@@ -95,6 +100,7 @@ class Record(RecordConversions):
     time: FloatArray
     input: FloatArray
     output: FloatArray
+    reference: FloatArray | None
     dt: float
     name: str
     input_labels: tuple[str, ...]
@@ -113,6 +119,7 @@ class Record(RecordConversions):
         output_labels: Sequence[str] | None = None,
         units: Mapping[str, str] | None = None,
         missing: Literal["refuse", "keep"] = "refuse",
+        reference: ArrayLike | None = None,
     ) -> None:
         stamps = numbers(time, "time")
         if stamps.ndim != 1 or stamps.size < MIN_SAMPLES:
@@ -138,6 +145,7 @@ class Record(RecordConversions):
         fix(self, "time", read_only(stamps))
         fix(self, "input", read_only(signals["input"]))
         fix(self, "output", read_only(signals["output"]))
+        fix(self, "reference", checked_reference(reference, signals["output"]))
         fix(self, "dt", sample_time(stamps))
         fix(self, "name", spelled_out(str(name)))
         fix(self, "missing", str(missing))
@@ -152,7 +160,8 @@ class Record(RecordConversions):
         )
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return _rebuild, (self.time, self.input, self.output, self._labels())
+        labels = self._labels() | {"reference": self.reference}
+        return _rebuild, (self.time, self.input, self.output, labels)
 
     def _labels(self) -> dict[str, Any]:
         """Arguments of a record besides its samples."""
@@ -170,6 +179,7 @@ class Record(RecordConversions):
         return (
             f"<Record{name}: {self.n_samples} samples of {self.dt:g} {unit}, "
             f"{_count(self.ninputs, 'input')}, {_count(self.noutputs, 'output')}"
+            + (", set point" if self.reference is not None else "")
             + (f", {self.n_missing} missing values>" if self.n_missing else ">")
         )
 
@@ -245,6 +255,7 @@ class Record(RecordConversions):
             self.time[inside],
             self.input[..., inside],
             self.output[..., inside],
+            reference=None if self.reference is None else self.reference[..., inside],
             **self._labels(),
         )
 
@@ -252,7 +263,7 @@ class Record(RecordConversions):
         """Return the record with one sample of the steady state in front of it.
 
         For a record that begins with its step: the input had the value `input` before, and the
-        output had settled at `output`.
+        output had settled at `output`. A set point was what it is at first.
 
         Parameters
         ----------
@@ -285,6 +296,9 @@ class Record(RecordConversions):
             np.r_[self.time[0] - self.dt, self.time],
             np.concatenate([levels[0], self.input], axis=-1),
             np.concatenate([levels[1], self.output], axis=-1),
+            reference=None
+            if self.reference is None
+            else np.concatenate([self.reference[..., :1], self.reference], axis=-1),
             **self._labels(),
         )
 

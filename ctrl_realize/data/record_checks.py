@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from .._checks import spelled_out
+from .._checks import numbers, spelled_out
 from ..errors import DataError, OptionError
-from ..numerics.arrays import BoolArray, ComplexArray, FloatArray
+from ..numerics.arrays import BoolArray, ComplexArray, FloatArray, read_only
 from ..numerics.constants import LARGEST
 from ..numerics.signals.time_axis import UNIFORM_WITHIN, AxisFault
 
@@ -44,6 +44,21 @@ def check_size(values: FloatArray, what: str) -> None:
             f"{what} is larger than {LARGEST:g} at index {_first(large)}; check the file and "
             "the unit"
         )
+
+
+def checked_reference(given: Any, output: FloatArray) -> FloatArray | None:
+    """Return the set point of every output, NaN where it is not in force."""
+    if given is None:
+        return None
+    values = numbers(given, "reference")
+    if values.shape != output.shape:
+        raise DataError(
+            f"reference has shape {values.shape}; expected that of the output, {output.shape}: "
+            "the set point at every sample"
+        )
+    check_finite(values, "reference", allow_nan=True)
+    check_size(values, "reference")
+    return read_only(values)
 
 
 def _first(marked: BoolArray) -> int:

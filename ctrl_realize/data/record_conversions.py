@@ -14,7 +14,7 @@ from ..numerics.arrays import FloatArray
 from ..results import Drawable
 from .frames import frame_of_signals, signals_of_frame
 from .irregular import on_one_axis
-from .resampling import resampled
+from .resampling import held_at, resampled
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -28,6 +28,7 @@ class RecordConversions(Drawable):
     time: FloatArray
     input: FloatArray
     output: FloatArray
+    reference: FloatArray | None
     name: str
     input_labels: tuple[str, ...]
     output_labels: tuple[str, ...]
@@ -43,6 +44,7 @@ class RecordConversions(Drawable):
         input: str | Sequence[str],
         output: str | Sequence[str],
         time: str | None = None,
+        reference: str | Sequence[str] | None = None,
         **options: Any,
     ) -> Self:
         """Make a record from a pandas table.
@@ -55,6 +57,8 @@ class RecordConversions(Drawable):
         time : str, optional
             Column of time; default: the index. Dates (a `DatetimeIndex`) and durations are
             counted in s from the first row, numbers are s.
+        reference : str or sequence of str, optional
+            Columns of the set points, one for each output.
         **options
             Further arguments of `Record`. With ``missing="keep"``, missing values are kept.
 
@@ -75,11 +79,15 @@ class RecordConversions(Drawable):
         10.0
         """
         *signals, inputs, outputs = signals_of_frame(frame, input, output, time)
-        labels = {"input_labels": inputs, "output_labels": outputs}
+        labels: dict[str, Any] = {"input_labels": inputs, "output_labels": outputs}
+        if reference is not None:
+            labels["reference"] = signals_of_frame(frame, input, reference, time)[2]
         return cls(*signals, **labels | options)
 
     def to_frame(self, start: Any = None) -> pd.DataFrame:
         """Convert the record to a pandas table with a column for each signal.
+
+        A set point is in the column ``reference``, or ``reference[0]``, ``reference[1]``, ...
 
         Parameters
         ----------
@@ -96,8 +104,13 @@ class RecordConversions(Drawable):
         1.0   1.0  5.0
         2.0   1.0  6.0
         """
-        rows = np.concatenate([np.atleast_2d(self.input), np.atleast_2d(self.output)])
-        return frame_of_signals(self.time, rows, (*self.input_labels, *self.output_labels), start)
+        signals, labels = [self.input, self.output], [*self.input_labels, *self.output_labels]
+        if self.reference is not None:
+            signals.append(self.reference)
+            many = len(self.output_labels)
+            labels += [f"reference[{k}]" for k in range(many)] if many > 1 else ["reference"]
+        rows = np.concatenate([np.atleast_2d(one) for one in signals])
+        return frame_of_signals(self.time, rows, labels, start)
 
     @classmethod
     def resampled(
@@ -108,6 +121,7 @@ class RecordConversions(Drawable):
         *,
         dt: float | None = None,
         max_jitter: float = 0.5,
+        reference: ArrayLike | None = None,
         **labels: Any,
     ) -> Self:
         """Make a record from samples with time jitter, by linear interpolation.
@@ -124,6 +138,8 @@ class RecordConversions(Drawable):
         max_jitter : float, optional
             Largest time step, as a relative excess over the median step; a longer step is a gap,
             across which the signals are not interpolated.
+        reference : array_like, optional
+            Set point at the time stamps; it holds its value from one to the next.
         **labels
             Further arguments of `Record`.
 
@@ -132,7 +148,8 @@ class RecordConversions(Drawable):
         TimeAxisError
             Time that repeats or decreases, or a gap.
         """
-        return cls(*resampled(time, input, output, dt, max_jitter), **labels)
+        signals = resampled(time, input, output, dt, max_jitter)
+        return cls(*signals, reference=held_at(time, reference, signals[0]), **labels)
 
     @classmethod
     def from_samples(
@@ -143,6 +160,7 @@ class RecordConversions(Drawable):
         *,
         input_time: ArrayLike | None = None,
         dt: float | None = None,
+        reference: ArrayLike | None = None,
         **labels: Any,
     ) -> Self:
         """Make a record from samples with gaps or irregular time stamps, without interpolation.
@@ -162,6 +180,8 @@ class RecordConversions(Drawable):
             Step of the grid in s; each sample goes to the nearest row. Default: regular samples
             keep their step; otherwise the greatest common divisor of the distances between the
             stamps, or a fiftieth of the usual distance if that would be too fine.
+        reference : array_like, optional
+            Set point at the stamps of the output; it holds its value from one to the next.
         **labels
             Further arguments of `Record`.
 
@@ -183,7 +203,8 @@ class RecordConversions(Drawable):
         (10.0, [0.0, 0.0, 0.0, 1.0, 1.0], [5.0, 5.0, nan, 5.0, 6.0])
         """
         labels = {"missing": "keep", **labels}
-        return cls(*on_one_axis(time, input, output, input_time, dt), **labels)
+        signals = on_one_axis(time, input, output, input_time, dt)
+        return cls(*signals, reference=held_at(time, reference, signals[0]), **labels)
 
     @classmethod
     def from_response(cls, response: ct.TimeResponseData, *, name: str | None = None) -> Self:

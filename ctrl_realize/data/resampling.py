@@ -56,6 +56,18 @@ def resampled(
     return uniform, moved[0], moved[1]
 
 
+def held_at(time: ArrayLike, reference: ArrayLike | None, uniform: FloatArray) -> FloatArray | None:
+    """Last value of a set point at every row of a new time axis; None without one."""
+    if reference is None:
+        return None
+    stamps, values = numbers(time, "time"), numbers(reference, "reference")
+    check_shape(values, "reference", stamps.size)
+    # A stamp that rounding puts behind its row belongs to it.
+    slack = 1e-6 * (uniform[1] - uniform[0])
+    last = np.searchsorted(stamps, uniform + slack, side="right") - 1
+    return np.asarray(values[..., np.maximum(last, 0)])
+
+
 def _at(uniform: FloatArray, stamps: FloatArray, values: FloatArray, *, held: bool) -> FloatArray:
     """Interpolate a signal; an input that holds its levels takes the value of the nearest stamp.
 

@@ -27,7 +27,8 @@ _LONG = 2.5
 class Samples:
     """Input and output with the stamps of each, as they stand in a file.
 
-    ``input_time`` is None where the samples of the input are those of the output.
+    ``input_time`` is None where the samples of the input are those of the output. `reference` is
+    the set point at the stamps of the output, NaN where it is not in force.
     """
 
     time: FloatArray
@@ -35,9 +36,11 @@ class Samples:
     output: FloatArray
     input_time: FloatArray | None
     place: Callable[[int], str]
+    reference: FloatArray | None = None
 
     def record(self, labels: dict[str, Any], *, treatment: str, resample: bool) -> Record:
         """Make a record: as it is, with gaps on a finer time axis, or interpolated."""
+        labels = labels | {"reference": self.reference}
         if resample:
             return Record.resampled(self.time, self.at_outputs(), self.output, **labels)
         if treatment == "refuse":
@@ -47,6 +50,8 @@ class Samples:
             # a stamp that comes twice was stored twice, or corrected: the later one holds
             last = np.r_[np.diff(time) != 0, True]
             time, input, output = time[last], input[..., last], output[..., last]
+            if self.reference is not None:
+                labels["reference"] = self.reference[..., last]
             holds = treatment == "hold" and np.isnan(input).any()
             if axis_fault(time) is None and not holds:
                 return Record(time, input, output, missing="keep", **labels)
@@ -74,9 +79,11 @@ class Samples:
             no_input, no_output = (one.all(axis=0) for one in lost)
             if no_input.size > _FEW and np.mean(no_input != no_output) > _APART:
                 said = "input and output have their own stamps, between which the input holds"
+                wanted = self.reference
                 samples = replace(
                     self, time=self.time[~no_output], output=self.output[..., ~no_output],
                     input=self.input[..., ~no_input], input_time=self.time[~no_input],
+                    reference=None if wanted is None else wanted[..., ~no_output],
                 )  # fmt: skip
             else:
                 samples = replace(self, input=self._held(fault is not None))

@@ -46,6 +46,8 @@ def read_record(
     time: str | int | None = None,
     input: Selector | None = None,
     output: Selector | None = None,
+    reference: Selector | None = None,
+    mode: str | int | None = None,
     dt: float | None = None,
     time_unit: str = "auto",
     time_format: str | None = None,
@@ -90,6 +92,12 @@ def read_record(
     output : str, int or sequence of them, optional
         Output column or tag. Several make a record of several channels. Columns of ``ON`` and
         ``OFF`` are 1 and 0; ``12.5 %`` is 12.5.
+    reference : str, int or sequence of them, optional
+        Column or tag of the set point, one for each output; it holds its value where a cell has
+        none. Default: ``SP``, ``SV``, ``setpoint``, ``TIC101_SP``, ..., if there is one.
+    mode : str or int, optional
+        Column or tag of the controller's mode: ``MAN`` or ``AUTO``, ``CAS``, 0 or 1. In manual the
+        set point is not in force, and NaN. Default: ``MODE``, ``A/M``, ..., if there is one.
     dt : float, optional
         Sample time in s, where there is no time column.
     time_unit : str, optional
@@ -316,17 +324,19 @@ def _record(table: Table, how: _Reading, name: str, taken: Sequence[int] = ()) -
 
 def _samples(table: Table, how: _Reading, taken: Sequence[int]) -> tuple[Samples, dict[str, Any]]:
     """Samples and their labels."""
-    long = long_table(table, how.time, (how.input, how.output))
+    long = long_table(table, how.time, (how.input, how.output, how.reference))
     if long is not None:
         axis = time_axis(table, long.time, how.clock, long.date)
         tags = tags_as_columns(table, long)
-        parts = choose_columns(tags, None, how.input, how.output, 1.0)
+        parts = choose_columns(tags, None, how.input, how.output, 1.0, (), how.reference, how.mode)
         span = span_of(how.start, how.stop, axis)
         samples = long_samples(table, long, parts, axis, span, how.rules)
         check_part(table.path, span, samples.time, axis)
         return samples, labels_of(tags, parts, axis.unit)
     taken = [*taken, *how.rules.columns(table)]
-    parts = choose_columns(table, how.time, how.input, how.output, how.dt, taken)
+    parts = choose_columns(
+        table, how.time, how.input, how.output, how.dt, taken, how.reference, how.mode
+    )
     axis, rows = wide_axis(table, parts, how.clock)
     span = span_of(how.start, how.stop, axis)
     inside = (axis.seconds >= span[0]) & (axis.seconds <= span[1])

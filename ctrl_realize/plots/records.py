@@ -40,7 +40,7 @@ UNIT_STEP = "unit step response\n[output / input]"
 def record_plot(
     record: Record, *, ax: style.AxesLike = None, title: str | None = None, **kwargs: Any
 ) -> ct.ControlPlot:
-    """Draw a record: outputs above, inputs below (figure 3).
+    """Draw a record: outputs above, with their set points dashed, inputs below (figure 3).
 
     Parameters
     ----------
@@ -61,6 +61,9 @@ def record_plot(
     ) as (upper, lower):
         factor, unit = axis_time_unit(float(np.abs(record.time[[0, -1]]).max()), lower)
         time = factor * record.time
+        if record.reference is not None:
+            for wanted in np.atleast_2d(record.reference):
+                upper.plot(time, wanted, color=style.INPUT, lw=1.0, ls="--", drawstyle="steps-post")
         measured = draw_signals(upper, time, record.output, record.output_labels, **kwargs)
         driven = draw_signals(lower, time, record.input, record.input_labels, color=style.INPUT)
         upper.set_ylabel(_axis_label(record.output_labels, record.output_units, "output"))

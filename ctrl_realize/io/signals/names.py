@@ -29,13 +29,16 @@ from ..units import TIME_UNITS, is_no_time, plain_unit, sample_time_unit, to_sec
 
 NAMES = {key: frozenset(words) for key, words in facts("io/words.toml")["columns"].items()}
 """Names of columns by what they hold, and the last parts of tags, such as ``TIC101_PV``."""
+MODES = facts("io/words.toml")["modes"]
+"""Words of a controller's mode."""
 
 
 @dataclass(frozen=True)
 class Parts:
     """Positions of the columns.
 
-    ``dt`` is used if there is no time column; ``date`` is the date of a time of day.
+    ``dt`` is used if there is no time column; ``date`` is the date of a time of day. `references`
+    are the set points of the outputs, if there are any, and `mode` the mode of their controller.
     """
 
     time: int | None
@@ -43,6 +46,8 @@ class Parts:
     dt: float
     inputs: list[int]
     outputs: list[int]
+    references: Sequence[int] = ()
+    mode: int | None = None
 
 
 def choose_columns(
@@ -52,6 +57,8 @@ def choose_columns(
     output: Selector | None,
     dt: float | None,
     taken: Sequence[int] = (),
+    reference: Selector | None = None,
+    mode: str | int | None = None,
 ) -> Parts:
     """Assign columns to signals; `taken` are those with another meaning.
 
@@ -64,6 +71,9 @@ def choose_columns(
         raise OptionError("expected time= or dt=, got both")
     inputs = [] if input is None else find_columns(table, input, "input")
     outputs = [] if output is None else find_columns(table, output, "output")
+    references = [] if reference is None else find_columns(table, reference, "reference")
+    modes = _modes(table, taken) if mode is None else [find_column(table, mode, "mode")]
+    taken = [*taken, *modes, *references]
     clock, step = None if time is None else find_column(table, time, "time"), dt
     if clock is None and dt is None:
         clock, step = _guessed_clock(table, [*inputs, *outputs, *taken])
@@ -78,10 +88,10 @@ def choose_columns(
         for k in range(len(table.columns))
         if k not in (*known, *inputs, *outputs) and holds_numbers(table, k)
     ]
+    setpoints = named(table, NAMES["setpoint"]) + _tagged(table, NAMES["setpoint_tag"], known)
     if not inputs and not outputs and not has_header(table) and len(rest) == 2:
         inputs, outputs, rest = rest[:1], rest[1:], []
     if len(rest) > 1:
-        setpoints = named(table, NAMES["setpoint"]) + _tagged(table, NAMES["setpoint_tag"], known)
         rest = [k for k in rest if k not in setpoints and _moves(table, k)]
     if not inputs and len(rest) > 1:
         stepping = moves_in_steps([_values(table, k) for k in rest])
@@ -104,8 +114,17 @@ def choose_columns(
     used = [*inputs, *outputs] + ([] if clock is None else [clock])
     if len(set(used)) != len(used):
         raise OptionError("a column is selected twice among time=, input= and output=")
+    if reference is None:
+        free = {k for k in setpoints if k not in (*used, *taken) and holds_numbers(table, k)}
+        references = sorted(free) if len(free) == len(outputs) else []
+    elif len(references) != len(outputs):
+        raise OptionError(
+            f"reference={reference!r} selects {len(references)} columns; expected one for each of "
+            f"{len(outputs)} outputs"
+        )
     date = next((k for k in clocks if k != clock), None) if clock is not None else None
-    return Parts(clock, date, math.nan if step is None else step, inputs, outputs)
+    step = math.nan if step is None else step
+    return Parts(clock, date, step, inputs, outputs, references, modes[0] if modes else None)
 
 
 def _signals(table: Table, kind: str, taken: Sequence[int]) -> list[int]:
@@ -119,6 +138,24 @@ def _signals(table: Table, kind: str, taken: Sequence[int]) -> list[int]:
     if len(families) > 1 and families & (NAMES["input_tag"] | NAMES["output_tag"]):
         raise ambiguous(table, found, f"the {kind}", kind)
     return found
+
+
+def _modes(table: Table, taken: Iterable[int]) -> list[int]:
+    """Column of the mode of a controller, if one is so named and says what is known."""
+    found = named(table, NAMES["mode"], taken) or _tagged(table, NAMES["mode_tag"], taken)
+    return found if len(found) == 1 and not strange_modes(table, found[0]) else []
+
+
+def strange_modes(table: Table, index: int) -> set[str]:
+    """Cells of a column that are no mode of a controller."""
+    known = {*MODES["manual"], *MODES["automatic"], ""}
+    return {mode_word(cell) for cell in table.columns[index].cells.tolist()} - known
+
+
+def mode_word(cell: object) -> str:
+    """Mode in a cell, as it is compared: ``1.0 -> "1"``."""
+    word = str(cell).strip().casefold()
+    return word.removesuffix(".0")
 
 
 def _tagged(table: Table, tags: Iterable[str], taken: Iterable[int]) -> list[int]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -20,11 +21,14 @@ from ..units import plain_unit
 from .long_format import LongTable
 from .names import Parts
 from .quality import Rows, Rules
+from .set_point import filled, held, in_manual
 
 
 def wide_axis(table: Table, parts: Parts, clock: Clock) -> tuple[TimeAxis, Rows]:
     """Time axis of a table with a column for each signal, and its rows in the order of time."""
-    used = [*parts.inputs, *parts.outputs] + ([] if parts.time is None else [parts.time])
+    used = [*parts.inputs, *parts.outputs, *parts.references] + (
+        [] if parts.time is None else [parts.time]
+    )
     check_lengths(table, used)
     count = table.columns[parts.outputs[0]].cells.size
     if parts.time is None:
@@ -48,7 +52,14 @@ def wide_samples(
         _stacked([rules.values(table, k, rows) for k in chosen])
         for chosen in (parts.inputs, parts.outputs)
     )
-    return Samples(seconds, input, output, None, table.rows(rows, []).place)
+    reference = None
+    if parts.references:
+        lenient = replace(rules, keep=True)
+        wanted = [filled(lenient.values(table, k, rows)) for k in parts.references]
+        reference = _stacked(wanted)
+        if parts.mode is not None:
+            reference[..., in_manual(table, parts.mode)[rows]] = np.nan
+    return Samples(seconds, input, output, None, table.rows(rows, []).place, reference)
 
 
 def long_samples(
@@ -77,7 +88,19 @@ def long_samples(
         # a valve that did not move again has held its place to the end
         input_time = np.r_[input_time, time[-1]]
         input = np.concatenate([input, input[..., -1:]], axis=-1)
-    return Samples(time, input, output, input_time, "sample {}".format)
+    reference = None
+    if parts.references:
+        wanted = [
+            held(*_series(table, long, tags[k], axis.seconds, rules, span, holds=True), time)
+            for k in parts.references
+        ]
+        reference = _stacked(wanted)
+        if parts.mode is not None:
+            rows = long.rows[tags[parts.mode]]
+            rows = rows[np.argsort(axis.seconds[rows], kind="stable")]
+            manual = in_manual(table.rows(rows, [long.value]), long.value)
+            reference[..., held(axis.seconds[rows], manual, time) == 1] = np.nan
+    return Samples(time, input, output, input_time, "sample {}".format, reference)
 
 
 def _series(
