@@ -112,6 +112,7 @@ TABLES = {
         "python -m benchmarks.ablation --made-for 24 --only Nyquist "
         "--output docs/tables/ablation_nyquist_table.md",
     ),
+    "textbook": ("docs/tables/textbook_table.md", "python -m benchmarks.loops.textbook"),
     "kinds": ("docs/tables/kinds_table.md", "python -m benchmarks.records kinds"),
     "verdicts_measured": (
         "docs/tables/verdicts_measured_table.md",
