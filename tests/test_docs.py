@@ -80,6 +80,12 @@ def test_tests_that_a_page_names_exist(page: Path):
             assert f"def {name}(" in (ROOT / file).read_text(), f"{file}::{name}"
 
 
+def test_files_that_the_architecture_names_exist():
+    named = re.findall(r"`(ctrl_realize/[\w/]+\.py)`", (DOCS / "architecture.md").read_text())
+    assert len(named) >= 10
+    assert [path for path in named if not (ROOT / path).exists()] == []
+
+
 @pytest.mark.parametrize("page", PAGES, ids=lambda path: str(path.relative_to(DOCS)))
 def test_cells_that_a_reader_sees_check_nothing_and_invent_no_data(page: Path):
     for options, code in re.findall(
