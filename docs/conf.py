@@ -216,6 +216,7 @@ html_theme = "furo"
 pygments_dark_style = "github-dark"
 html_title = "ctrl_realize"
 html_static_path = ["_static"]
+html_extra_path = ["extra", "../ctrl_realize/report/identification.schema.json"]
 html_css_files = ["style.css"]
 html_js_files = ["figures.js", "front.js"]
 html_copy_source = False

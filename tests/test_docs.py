@@ -17,7 +17,9 @@ from tests.sources import parsed
 
 ROOT = Path(__file__).resolve().parents[1]
 DOCS = ROOT / "docs"
-PAGES = sorted(path for path in DOCS.rglob("*.md") if not {"_build", "generated"} & set(path.parts))
+PAGES = sorted(
+    path for path in DOCS.rglob("*.md") if not {"_build", "generated", "extra"} & set(path.parts)
+)
 OUTSIDE = sorted(ROOT.glob("*.md"))
 """README, CONTRIBUTING and the like, which are no pages of the site."""
 

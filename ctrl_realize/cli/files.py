@@ -21,7 +21,7 @@ _COLUMNS = ("time", "input", "output", "quality", "by", "frequency", "magnitude"
             "imag")  # fmt: skip
 
 
-_NO_RESULT = ("folder", "jobs")
+_NO_RESULT = ("folder", "jobs", "json")
 
 
 def typed_call(command: str, words: Sequence[str]) -> str:

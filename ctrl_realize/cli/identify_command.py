@@ -23,6 +23,7 @@ from .inputs import (
     Source,
     calls_again,
 )
+from .machine import Told, told_as_json
 from .manifest import Run, refuse_other_results
 from .results import Provenance, campaign_table, write_campaign_files, write_record_files
 from .staging import appearing, kept_rows, refuse_a_file
@@ -35,9 +36,17 @@ _MANY = 12
 """Number of records from which on all cores are used."""
 
 
-def run_identify(files: list[Path], folder: Path, *, tune: str | None, **given: Any) -> int:
+def run_identify(
+    files: list[Path], folder: Path | None, *, tune: str | None, json: str | None, **given: Any
+) -> int:
     """Identify, write the results, and return the exit code."""
     tuning = None if tune is None else Tuning({}, {"form": tune})
+    if json is not None:
+        return told_as_json(
+            json, lambda told: identified(files, folder, tuning=tuning, told=told, **given)
+        )
+    if folder is None:
+        raise OptionError("expected --output, the folder of the results, or --json")
     return identified(files, folder, tuning=tuning, **given)
 
 
@@ -75,8 +84,9 @@ def identified(
     require: Sequence[str] | None,
     run: Run,
     tuning: Tuning | None = None,
+    told: Told | None = None,
 ) -> int:
-    """Identify, and tune; results are written if there is a folder, as there is without `joint`."""
+    """Identify, and tune; results are written if there is a folder, and `told` is filled."""
     joint = joint or "gains" in chosen
     if joint and separate:
         raise OptionError("expected --joint or --separate, got both")
@@ -88,7 +98,11 @@ def identified(
     response = response or {}
     measured = None if frf is None else read_frf(frf, **response)
     calls = calls_again(files, settings, how, run.typed, None if frf is None else (frf, response))
-    sources, task = how.sources(files), _Task(settings, measured, required, run, tuning)
+    sources, task = how.sources(files), _Task(settings, measured, required, run, tuning, told)
+    if told is not None and len(sources) > 1 and not joint:
+        raise OptionError(
+            f"--json is for one model: expected one record or --joint, got {len(sources)}"
+        )
     if folder is None:
         return _one(task, sources, None, calls)
     if separate and len(sources) > 1:
@@ -111,6 +125,7 @@ class _Task:
     required: list[str]
     run: Run
     tuning: Tuning | None = None
+    told: Told | None = None
 
     def provenance(
         self,
@@ -156,6 +171,8 @@ def _one(
     _say_model(system, comparison)
     files = [source.file for source in sources]
     provenance = task.provenance(system, files, comparison, calls)
+    if task.told is not None:
+        task.told.append({"system": system, "records": records, **provenance.tuned})
     if folder is None:
         return task.judged(system)
     written = write_record_files(folder, system, records[0], provenance)

@@ -60,6 +60,12 @@ Tune = Annotated[
             "siemens_pid_compact; see the command tune."),
 ]  # fmt: skip
 
+Json = Annotated[
+    str | None,
+    _OPTION("--json", metavar="FILE", help="Write model, verdicts and flags as JSON; -: to "
+            "stdout, with everything else on stderr."),
+]  # fmt: skip
+
 # how to judge a valve
 Limit = Annotated[
     list[str] | None,

@@ -36,7 +36,7 @@ def look(
 @command(".identify_command", "run_identify")
 def identify(
     files: o.Files,
-    folder: o.Folder,
+    folder: o.MaybeFolder = None,
     *,
     frf: o.Frf = None,
     joint: o.Joint = False,
@@ -48,6 +48,7 @@ def identify(
     jobs: o.Jobs = None,
     require: o.Require = None,
     tune: o.Tune = None,
+    json: o.Json = None,
     no_report: o.NoReport = False,
     overwrite: o.Overwrite = False,
 ) -> None:
@@ -58,7 +59,8 @@ def identify(
     (models/) and a final model. A record that fails becomes a row of the table with its error. If a
     campaign is interrupted, the finished records are kept in rows/, and the same command resumes
     from there. With --joint, or --gains own, one model is fitted to all records together. With
-    --tune, the report also has a controller, see the command tune.
+    --tune, the report also has a controller, see the command tune. With --json -, a program reads
+    the model, its verdicts and what may be done with it from stdout.
 
     \b
     Examples:
@@ -68,6 +70,7 @@ def identify(
       ctrl-realize identify historian.csv -o out --missing keep --from "2025-02-01 08:00"
       ctrl-realize identify tests.csv -o out --by test --joint --gains own
       ctrl-realize identify step.csv -o out --frf frf.csv --joint
+      ctrl-realize identify step.csv --json - --require tuning
     """  # noqa: D301  # \b keeps the lines of the examples apart
 
 

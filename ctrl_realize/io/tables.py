@@ -39,7 +39,7 @@ class Column:
     @property
     def told_unit(self) -> str:
         """Unit of the header, or of the first cell."""
-        cells = [] if self.unit else self.first(1)
+        cells: Any = [] if self.unit else self.first(1)
         return measured(str(cells[0]).strip())[1] if len(cells) else self.unit
 
     def first(self, count: int) -> np.ndarray[Any, np.dtype[Any]]:

@@ -262,7 +262,11 @@ def _draw_others(
             for where, signal in zip(
                 axes, _simulated(one, controller, time.size, steps, {}), strict=True
             ):
-                looks = {"color": style.TRUTH, "linewidth": 0.8, "scaley": not inside}
+                looks: dict[str, Any] = {
+                    "color": style.TRUTH,
+                    "linewidth": 0.8,
+                    "scaley": not inside,
+                }
                 where.plot(time, signal, **looks)
     if inside:
         for where, signals in zip(axes, zip(*inside, strict=True), strict=True):

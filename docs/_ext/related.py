@@ -106,6 +106,8 @@ PAGES: dict[str, tuple[str, ...]] = {
     "bench.*": ("howto/which_test", "course/index"),
     "valves.*oop*": ("howto/oscillating_loop",),
     "valves.*": ("howto/valve_test",),
+    "report.summary": ("howto/scripts", "verdicts"),
+    "report.identification_schema": ("howto/scripts",),
     "report.*": ("howto/export",),
     "paper.*": ("paper_map",),
     "errors.*": ("howto/own_csv", "flags"),

@@ -97,9 +97,9 @@ def _fit(
     if refuses and found.explained < FOLLOWS:
         codes = [str(code) for y in found.data.measured if (code := missing_code(y))]
         raise UnrelatedError(
-            f"{_named(records)}: the output does not respond to the input (the best model "
-            f"lowers the sum of squares by {found.explained:.3g} noise variances, expected at "
-            f"least {FOLLOWS:g}); " + (codes[0] if codes else _turns(found.data.measured))
+            f"{_named(records)}: the output does not respond to the input, which explains nothing "
+            f"beyond the noise (test value {found.explained:.3g}, needed {FOLLOWS:g}); "
+            + (codes[0] if codes else _turns(found.data.measured))
         )
     return found
 

@@ -10,6 +10,7 @@ from ..._flags import Flag, flagged
 from ..._wording import in_time, plainly
 from ...numerics.arrays import FloatArray
 from ...numerics.constants import SMALLEST
+from ...numerics.signals.jumps import swapped
 from ...numerics.signals.noise import winsorised_sigma
 from ...numerics.validation.held_output import held_share, longest_hold, stuck_samples
 from ...numerics.validation.limits import at_limit
@@ -42,6 +43,8 @@ def sensor_flags(fit: OutputErrorFit, output: FloatArray, fitted: FloatArray) ->
             end=" (the end of the record)" if at_end else "",
             value=output[first],
         )
+    if swapped(fit.data.input[fit.data.rows], output):
+        yield flagged("swapped")
     if np.isfinite(fit.onset):
         yield from _onset_in_gap(fit)
         yield from _lead(fit, output, fitted)

@@ -51,7 +51,7 @@ def keyed_as_table(source: TextSource) -> TextSource:
     they are.
     """
     lines = source.head(_HEAD).decode("utf-8", "replace").splitlines()[:-1]
-    if np.mean([len(_PAIR.findall(one)) > 1 for one in lines] or [0.0]) < _MOSTLY:
+    if np.mean([len(_PAIR.findall(one)) > 1 for one in lines] or [False]) < _MOSTLY:
         return source
     rows = []
     with source.open("utf-8") as file:

@@ -16,6 +16,9 @@ _FEWEST = 8  # samples
 _JUMPS, _FOLLOWS = 0.3, 0.34
 """Part of its range by which an input jumps, and part of that by which an output does at most."""
 
+_STILL = 0.05
+"""Part of its range in which an input is still, with its noise."""
+
 
 def moves_in_steps(signals: Sequence[FloatArray]) -> int | None:
     """Position of the one signal that jumps and holds while the others follow; None if unclear.
@@ -62,3 +65,24 @@ def largest_jump(values: FloatArray) -> float:
     one = np.abs(np.diff(values)[1:-1])
     lasting = np.abs(values[2:-1] + values[3:] - values[:-3] - values[1:-2]) / 2
     return float(np.minimum(one, lasting).max()) / reach
+
+
+def swapped(input: FloatArray, output: FloatArray) -> bool:
+    """Whether an output jumps first and its input follows, as if they were swapped.
+
+    A valve that sticks jumps as well, but after its input has moved.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from ctrl_realize.numerics.signals.jumps import swapped
+    >>> t = np.arange(100.0)
+    >>> u, y = 1.0 * (t > 20), 1 - np.exp(-np.maximum(t - 25, 0) / 20)
+    >>> swapped(y, u), swapped(u, y)
+    (True, False)
+    """
+    if moves_in_steps([input, output]) != 1:
+        return False
+    steps = np.abs(np.diff(output))
+    first = int(np.argmax(steps > steps.max() / 2))
+    return bool(np.ptp(input[: first + 1]) <= _STILL * np.ptp(input))
