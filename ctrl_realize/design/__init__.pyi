@@ -17,6 +17,8 @@ from .loops.robust_stability import UncertaintyBound as UncertaintyBound
 from .loops.robust_stability import robust_stability as robust_stability
 from .loops.root_locus import root_locus as root_locus
 from .loops.uncertainty import uncertainty_bound as uncertainty_bound
+from .measured_load import Feedforward as Feedforward
+from .measured_load import feedforward as feedforward
 from .models.approximations import pade_ss as pade_ss
 from .models.approximations import thiran as thiran
 from .models.balanced import BalancedReduction as BalancedReduction

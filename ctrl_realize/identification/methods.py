@@ -76,7 +76,8 @@ def identify(
         For ``"output_error"``, see `fit_output_error`.
     structures : optional
         Process model, such as P1D, P2DZ, FOPDT or SOPDT. For ``"output_error"``, which also takes
-        (order, relative degree), see `fit_output_error`.
+        (order, relative degree), see `fit_output_error`. For a record with several inputs and one
+        output: of the model of each input, see `fit_several_inputs`.
     gains : {"common", "own"}, optional
         ``"own"``: each of several records has its own gain. For ``"output_error"``.
     actuator : {"auto", "slew_rate", "dead_band", "stiction", "resolution", "saturation", \
@@ -153,7 +154,8 @@ def identify(
         for name, value in locals().items()
         if name in _DEFAULTS and not _is_default(value, _DEFAULTS[name])
     }
-    name, fit = _fit_of(one_of(method, "method", METHODS), record, frf is not None)
+    models = frf is not None, structures is not None
+    name, fit = _fit_of(one_of(method, "method", METHODS), record, *models)
     taken = signature(fit).parameters
     if "structures" in taken:
         options = _with_structures(**options)
@@ -183,7 +185,7 @@ def _is_default(value: object, default: object) -> bool:
 
 
 def _fit_of(
-    method: str, record: object, with_frf: bool
+    method: str, record: object, with_frf: bool, with_structures: bool
 ) -> tuple[str, Callable[..., DelayedStateSpace]]:
     """Name and function of the fit; its signature has the arguments that it takes."""
     if method != "output_error":
@@ -199,7 +201,12 @@ def _fit_of(
         from .joint.fit import fit_joint
 
         return "a fit with frf", fit_joint
-    if any(one.ninputs * one.noutputs > 1 for one in as_records(record)):
+    several = [one for one in as_records(record) if one.ninputs * one.noutputs > 1]
+    if with_structures and several and max(one.noutputs for one in several) == 1:
+        from .several_inputs import fit_several_inputs
+
+        return "a fit of several inputs", fit_several_inputs
+    if several:
         from .state_space_fit.fit import fit_state_space
 
         return "a fit of several channels", fit_state_space

@@ -9,6 +9,7 @@ from .dispatch import draw as draw
 from .fits import dead_time_plot as dead_time_plot
 from .fits import each_record_plot as each_record_plot
 from .fits import fit_plot as fit_plot
+from .fits import several_inputs_plot as several_inputs_plot
 from .frequencies import frf_fit_plot as frf_fit_plot
 from .frequencies import frf_plot as frf_plot
 from .frequencies import joint_fit_plot as joint_fit_plot

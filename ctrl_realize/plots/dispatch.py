@@ -15,10 +15,11 @@ from ..identification.joint.result import JointFit
 from ..identification.output_error.result import OutputErrorFit
 from ..identification.realization.delay_scan_result import DelayScan
 from ..identification.realization.result import Realization
+from ..identification.several_inputs import SeveralInputsFit
 from ..io.stored_fit import FitSummary
 from .campaigns import campaign_plot, gain_plot
 from .delays import bootstrap_plot, delay_comparison_plot, track_plot
-from .fits import fit_plot
+from .fits import fit_plot, several_inputs_plot
 from .frequencies import frf_fit_plot, frf_plot, joint_fit_plot, truth_plot
 from .frf_comparison import comparison_plot
 from .loops import margins_plot
@@ -120,4 +121,5 @@ draw.register(JointFit, joint_fit_plot)
 draw.register(DelayScan, delay_plot)
 draw.register(MeasuredFRF, frf_plot)
 draw.register(Realization, singular_value_plot)
+draw.register(SeveralInputsFit, several_inputs_plot)
 draw.register(StepResponse, step_plot)

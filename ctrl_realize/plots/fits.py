@@ -17,6 +17,7 @@ from ..delayed.simulation import simulate_record
 from ..errors import OptionError
 from ..identification.output_error.repeatability import distinct
 from ..identification.output_error.result import OutputErrorFit
+from ..identification.several_inputs import SeveralInputsFit
 from ..identification.step.steps import unit_step
 from ..numerics.constants import VERY_STRONG
 from ..numerics.signals.correlation import fit_percent
@@ -181,6 +182,58 @@ def each_record_plot(
             axis.set_visible(False)
             lines.append([])
         return style.finished(axes, lines, columns=columns, loc="lower right")
+
+
+@documented("sequence of two Axes")
+def several_inputs_plot(
+    fit: SeveralInputsFit | DelayedStateSpace,
+    *,
+    ax: style.AxesLike = None,
+    title: str | None = None,
+    **kwargs: Any,
+) -> ct.ControlPlot:
+    """Draw output and model, and below the response to each input.
+
+    Parameters
+    ----------
+    fit : SeveralInputsFit, or model with one as its `fit`
+    **kwargs
+        Line properties of the model's response.
+
+    Raises
+    ------
+    OptionError
+        The model has no fit of several inputs.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import ctrl_realize as cr
+    >>> t = np.arange(200.0)
+    >>> u = np.stack([1.0 * (t > 20), 1.0 * (t > 110)])
+    >>> y = np.stack([1.0 * (t > 25), 1.0 * (t > 118)]).sum(axis=0)
+    >>> y = y + 0.01 * np.random.default_rng(0).standard_normal(t.size)
+    >>> sys = cr.identify(cr.Record(t, u, y), structures="FOPDT")
+    >>> cplt = cr.plots.several_inputs_plot(sys)
+    >>> cplt.figure.axes[-1].get_xlabel()
+    'time [s]'
+    """
+    result = style.result_of(fit, SeveralInputsFit, "no fit of several inputs; give structures=")
+    record, total = result.records[0], result.responses.sum(axis=0)
+    measured = np.ravel(record.output)
+    with style.canvas(ax, 2, title=title, default_title=record.name) as (upper, lower):
+        factor, unit = axis_time_unit(float(np.abs(record.time[[0, -1]]).max()), lower)
+        time, looks = factor * record.time, {**style.model_looks(), "label": "model", **kwargs}
+        lines = [list(upper.plot(time, measured, color=style.MEASURED, lw=1.5, label="measured"))]
+        lines[0] += upper.plot(time, total + np.nanmean(measured - total), **looks)
+        lines.append([])
+        for i, (name, response) in enumerate(zip(result.inputs, result.responses, strict=True)):
+            own = {"color": style.model_colour(i + 1), "label": plain(name, 30)}
+            lines[1] += lower.plot(time, response, **own)
+        upper.set_ylabel(with_unit(record.output_labels[0], record.output_units[0]))
+        lower.set_ylabel("response to")
+        lower.set_xlabel(f"time [{unit}]")
+        return style.finished([upper, lower], lines, legends=(0, 1), loc="above")
 
 
 def each_record_rows(count: int) -> int:

@@ -1,0 +1,384 @@
+"""A process model with dead time for every input of a record with one output.
+
+The models are those of the output-error fit, each of the output without the responses to the other
+inputs, in turn until nothing changes: Gauss-Seidel iterations of the common least-squares problem
+[1]_. Each interval then holds for the other models as they are; it is widened by what the other
+parameters leave open, from the information matrix of all [2]_.
+
+References
+----------
+.. [1] A. Buja, T. Hastie and R. Tibshirani, Linear smoothers and additive models, Ann. Statist. 17
+   (1989) 453-510, doi:10.1214/aos/1176347115 (backfitting).
+.. [2] L. Ljung, System Identification: Theory for the User, 2nd ed., Prentice Hall 1999, section
+   9.4 (covariance of parameters).
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from scipy.signal import lfilter
+
+from .._flags import Flag
+from .._wording import interval_in_time, time_within
+from ..data import Record
+from ..data.given import as_records
+from ..data.shown_units import in_shown_units
+from ..delayed import DelayedStateSpace, delayed_ss, fit_of
+from ..errors import DataError, DataWarning
+from ..numerics.arrays import FloatArray
+from ..numerics.blas_threads import single_threaded
+from ..numerics.engine.poles import parameters_from_poles, poles_from_parameters
+from ..results import ModelFit
+from .impulse.from_io import impulse_from_io
+from .output_error.any_input import UnrelatedError
+from .output_error.fit import fit_output_error
+from .output_error.result import OutputErrorFit
+from .plausible import continuous_core
+
+if TYPE_CHECKING:
+    from .process_structures import Structures
+
+MOST_CYCLES = 8
+"""Turns of the iterations; inputs that move alike converge slowly."""
+_SETTLED = 0.02
+"""Change of a response, in standard deviations of the residual, from which on all is settled: a
+tenth of the error of a response that five parameters have from a thousand samples."""
+_STEP = 1e-4
+"""Relative change of a parameter for a derivative by differences."""
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class SeveralInputsFit(ModelFit):
+    """One model with dead time for every input of one output.
+
+    ``output == level + drift + responses.sum(axis=0) + residual``, where each response is that of
+    ``fits[i]`` to input i.
+
+    Attributes
+    ----------
+    fits : tuple of OutputErrorFit
+        One for each input, of the output without the responses to the others. Intervals of dead
+        time and gain are wider than for these alone, by what the others leave open.
+    records : tuple of Record
+        The record.
+    responses : ndarray, shape (inputs, N)
+        Responses of the models to their inputs, from rest.
+    cycles : int
+        Iterations.
+    converged : bool
+        Whether they have ended before the last one that is allowed.
+
+    Examples
+    --------
+    >>> import control as ct
+    >>> import numpy as np
+    >>> import ctrl_realize as cr
+    >>> rng = np.random.default_rng(0)
+    >>> u = np.repeat(rng.choice([-1.0, 1.0], (2, 40)), 20, axis=1)
+    >>> heating = cr.delayed_ss(ct.tf([2.0], [20, 1]), dead_time=5.0, dt=1.0)
+    >>> load = cr.delayed_ss(ct.tf([-1.0], [30, 1]), dead_time=9.0, dt=1.0)
+    >>> y = heating.simulate(u[0]) + load.simulate(u[1]) + 0.05 * rng.standard_normal(u.shape[1])
+    >>> record = cr.Record(np.arange(u.shape[1]) * 1.0, u, y, input_labels=["heating", "load"])
+    >>> sys = cr.identify(record, structures="FOPDT")
+    >>> [round(fit.dead_time) for fit in sys.fit.fits]
+    [5, 9]
+    """
+
+    fits: tuple[OutputErrorFit, ...]
+    records: tuple[Record, ...]
+    responses: FloatArray
+    cycles: int
+    converged: bool
+
+    _method = "process model for each input"
+    dead_time = interval = delay = delay_interval = None
+
+    @property
+    def order(self) -> int:
+        """Number of states of all models."""
+        return sum(fit.order for fit in self.fits)
+
+    @property
+    def inputs(self) -> tuple[str, ...]:
+        """Names of the inputs."""
+        return tuple(self.records[0].input_labels)
+
+    @property
+    def residual_std(self) -> float:
+        """Standard deviation of the residual, in the unit of the output."""
+        return self.fits[-1].residual_std
+
+    @property
+    def choices(self) -> tuple[str, ...]:
+        """What was chosen for each input, and why."""
+        return tuple(
+            f"{name}: {choice}"
+            for name, fit in zip(self.inputs, self.fits, strict=True)
+            for choice in fit.choices[:1]
+        )
+
+    @property
+    def flags(self) -> tuple[Flag, ...]:
+        """Flags of all fits, with the name of the input."""
+        return tuple(
+            replace(flag, message=f"{name}: {flag.message}")
+            for name, fit in zip(self.inputs, self.fits, strict=True)
+            for flag in fit.flags
+        )
+
+    def table(self) -> Any:
+        """One row for each input: gain, dead time, their intervals, and the transfer function.
+
+        Returns
+        -------
+        pandas.DataFrame
+            Index ``input``; columns ``gain``, ``gain_low``, ``gain_high``, ``dead_time``,
+            ``dead_time_low``, ``dead_time_high`` [s] and ``formula``.
+        """
+        import pandas as pd
+
+        rows = [
+            (fit.gain, *fit.gain_interval, fit.dead_time, *fit.interval, fit.formula)
+            for fit in self.fits
+        ]
+        ends = ("", "_low", "_high")
+        columns = [f"{name}{end}" for name in ("gain", "dead_time") for end in ends]
+        index = pd.Index(self.inputs, name="input")
+        return pd.DataFrame(rows, columns=[*columns, "formula"], index=index)
+
+    def _title(self) -> str:
+        return f"Process models of {len(self.fits)} inputs"
+
+    def _rows(self) -> list[tuple[str, str]]:
+        rows = []
+        for name, fit in zip(self.inputs, self.fits, strict=True):
+            told = time_within(fit.dead_time, *fit.interval)
+            rows += [
+                (name, fit.formula),
+                ("  dead time", f"{told} ({interval_in_time(*fit.interval)})"),
+            ]
+        state = "converged" if self.converged else "not converged"
+        return [
+            *rows,
+            ("residual", f"{self.residual_std:.3g}"),
+            ("iterations", f"{self.cycles}, {state}"),
+        ]
+
+    def __repr__(self) -> str:
+        return f"<SeveralInputsFit of {', '.join(self.inputs)}>"
+
+
+@single_threaded
+@in_shown_units
+def fit_several_inputs(
+    records: Record | Sequence[Record],
+    *,
+    structures: Structures | None = None,
+    max_delay: float | None = None,
+    noise: Any = "auto",
+) -> DelayedStateSpace:
+    """Fit a model with dead time for each input of a record with several inputs and one output.
+
+    Parameters
+    ----------
+    records : Record
+        Two inputs or more, one output.
+    structures, max_delay, noise : optional
+        As for `fit_output_error`, the same for every input.
+
+    Returns
+    -------
+    DelayedStateSpace
+        With all inputs; its `.fit` is a `SeveralInputsFit`.
+
+    Raises
+    ------
+    DataError
+        Several records or outputs, one input, or an input that the output does not respond to.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import ctrl_realize as cr
+    >>> t = np.arange(200.0)
+    >>> u = np.stack([1.0 * (t > 20), 1.0 * (t > 110)])
+    >>> y = 2.0 * (t > 25) - 1.0 * (t > 118) + 0.01 * np.random.default_rng(0).standard_normal(200)
+    >>> sys = cr.identification.fit_several_inputs(cr.Record(t, u, y), structures="FOPDT")
+    >>> sys.fit.table()["gain"].round(1).tolist()
+    [2.0, -1.0]
+    """
+    record = _checked(as_records(records))
+    inputs, output = np.atleast_2d(record.input), np.ravel(record.output)
+    options: dict[str, Any] = {"max_delay": max_delay, "noise": noise}
+    responses = _starting(record)
+    systems: list[DelayedStateSpace] = []
+    asked: list[Any] = [structures] * len(inputs)
+    cycle, settled = 0, False
+    while cycle < MOST_CYCLES:
+        cycle, moved, found = cycle + 1, 0.0, []
+        # the last turn, once settled, chooses structures again and finds the intervals
+        for i in range(len(inputs)):
+            left = output - (responses.sum(axis=0) - responses[i])
+            system = _one(record, i, left, structures if settled else asked[i], options)
+            response = system.simulate(inputs[i] - inputs[i, 0])
+            fit = fit_of(system, OutputErrorFit)
+            moved = max(moved, float(np.std(response - responses[i])) / fit.residual_std)
+            responses[i], asked[i] = response, _kept(fit, structures)
+            found.append(system)
+        systems = found
+        if settled:
+            break
+        settled = moved < _SETTLED
+    fits = _wider([fit_of(system, OutputErrorFit) for system in systems], record)
+    result = SeveralInputsFit(fits, (record,), responses, cycle, settled)
+    return _joined(systems, result)
+
+
+def _checked(records: tuple[Record, ...]) -> Record:
+    record = records[0]
+    if len(records) > 1 or record.ninputs < 2 or record.noutputs > 1:
+        raise DataError(
+            f"got {len(records)} record(s) with {record.ninputs} inputs and {record.noutputs} "
+            "outputs; process models of several inputs need one record with one output. Without "
+            "structures= all channels are fitted by fit_state_space"
+        )
+    return record
+
+
+def _starting(record: Record) -> FloatArray:
+    """Responses of finite impulse responses to each input; zero where samples are missing."""
+    inputs = np.atleast_2d(record.input)
+    if record.n_missing:
+        return np.zeros(inputs.shape)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", DataWarning)  # a start need not be exact
+        markov = impulse_from_io(record, method="regularized").markov[0]
+    pairs = zip(markov, inputs, strict=True)
+    return np.array([lfilter(h, [1.0], u - u[0]) for h, u in pairs])
+
+
+def _one(
+    record: Record, i: int, left: FloatArray, structures: Any, options: dict[str, Any]
+) -> DelayedStateSpace:
+    name = record.input_labels[i]
+    units = {label: unit for label, unit in record.units.items() if label in (name, "time")}
+    units |= {k: record.units[k] for k in record.output_labels if k in record.units}
+    one = Record(
+        record.time, np.atleast_2d(record.input)[i], left, name=f"{record.name}, input {name}",
+        units=units, input_labels=[name], output_labels=list(record.output_labels), missing="keep",
+    )  # fmt: skip
+    try:
+        return fit_output_error(one, structures=structures, **options)
+    except UnrelatedError as error:
+        raise UnrelatedError(f"{error}; leave the input {name!r} out of the record") from None
+
+
+def _kept(fit: OutputErrorFit, structures: Structures | None) -> Any:
+    """Structure of the next turns: that which was chosen."""
+    return structures if fit.estimate.process.form is not None else [fit.structure]
+
+
+def _wider(fits: list[OutputErrorFit], record: Record) -> tuple[OutputErrorFit, ...]:
+    """Widen the intervals from those with the other models known to those with all estimated."""
+    tangents = [
+        _tangents(fit, u - u[0]) for fit, u in zip(fits, np.atleast_2d(record.input), strict=True)
+    ]
+    seen = ~np.isnan(np.ravel(record.output))
+    time = record.time - record.time[0]
+    local = np.stack([np.ones_like(time), time / max(float(time[-1]), 1e-300)], axis=1)
+    found = []
+    for i, fit in enumerate(fits):
+        own = np.column_stack([tangents[i], local])[seen]
+        others = np.column_stack([tangents[j] for j in range(len(fits)) if j != i])[seen]
+        weights = np.zeros(own.shape[1])
+        weights[0] = 1.0
+        factor = _ratio(own, others, weights)
+        estimate = fit.estimate
+        at = estimate.dead_time
+        estimate = replace(
+            estimate,
+            low=max(at - factor * (at - estimate.low), 0.0),
+            high=at + factor * (estimate.high - at),
+            std=factor * estimate.std,
+        )
+        if estimate.static is not None:
+            gains = np.zeros(own.shape[1])
+            gains[1 : tangents[i].shape[1]] = _gain_slopes(fit)
+            more = _ratio(own, others, gains)
+            static = replace(estimate.static, gain_std=more * estimate.static.gain_std)
+            alike = tuple(
+                (replace(other, gain_std=more * other.gain_std), weight)
+                for other, weight in estimate.alike
+            )
+            estimate = replace(estimate, static=static, alike=alike)
+        found.append(replace(fit, estimate=estimate))
+    return tuple(found)
+
+
+def _ratio(own: FloatArray, others: FloatArray, weights: FloatArray) -> float:
+    """Standard error of a sum of own parameters with all estimated, over that with own alone."""
+    alone = np.linalg.pinv(own) @ np.linalg.pinv(own).T
+    every = np.linalg.pinv(np.column_stack([own, others]))
+    m = own.shape[1]
+    together = (every @ every.T)[:m, :m]
+    return float(np.sqrt(max(weights @ together @ weights, 0) / (weights @ alone @ weights)))
+
+
+def _parameters(fit: OutputErrorFit) -> tuple[FloatArray, FloatArray]:
+    """Pole parameters and numerator of a fit."""
+    return parameters_from_poles(fit.estimate.poles), fit.estimate.numerator
+
+
+def _tangents(fit: OutputErrorFit, u: FloatArray) -> FloatArray:
+    """Derivatives (N, 1 + n + k) of a response to dead time, pole parameters and numerator."""
+    poles, numerator = _parameters(fit)
+
+    def response(late: float, theta: FloatArray, b: FloatArray) -> FloatArray:
+        core = continuous_core(b, poles_from_parameters(theta[None])[0][0])
+        return np.asarray(delayed_ss(core, dead_time=late, dt=fit.dt).simulate(u))
+
+    at, h = fit.dead_time, 0.25 * fit.dt
+    best = response(at, poles, numerator)
+    early = max(at - h, 0.0)
+    columns = [(response(at + h, poles, numerator) - response(early, poles, numerator)) / 2]
+    for k in range(poles.size):
+        moved = poles.copy()
+        moved[k] += _STEP
+        columns.append((response(at, moved, numerator) - best) / _STEP)
+    columns += [response(at, poles, row) for row in np.diag(numerator)]
+    return np.stack(columns, axis=1)
+
+
+def _gain_slopes(fit: OutputErrorFit) -> FloatArray:
+    """Derivatives of the gain to the parameters of `_tangents` behind the dead time."""
+    poles, numerator = _parameters(fit)
+
+    def gain(theta: FloatArray, b: FloatArray) -> float:
+        found = poles_from_parameters(theta[None])[0][0]
+        return float(b[0] / np.prod(-found[found != 0]).real)
+
+    slopes = []
+    for k in range(poles.size):
+        moved = poles.copy()
+        moved[k] += _STEP
+        slopes.append((gain(moved, numerator) - gain(poles, numerator)) / _STEP)
+    slopes += [gain(poles, row) for row in np.diag(numerator)]
+    return np.array(slopes)
+
+
+def _joined(systems: Sequence[DelayedStateSpace], result: SeveralInputsFit) -> DelayedStateSpace:
+    """Add the responses to all inputs."""
+    whole: Any = systems[0]
+    for system in systems[1:]:
+        whole = whole.append(system)
+    total: DelayedStateSpace = np.ones((1, len(systems))) * whole
+    record = result.records[0]
+    return total.replace(
+        fit=result, name=record.name or None, inputs=list(record.input_labels),
+        outputs=list(record.output_labels),
+    )  # fmt: skip

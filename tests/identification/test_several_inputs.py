@@ -1,0 +1,71 @@
+"""A process model for every input of a record with one output. Simulated."""
+
+import control as ct
+import numpy as np
+import pytest
+
+import ctrl_realize as cr
+
+T = np.arange(800.0)
+PLANTS = {"valve": (2.0, 20.0, 5.3), "load": (-1.2, 30.0, 9.0)}
+
+
+def record(seed, alike=0.0):
+    """Binary signals of two inputs, of which one may follow the other in part."""
+    rng = np.random.default_rng(seed)
+    first, second = np.repeat(rng.choice([-1.0, 1.0], (2, T.size // 20)), 20, axis=1)
+    inputs = np.stack([first, alike * first + (1 - alike) * second])
+    y = 0.1 * rng.standard_normal(T.size)
+    for u, (gain, lag, dead_time) in zip(inputs, PLANTS.values(), strict=True):
+        y += cr.delayed_ss(ct.tf([gain], [lag, 1]), dead_time=dead_time, dt=1.0).simulate(u - u[0])
+    units = {"valve": "%", "load": "t/h", "y": "degC"}
+    return cr.Record(T, inputs, y, input_labels=list(PLANTS), units=units, name="oven")
+
+
+@pytest.fixture(scope="module")
+def sys():
+    return cr.identify(record(0), structures="FOPDT")
+
+
+def test_every_input_has_gain_and_dead_time_with_intervals(sys):
+    table = sys.fit.table()
+    for name, (gain, _, dead_time) in PLANTS.items():
+        row = table.loc[name]
+        assert row.gain_low <= gain <= row.gain_high
+        assert row.dead_time_low <= dead_time <= row.dead_time_high
+        assert row.dead_time_high - row.dead_time_low < 5
+    assert sys.fit.converged
+    assert "degC/%" in table.loc["valve", "formula"]
+    assert "degC/(t/h)" in sys.fit.report()
+
+
+def test_the_model_has_both_inputs_and_leaves_the_noise(sys):
+    data = sys.fit.records[0]
+    assert sys.input_labels == list(PLANTS)
+    assert (sys.ninputs, sys.noutputs) == (2, 1)
+    left = data.output.ravel() - sys.simulate(data.input - data.input[:, :1])
+    assert np.std(left) == pytest.approx(0.1, rel=0.1)
+    np.testing.assert_allclose(
+        sys.simulate(data.input - data.input[:, :1])[0], sys.fit.responses.sum(axis=0), atol=1e-9
+    )
+
+
+def test_inputs_that_move_alike_have_wider_intervals(sys):
+    # correlation of 0.8 between the inputs: variance inflation 1 / (1 - 0.64) for gains
+    together = cr.identify(record(0, alike=0.57), structures="FOPDT").fit
+    for one, other in zip(sys.fit.fits, together.fits, strict=True):
+        ratio = other.gain_std_given_structure / one.gain_std_given_structure
+        assert ratio > 1.2
+    for fit, (gain, _, _) in zip(together.fits, PLANTS.values(), strict=True):
+        assert abs(fit.gain - gain) < 3 * fit.gain_std_given_structure
+
+
+def test_records_that_it_is_not_for_are_refused():
+    data = record(0)
+    with pytest.raises(cr.errors.DataError, match="one record with one output"):
+        cr.identify([data, data], structures="FOPDT")
+    silent = data.input.copy()
+    silent[1] = np.random.default_rng(5).permutation(silent[1])
+    wrong = cr.Record(T, silent, data.output, input_labels=list(PLANTS))
+    with pytest.raises(cr.errors.DataError, match="load"):
+        cr.identify(wrong, structures="FOPDT")
