@@ -322,11 +322,10 @@ def _wider(fits: list[OutputErrorFit], record: Record) -> tuple[OutputErrorFit, 
 
 def _ratio(own: FloatArray, others: FloatArray, weights: FloatArray) -> float:
     """Standard error of a sum of own parameters with all estimated, over that with own alone."""
-    alone = np.linalg.pinv(own) @ np.linalg.pinv(own).T
-    every = np.linalg.pinv(np.column_stack([own, others]))
-    m = own.shape[1]
-    together = (every @ every.T)[:m, :m]
-    return float(np.sqrt(max(weights @ together @ weights, 0) / (weights @ alone @ weights)))
+    # the covariance is the product of the pseudo-inverse with its transpose
+    alone = np.linalg.pinv(own).T @ weights
+    together = np.linalg.pinv(np.column_stack([own, others]))[: own.shape[1]].T @ weights
+    return float(np.linalg.norm(together) / np.linalg.norm(alone))
 
 
 def _parameters(fit: OutputErrorFit) -> tuple[FloatArray, FloatArray]:

@@ -228,7 +228,7 @@ def several_inputs_plot(
         lines[0] += upper.plot(time, total + np.nanmean(measured - total), **looks)
         lines.append([])
         for i, (name, response) in enumerate(zip(result.inputs, result.responses, strict=True)):
-            own = {"color": style.model_colour(i + 1), "label": plain(name, 30)}
+            own: dict[str, Any] = {"color": style.model_colour(i + 1), "label": plain(name, 30)}
             lines[1] += lower.plot(time, response, **own)
         upper.set_ylabel(with_unit(record.output_labels[0], record.output_units[0]))
         lower.set_ylabel("response to")
