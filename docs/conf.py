@@ -127,6 +127,7 @@ TABLES = {
         "docs/tables/relay_table.md",
         "python -m benchmarks.relay --store relay.jsonl --output docs/tables/relay_table.md",
     ),
+    "app": ("docs/tables/app_table.md", "python -m benchmarks.app"),
     "missing": ("docs/tables/missing_table.md", "python -m benchmarks.accuracy.missing"),
     "loops": ("docs/tables/loops_table.md", "python -m benchmarks.loops"),
     "fuzz": ("docs/tables/fuzz_table.md", "python3 tools/fuzz_table.py"),

@@ -208,6 +208,10 @@ class Browser:
         if release:
             self.release(*places[-1])
 
+    def move(self, x: float, y: float) -> None:
+        """Go on with a drag."""
+        self._mouse("mouseMoved", x, y, held=True)
+
     def release(self, x: float, y: float) -> None:
         """Let go of the mouse's button."""
         self._mouse("mouseReleased", x, y)

@@ -48,10 +48,10 @@ def _panels(
     start, stop = row["range"] or (first, last)
     out = [(*ends, "struck out") for ends in row["struck"]]
     out += [(first, start, ""), (stop, last, "")]
-    seen = raw.output[~np.isnan(raw.output)]
+    there = ~np.isnan(raw.output)
     begin = first if edge is None else edge.time
-    before = seen[: max(int(np.searchsorted(raw.time, begin)), 1)]
-    rest = row["rest"][1] if row["rest"] else float(np.median(before))
+    seen, before = raw.output[there], raw.output[there & (raw.time < begin)]
+    rest = row["rest"][1] if row["rest"] else float(np.median(before if before.size else seen[:1]))
     layers = [
         *(line(factor * one.time, one.output, "plausible") for one in behind),
         *[

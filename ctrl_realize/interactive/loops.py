@@ -11,13 +11,12 @@ import numpy as np
 
 from .._wording import in_time
 from ..delayed import DelayedStateSpace, delayed_ss
-from ..design import LoopSimulation, PIDController, simulate_loop
+from ..design import LoopSimulation, PIDController, margins, simulate_loop
 from ..design.tuning.pid import TuningOptions, pid, tuned
 from ..errors import CtrlRealizeError, CtrlRealizeWarning
 from ..identification import OutputErrorFit
 from ..identification.plausible import continuous_core
 from ..numerics.arrays import BoolArray, FloatArray
-from ..numerics.loops.reference import largest_sensitivity
 from ..report.controller import unsafe_if
 from .drawing import JSON, axis, layer, line, panel, time_axis
 
@@ -28,7 +27,6 @@ _MIDDLE = {"lambda": 3.0}  # closed-loop time in the middle, in dead times, wher
 _MS = (1.2, 2.0)
 _SAMPLES, _FEW_SAMPLES = 500, 250  # of a simulated loop, at rest and while the slider moves
 _SETTLED = 4.0  # integral times and dead times, which a loop is shown for
-_POINTS = 600  # of frequency, twice
 _THIN = 4  # samples of a simulated loop for each point of a curve that is one of many
 _ROOM = 0.08  # of an axis
 
@@ -37,8 +35,8 @@ _ROOM = 0.08  # of an axis
 class TunedLoop:
     """A controller with what was said about it.
 
-    `sensitivities` (1 + 39,) are Ms with the model and with each plausible plant; infinite where
-    the loop is unstable.
+    `sensitivities` (1 + 39,) are Ms with the model and with each plausible plant, if these were
+    checked; infinite where the loop is unstable.
     """
 
     controller: PIDController
@@ -75,12 +73,9 @@ def tuned_loop(
         rule, kind = options.pop("rule"), options.pop("kind")
         controller, _ = tuned(system, rule, kind, TuningOptions(**options))
     said = tuple(str(one.message) for one in told)
-    dt = float(system.dt)
-    # A crossover near half the sample rate needs steps of equal width.
-    slow = np.geomspace(1e-3 / middle_time(system), np.pi / dt, _POINTS)
-    z = np.exp(1j * dt * np.union1d(slow, np.linspace(0.0, np.pi / dt, _POINTS)[1:]))
-    response = np.stack([np.ravel(one(z)) for one in _plants(system)]) * np.ravel(controller(z))
-    return TunedLoop(controller, largest_sensitivity(response), said)
+    found = (margins(one, controller) for one in (_plants(system) if checked else [system]))
+    sizes = np.array([one.ms if one.stable else np.inf for one in found])
+    return TunedLoop(controller, sizes, said)
 
 
 def _plants(system: DelayedStateSpace) -> list[DelayedStateSpace]:

@@ -152,7 +152,7 @@ def _criterion(free: OutputErrorFit, fit: OutputErrorFit) -> JSON:
                layer("level", "ink", "95 %", y=CHI2_95)]  # fmt: skip
     said, step = in_time(fit.dead_time, 4), min(fit.dt, (ends[1] - ends[0]) / 100)
     here = handle("dead_time", "dead time", fit.dead_time, said, ends, step, per_unit=factor)
-    y = axis("misfit above the best", "noise variances", (0.0, most))
+    y = axis("misfit", "noise variances", (0.0, most))
     return panel("criterion", "Which dead times the record allows", across, y, layers, [here])
 
 

@@ -25,7 +25,7 @@ from ..io.text_options import TextOptions
 from ..numerics.arrays import FloatArray
 from .drawing import JSON
 
-SHOWN_ROWS = 6
+SHOWN_ROWS, MOST_COLUMNS = 6, 60
 ATTEMPTS: tuple[JSON, ...] = ({}, {"missing": "keep"}, {"resample": True})
 """Ways to read a file, of which the first that succeeds is the first guess."""
 _ARRAYS = ("time", "input", "output")
@@ -112,7 +112,7 @@ def preview(content: bytes, row: Mapping[str, Any]) -> JSON:
         {"name": one.name or f"column {k}", "unit": one.unit,
          "cells": [f"{cell:.6g}" if isinstance(cell, float) else str(cell)[:24]
                    for cell in one.first(SHOWN_ROWS).tolist()]}
-        for k, one in enumerate(table.columns)
+        for k, one in enumerate(table.columns[:MOST_COLUMNS])
     ]  # fmt: skip
     return {"columns": columns, "taken": dict(zip(_ARRAYS, taken, strict=True))}
 

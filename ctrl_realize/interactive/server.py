@@ -9,6 +9,7 @@ from __future__ import annotations
 import hmac
 import json
 import secrets
+import sys
 import webbrowser
 from collections.abc import Callable, Iterable
 from contextlib import closing, suppress
@@ -40,6 +41,11 @@ class AppServer(ThreadingHTTPServer):
         super().__init__((LOOPBACK, port), _Handler)
         self.host = host
         self.token = secrets.token_urlsafe(24)
+
+    def handle_error(self, *request: Any) -> None:
+        """Tell a defect; a browser that has gone away is none."""
+        if not isinstance(sys.exception(), ConnectionError):
+            super().handle_error(*request)
 
     @property
     def address(self) -> str:

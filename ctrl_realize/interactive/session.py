@@ -349,7 +349,7 @@ class Session:
                 rows.append((row, None, [str(error)], None))
         at = self.state["selected"]
         seen: JSON = dict(self._now("data view", [self.state["records"], at], data_view, rows, at))
-        if rows:
+        if rows and not rows[at][0]["given"]:
             row = self.state["records"][at]
             key, content = [row["file"], row["options"]], self.files[row["file"]]
             seen["preview"] = self._now("preview", key, records.preview, content, row)

@@ -62,15 +62,21 @@ class Plot {
     this.key = h("div", { class: "legend" });
     this.figure = h("figure", { "data-panel": panel.key }, this.head, this.svg, this.key);
     this.handles = new Map();
-    this.watch = new ResizeObserver(() => { if (this.width !== this.svg.clientWidth) this.draw(); });
+    this.watch = new ResizeObserver(() => { if (!this.holding && this.width !== this.svg.clientWidth) this.draw(); });
     this.watch.observe(this.svg);
     this.set(panel);
   }
 
   set(panel) {
     this.panel = panel;
-    this.moved = {};
+    this.moved = null;
     if (!this.holding) this.draw();
+  }
+
+  // Draw the model as it was dragged.
+  follow(line) {
+    this.moved = line;
+    for (const path of this.models) path.setAttribute("d", this.path(line.x, line.y));
   }
 
   // Where a value of a handle stands, in pixels.
@@ -145,7 +151,8 @@ class Plot {
     const look = { class: `${one.kind} ${one.look}` };
     const { w, tall } = this.box;
     if (one.kind === "line") {
-      const path = s("path", { ...look, d: this.path(one.x, one.y) });
+      const { x, y } = (one.look === "model" && this.moved) || one;
+      const path = s("path", { ...look, d: this.path(x, y) });
       if (one.name && one.look === "bar") path.append(s("title", {}, one.name));
       if (one.look === "model") this.models.push(path);
       return [path];
@@ -441,8 +448,8 @@ class App {
     this.view = view;
     this.undo.disabled = !view.can.undo;
     this.redo.disabled = !view.can.redo;
+    this.compute(); // goes on while the rest is drawn
     this.parts();
-    this.compute();
   }
 
   // What is still to be computed stays as it was drawn, also where it was dragged to.
@@ -522,7 +529,7 @@ class App {
       return [h("p", { class: "drop" }, "Drop files here, or open them: CSV of loggers and historians, Excel, MATLAB, Parquet, HDF5, TDMS, npz; a measured frequency response; or saved work.")];
     }
     const chosen = view.state.selected;
-    const rows = records.map((one, k) => h("tr", { class: k === chosen ? "best" : "" },
+    const rows = records.map((one, k) => h("tr", { class: k === chosen && records.length > 1 ? "best" : "" },
       h("td", {}, h("input", { type: "checkbox", checked: one.used, "data-key": `use${k}`, "aria-label": `use ${one.name}`,
         onchange: (event) => this.record({ used: event.target.checked }, k) })),
       h("td", { class: "name" }, h("button", { type: "button", class: "link", "data-key": `select${k}`, onclick: () => this.change({ do: "select", index: k }) }, one.name)),
@@ -592,10 +599,7 @@ class App {
   drag(name, value) {
     this.follow({ do: "drag", values: { [name]: value } }, ({ drag }) => {
       if (!drag) return;
-      for (const [key, line] of Object.entries(drag.lines)) {
-        const plot = this.plots.get(key);
-        for (const path of plot?.models ?? []) path.setAttribute("d", plot.path(line.x, line.y));
-      }
+      for (const [key, line] of Object.entries(drag.lines)) this.plots.get(key)?.follow(line);
       this.told.textContent = drag.misfit.text;
       this.told.classList.toggle("bad", drag.misfit.allowed === false);
       this.told.dataset.steps = Number(this.told.dataset.steps ?? 0) + 1;
@@ -774,9 +778,7 @@ class App {
     if (!slide) return;
     this.tell(slide);
     for (const panel of slide.panels) {
-      const plot = this.plots.get(panel.key);
-      const [line] = panel.layers.filter((one) => one.look === "model");
-      for (const path of plot?.models ?? []) path.setAttribute("d", plot.path(line.x, line.y));
+      this.plots.get(panel.key)?.follow(panel.layers.find((one) => one.look === "model"));
     }
   }
 
