@@ -26,7 +26,7 @@ from ..numerics.arrays import FloatArray
 from .drawing import JSON
 
 SHOWN_ROWS, MOST_COLUMNS = 6, 60
-ATTEMPTS: tuple[JSON, ...] = ({}, {"missing": "keep"}, {"resample": True})
+ATTEMPTS: tuple[JSON, ...] = ({}, {"resample": True})
 """Ways to read a file, of which the first that succeeds is the first guess."""
 _ARRAYS = ("time", "input", "output")
 

@@ -567,7 +567,7 @@ class App {
       h("div", { class: "fields" },
         this.choice("time_unit", "unit of time", options.time_unit ?? "auto", ["auto", "s", "ms", "us", "min", "h", "day"].map((one) => [one, one]), (value) => read({ time_unit: value === "auto" ? null : value })),
         this.field("dt", "sample time in s, if there is no time", options.dt, (value) => read({ dt: value ? Number(value) : null, time: value ? null : options.time })),
-        this.choice("missing", "bad cells and gaps", options.missing ?? "refuse", [["refuse", "refuse"], ["keep", "keep as missing"], ["hold", "input holds its value"]], (value) => read({ missing: value === "refuse" ? null : value })),
+        this.choice("missing", "bad cells and gaps", options.missing ?? "auto", [["auto", "keep and tell"], ["refuse", "refuse"], ["keep", "keep"], ["hold", "input holds its value"]], (value) => read({ missing: value === "auto" ? null : value })),
         this.choice("resample", "jitter", options.resample ? "true" : "", [["", "refuse"], ["true", "resample"]], (value) => read({ resample: value ? true : null })),
         this.choice("decimal", "decimal sign", options.decimal ?? "auto", [["auto", "auto"], [".", "."], [",", ","]], (value) => read({ decimal: value === "auto" ? null : value })),
         this.field("unit-input", "unit of the input", units.input, (input) => unit({ input })),
