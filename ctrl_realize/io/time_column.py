@@ -10,7 +10,7 @@ import numpy as np
 from .._wording import ASSUMED
 from ..errors import DataError, DataWarning, OptionError, warn_caller
 from ..numerics.arrays import FloatArray
-from ..numerics.signals.counters import clock_change
+from ..numerics.signals.counters import clock_change, clock_unit
 from .columns import holds_numbers
 from .tables import Table
 from .text.dates import have_offset, in_utc, stamps_of
@@ -18,18 +18,15 @@ from .units import checked_time_unit, plain_unit, sample_time_unit, to_seconds, 
 
 # from here on neighbouring integers are the same double
 _EXACT_INTEGERS = 2**53
-# in s since 1970; a clock in seconds needs no check
-_YEAR_1990, _YEAR_2100 = 6.3e8, 4.1e9
+# in 0.1 us since 1601, as TwinCAT and Windows count; years 1968 to 2101
+_FILETIME = (1.16e17, 1.58e17)
 _TICKS = {"ms": 1e3, "us": 1e6, "ns": 1e9}
-# years 2000 to 2060 in days, as counted by Excel and by MATLAB's datenum
-_DAY_COUNTS = ((36526.0, 58440.0), (730486.0, 752400.0))
 # 12:34, 12:34.5, 12:34:56 and 12:34:56.789
 _SHORT = r"\d{1,3}:\d{2}(\.\d*)?"
 _CLOCK = rf"{_SHORT}|\d{{1,3}}:\d{{2}}:\d{{2}}(\.\d*)?"
 _PART = re.compile(r"(?<=:\d\d)[,;:](?=\d{3,}$)")
 """Sign before a part of a second, as some controllers write it."""
 _FIRST = {"hh:mm": "h", "h:mm": "h", "h:min": "h", "mm:ss": "min", "m:ss": "min", "min:s": "min"}
-_HALF_AN_HOUR = 1 / 48
 _AS_STATED = 0.01  # relative difference of the usual step from the sample time in the header
 
 
@@ -89,6 +86,8 @@ def time_axis(table: Table, index: int, clock: Clock, date: int | None = None) -
         return _since_first(table, index, stamps, shown)._replace(doubt=doubt, zone=zone)
     if zone is not None:
         _refuse_zone(table, index, zone)
+    if unit == "auto" and cells.dtype.kind in "iu" and _FILETIME[0] < cells[0] < _FILETIME[1]:
+        return TimeAxis((cells - cells[0]) / 1e7, unit="s")
     if unit == "auto":
         unit = named or _epoch_unit(table, index) or _stated_unit(table, index)
     used = checked_time_unit(unit or "s")
@@ -120,29 +119,20 @@ def _stated_unit(table: Table, index: int) -> str:
 
 
 def _epoch_unit(table: Table, index: int) -> str:
-    """Unit of a clock in ms or finer since 1970, or in days as in a spreadsheet; otherwise empty.
-
-    A clock in seconds may have such numbers of days too, but then its steps are round.
-    """
+    """Unit of a clock that counts since 1970, or days as in a spreadsheet; otherwise empty."""
     values = table.numbers(index)
-    first = float(values[0]) if values.size else 0.0
-    units = [unit for unit, ticks in _TICKS.items() if _YEAR_1990 <= first / ticks < _YEAR_2100]
-    if not units and any(low <= first < high for low, high in _DAY_COUNTS):
-        step = float(values[-1] - values[0]) / max(values.size - 1, 1)
-        if 0 < step < _HALF_AN_HOUR and abs(float(f"{step:.3g}") / step - 1) >= 1e-5:
-            units = ["day"]
-    if units:
-        since = (
-            "days since 1900 or 0 (Excel, datenum)"
-            if units == ["day"]
-            else f"{units[0]} since 1970"
+    unit = clock_unit(values)
+    begins = f"{table.path}: {table.title(index)} begins at {(*values[:1], 0.0)[0]:.14g}"
+    if unit is None:
+        raise OptionError(
+            f"{begins}, which is no clock in s; give time_unit='ms', 'us' or 'ns', or time_format= "
+            "such as '%Y%m%d%H%M%S'"
         )
-        warn_caller(
-            f"{table.path}: {table.title(index)} begins at {first:.9g} and is taken for {since}; "
-            "time_unit= says otherwise, such as 's'",
-            DataWarning,
-        )
-    return units[0] if units else ""
+    if unit:
+        since = "days since 1900 or 0 (Excel, datenum)" if unit == "day" else f"{unit} since 1970"
+        said = f"{begins} and is taken for {since}; time_unit= says otherwise, such as 's'"
+        warn_caller(said, DataWarning)
+    return unit
 
 
 def _refuse_zone(table: Table, index: int, zone: str) -> NoReturn:

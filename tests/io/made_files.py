@@ -385,6 +385,72 @@ def logger(path):
     return Truth(t, u, y, 0.8, 45)
 
 
+def influx_blocks(path):
+    """A table for each field, each with its annotations and header."""
+    t, u, y = plant(29, 1.0, 200, [(0, 40.0), (30, 50.0)], 3.5, 6.5, (20,), 180)
+    head = [
+        "#group,false,false,false,false,true,true",
+        "#datatype,string,long,dateTime:RFC3339,double,string,string",
+        "#default,_result,,,,,", ",result,table,_time,_value,_field,_measurement",
+    ]  # fmt: skip
+    lines = []
+    for number, (name, signal) in enumerate((("op", u), ("pv", y))):
+        lines += head
+        for at, value in zip(stamps(t, "%Y-%m-%dT%H:%M:%SZ"), signal, strict=True):
+            lines.append(f",,{number},{at},{value},{name},oven")
+        lines.append("")
+    write(path, lines, end="\r\n")
+    return Truth(t, u, y, 3.5, 6.5)
+
+
+def ignition_tall(path):
+    t, u, y = plant(30, 1.0, 200, [(0, 40.0), (30, 50.0)], 3.5, 6.5, (20,), 180)
+    lines = ["path,value,quality,t_stamp"]
+    for k, at in enumerate(stamps(t)):
+        lines += [f"tic101/op,{u[k]},192,{at}", f"tic101/pv,{y[k]},192,{at}"]
+    write(path, lines)
+    return Truth(t, u, y, 3.5, 6.5)
+
+
+def twincat_filetime(path):
+    """With full time stamps, in 0.1 us since 1601."""
+    t, u, y = plant(31, 0.01, 300, [(0, 1.0), (0.5, 2.0)], 12, 0.12, (0.3,), 3)
+    lines = ["Name;Drive", "", "Name;fVoltage;Name;fSpeed", "SampleTime[ms];10;SampleTime[ms];10",
+             "SymbolName;MAIN.fVoltage;SymbolName;MAIN.fSpeed", ""]  # fmt: skip
+    clock = [133828893000000000 + round(1e7 * s) for s in t]
+    lines += [f"{s};{a};{s};{b}" for s, a, b in zip(clock, u, y, strict=True)]
+    write(path, lines)
+    return Truth(t, u, y, 12, 0.12)
+
+
+def json_lines(path):
+    t, u, y = plant(32, 1.0, 200, [(0, 40.0), (30, 50.0)], 3.5, 6.5, (20,), 180)
+    clock = stamps(t, "%Y-%m-%dT%H:%M:%S.%fZ")
+    write(
+        path,
+        [f'{{"time": "{s}", "u": {a}, "y": {b}}}' for s, a, b in zip(clock, u, y, strict=True)],
+    )
+    return Truth(t, u, y, 3.5, 6.5)
+
+
+def picolog(path):
+    """A column of time without a name."""
+    t, u, y = plant(33, 1.0, 200, [(0, 40.0), (30, 50.0)], 0.9, 6.5, (20,), 180)
+    lines = [",Heater (%),Oven Ave. (C)"]
+    lines += [f"{s},{a},{b}" for s, a, b in zip(stamps(t, "%H:%M:%S"), u, y, strict=True)]
+    write(path, lines)
+    return Truth(t, u, y, 0.9, 6.5)
+
+
+def faceplate(path):
+    """What a loop calls its output is the input of the plant."""
+    t, u, y = plant(34, 1.0, 200, [(0, 40.0), (30, 50.0)], 0.9, 6.5, (20,), 180)
+    lines = ["Time [s],Setpoint,Actual,Output"]
+    lines += [f"{s},190,{b},{a}" for s, a, b in zip(t, u, y, strict=True)]
+    write(path, lines)
+    return Truth(t, u, y, 0.9, 6.5)
+
+
 GUESSED = "moves in steps"
 MADE = [
     MadeFile("influx.csv", influx),
@@ -415,4 +481,10 @@ MADE = [
     MadeFile("encoder.csv", encoder, told="starts again"),
     MadeFile("utf16.txt", utf16),
     MadeFile("logger.csv", logger, told=GUESSED),
+    MadeFile("influx_blocks.csv", influx_blocks),
+    MadeFile("ignition_tall.csv", ignition_tall),
+    MadeFile("filetime.csv", twincat_filetime, told=GUESSED),
+    MadeFile("lines.json", json_lines),
+    MadeFile("picolog.csv", picolog, told=GUESSED),
+    MadeFile("faceplate.csv", faceplate),
 ]

@@ -117,3 +117,14 @@ def test_units_in_cells_are_units_of_the_column_and_two_of_them_are_refused(tmp_
     path.write_text(path.read_text().replace("24.5 °C", "24.5 °F"))
     with pytest.raises(DataError, match=r"'y' has 1 cells with the unit '°F' and 5 without"):
         cr.read_record(path)
+
+
+@pytest.mark.parametrize("first", [700_000_000_000, 20250201081500])
+def test_numbers_that_are_no_clock_in_seconds_nor_since_1970_are_asked_about(tmp_path, first):
+    """Nanoseconds since a device was started, and dates without marks."""
+    path = tmp_path / "a.csv"
+    rows = [f"{first + 10**9 * k},{k % 2},{k}" for k in range(9)]
+    path.write_text("\n".join(["timestamp,u,y", *rows]) + "\n")
+    with pytest.raises(OptionError, match=r"no clock in s; give time_unit='ms'.* or time_format="):
+        cr.read_record(path)
+    assert cr.read_record(path, time_unit="ns").dt == 1.0

@@ -13,6 +13,7 @@ from ..._facts import facts
 from ...errors import DataError, DataWarning, OptionError, warn_caller
 from ...numerics.arrays import FloatArray
 from ...numerics.signals.jumps import moves_in_steps
+from ..cells import kind_of
 from ..columns import (
     Selector,
     ambiguous,
@@ -24,7 +25,7 @@ from ..columns import (
     named,
     plain_name,
 )
-from ..tables import Table
+from ..tables import Column, Table
 from ..units import TIME_UNITS, is_no_time, plain_unit, sample_time_unit, to_seconds
 
 NAMES = {key: frozenset(words) for key, words in facts("io/words.toml")["columns"].items()}
@@ -81,14 +82,16 @@ def choose_columns(
     clocks = clocks_of(table, taken, every=True) if clock is None else [clock]
     clocks += dates_of(table, clock, taken)
     known = [*clocks, *taken, *clocks_of(table, [*clocks, *inputs, *outputs, *taken], every=True)]
-    inputs = inputs or _signals(table, "input", [*known, *outputs])
-    outputs = outputs or _signals(table, "output", [*known, *inputs])
+    setpoints = named(table, NAMES["setpoint"]) + _tagged(table, NAMES["setpoint_tag"], known)
+    free = [k for k in range(len(table.columns)) if k not in (*known, *setpoints)]
+    loop = bool(setpoints) and sum(holds_numbers(table, k) for k in free) > 1
+    inputs = inputs or _signals(table, "input", [*known, *outputs], loop)
+    outputs = outputs or _signals(table, "output", [*known, *inputs], loop)
     rest = [
         k
         for k in range(len(table.columns))
         if k not in (*known, *inputs, *outputs) and holds_numbers(table, k)
     ]
-    setpoints = named(table, NAMES["setpoint"]) + _tagged(table, NAMES["setpoint_tag"], known)
     if not inputs and not outputs and not has_header(table) and len(rest) == 2:
         inputs, outputs, rest = rest[:1], rest[1:], []
     if len(rest) > 1:
@@ -127,10 +130,15 @@ def choose_columns(
     return Parts(clock, date, step, inputs, outputs, references, modes[0] if modes else None)
 
 
-def _signals(table: Table, kind: str, taken: Sequence[int]) -> list[int]:
-    """Columns of a signal by their names: whole names first, then the last part of a tag."""
+def _signals(table: Table, kind: str, taken: Sequence[int], loop: bool) -> list[int]:
+    """Columns of a signal by their names: whole names first, then the last part of a tag.
+
+    What is called output in a `loop`, beside a set point, is that of the controller.
+    """
+    own = NAMES["controller_output"] if loop else frozenset()
+    names = NAMES[kind] | own if kind == "input" else NAMES[kind] - own
     other = {"input": "output", "output": "input"}[kind]
-    found = named(table, NAMES[kind], taken) or _tagged(table, NAMES[f"{kind}_tag"], taken)
+    found = named(table, names, taken) or _tagged(table, NAMES[f"{kind}_tag"], taken)
     if not found and _tagged(table, NAMES[f"{other}_tag"], ()):
         found = _tagged(table, NAMES["either_tag"], taken)
     families = {family(table.columns[k].name) for k in found}
@@ -196,7 +204,15 @@ def _runs(table: Table, index: int) -> bool:
 def _moves(table: Table, index: int) -> bool:
     """Whether a column may be a signal: it counts no rows, and is not constant."""
     told = {plain_name(table.columns[index].name), plain_unit(table.columns[index].unit)}
-    return not told & NAMES["counter"] and len(set(_values(table, index).tolist())) > 1
+    steps = set(np.diff(_values(table, index)).tolist())
+    counts = told & NAMES["counter"] or (steps == {1.0} and not table.columns[index].name)
+    return not counts and steps not in (set(), {0.0})
+
+
+def _shows_time(column: Column) -> bool:
+    """Whether the first cells of a column are dates or times of day."""
+    cells = [str(cell).strip() for cell in column.first(3)]
+    return bool(cells) and all(kind_of(cell, ".") == "time" for cell in cells)
 
 
 def _values(table: Table, index: int) -> FloatArray:
@@ -230,6 +246,9 @@ def _guessed_clock(table: Table, taken: Sequence[int]) -> tuple[int | None, floa
             if not (math.isfinite(step) and step > 0):
                 raise DataError(f"{table.path}: {key}={value} is not a sample time; give dt=")
             return None, step
+    dated = [k for k, one in enumerate(table.columns) if k not in taken and _shows_time(one)]
+    if len(dated) == 1:
+        return dated[0], None
     if 0 not in taken and not has_header(table) and len(table.columns) >= 3:
         return 0, None
     raise OptionError(

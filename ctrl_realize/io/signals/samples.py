@@ -13,6 +13,7 @@ from ...data.resampling import MIN_SAMPLES
 from ...data.samples import Samples
 from ...errors import DataError, OptionError
 from ...numerics.arrays import FloatArray
+from ...numerics.signals.sample_grid import filled, held
 from ..columns import check_lengths
 from ..tables import Table
 from ..text.dates import in_utc
@@ -21,7 +22,7 @@ from ..units import plain_unit
 from .long_format import LongTable
 from .names import Parts
 from .quality import Rows, Rules
-from .set_point import filled, held, in_manual
+from .set_point import in_manual
 
 
 def wide_axis(table: Table, parts: Parts, clock: Clock) -> tuple[TimeAxis, Rows]:

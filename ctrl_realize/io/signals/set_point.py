@@ -5,27 +5,13 @@ A set point holds its value until it is stored again. In manual it is not in for
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from ...errors import OptionError
-from ...numerics.arrays import BoolArray, FloatArray
+from ...numerics.arrays import BoolArray
+from ...numerics.signals.sample_grid import filled
 from ..tables import Table
 from .names import MODES, mode_word, strange_modes
-
-
-def filled(values: FloatArray) -> FloatArray:
-    """Values (N,) that hold where one is missing; before the first one they are missing still."""
-    known = ~np.isnan(values)
-    last = np.maximum.accumulate(np.where(known, np.arange(values.size), -1))
-    return np.asarray(np.where(last < 0, np.nan, values[np.maximum(last, 0)]))
-
-
-def held(stamps: FloatArray, values: np.ndarray[Any, Any], time: FloatArray) -> FloatArray:
-    """Last value at every time (M,), NaN before the first stamp."""
-    last = np.searchsorted(stamps, time, side="right") - 1
-    return np.where(last < 0, np.nan, np.asarray(values, np.float64)[np.maximum(last, 0)])
 
 
 def in_manual(table: Table, index: int) -> BoolArray:

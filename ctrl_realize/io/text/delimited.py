@@ -33,6 +33,9 @@ def read_delimited(source: TextSource, options: TextOptions) -> Table:
     path, layout = source.path, sniff(source, options)
     frame = _parse(source, layout)
     _check_parsed(path, layout, frame)
+    texts = [k for k in frame if layout.names[k] and frame[k].dtype.kind == "O"]
+    if texts:  # the header may stand above each part of the table
+        frame = frame[frame[texts[0]] != layout.names[texts[0]]]
     cut = _cut_last_line(source, layout)
     if cut and len(frame) > 1:
         warnings.warn(f"{path}: the last line is skipped: {cut}", DataWarning, stacklevel=4)

@@ -12,7 +12,10 @@ import numpy as np
 
 from ..checks import read_head, read_tail
 
-_PAIR = re.compile(r"""(?<![\w.])([A-Za-z_]\w*)["']?\s*[:=]\s*([+-]?[\d.]+(?:[eE][+-]?\d+)?)""")
+_PAIR = re.compile(
+    r"""(?<![\w.])([A-Za-z_]\w*)["']?\s*[:=]\s*"""
+    r"""["']?(\d{4}-\d\d-\d\d[T ][\d:.]+(?:Z|[+-]\d\d:?\d\d)?|[+-]?[\d.]+(?:[eE][+-]?\d+)?)"""
+)
 _STAMPED = re.compile(r"^[\s\[{\"']*(\d[\d:.,/ T-]*\d)?[\s\]>,;-]*$")
 _HEAD, _MOSTLY = 4096, 0.8
 

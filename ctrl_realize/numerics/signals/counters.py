@@ -23,6 +23,14 @@ _ANGLES = (2 * np.pi, 360.0)
 _BITS = tuple(2.0**bits for bits in range(8, 33))  # registers of counters: a byte to four
 _BACK, _FORWARD = (4, 10, 11), (3, 9, 10)
 """Months, of both hemispheres."""
+_TICKS = {"ms": 1e3, "us": 1e6, "ns": 1e9}  # in a second
+_YEAR_2005, _YEAR_2060 = 1.1e9, 2.85e9  # in s since 1970; a clock in seconds needs no check
+_AN_HOUR = 3600.0  # in s; ticks since the start of a device may have the numbers of a date
+_NO_SECONDS = 1e11  # in s, the year 5138
+_DAY_COUNTS = ((36526.0, 58440.0), (730486.0, 752400.0))
+"""Years 2000 to 2060 in days, as counted by Excel and by MATLAB's datenum."""
+_HALF_AN_HOUR = 1 / 48  # in days
+_ROUND = 1e-5  # relative difference of a step from its first three digits
 _EARLY = np.timedelta64(4, "h")  # after midnight
 _REGULAR = 1 / 3  # of a step
 _HOUR = np.timedelta64(1, "h")  # by which clocks are set
@@ -111,3 +119,42 @@ def clock_change(stamps: np.ndarray[Any, np.dtype[np.datetime64]]) -> tuple[int,
     if abs(turn - round(turn)) > _REGULAR * usual or not at_night or month not in months:
         return 0, 0
     return row, round(turn)
+
+
+@np.errstate(over="ignore", invalid="ignore")  # the largest doubles
+def clock_unit(values: FloatArray) -> str | None:
+    """Unit of the numbers of a clock: ticks since 1970, or days as in a spreadsheet.
+
+    A clock in seconds may have such numbers of days too, but then its steps are round.
+
+    Parameters
+    ----------
+    values : ndarray, shape (N,)
+
+    Returns
+    -------
+    str or None
+        Empty if they may be seconds; None if they can be neither.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from ctrl_realize.numerics.signals.counters import clock_unit
+    >>> k = np.arange(5.0)
+    >>> clock_unit(1738397700e3 + 500 * k), clock_unit(46085.5 + k / 86400), clock_unit(7e11 + k)
+    ('ms', 'day', None)
+    >>> clock_unit(k)
+    ''
+    """
+    if not values.size:
+        return ""
+    first, step = float(values[0]), float(values[-1] - values[0]) / max(values.size - 1, 1)
+    for unit, ticks in _TICKS.items():
+        if _YEAR_2005 <= first / ticks < _YEAR_2060 and 0 < abs(step) / ticks <= _AN_HOUR:
+            return unit
+    if first > _NO_SECONDS:
+        return None
+    if not any(low <= first < high for low, high in _DAY_COUNTS):
+        return ""
+    coarse = 0 < step < _HALF_AN_HOUR and abs(float(f"{step:.3g}") / step - 1) >= _ROUND
+    return "day" if coarse else ""

@@ -7,6 +7,8 @@ full precision are rounded to a fiftieth of the usual step, an error of 1 % of i
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from ..arrays import FloatArray, IntArray
@@ -84,3 +86,16 @@ def _common_divisor(stamps: FloatArray) -> float:
             apart = np.diff(whole.astype(np.int64))
             return float(np.gcd.reduce(apart)) / 10.0**decimals
     return 0.0
+
+
+def filled(values: FloatArray) -> FloatArray:
+    """Values (N,) that hold where one is missing; before the first one they are missing still."""
+    known = ~np.isnan(values)
+    last = np.maximum.accumulate(np.where(known, np.arange(values.size), -1))
+    return np.asarray(np.where(last < 0, np.nan, values[np.maximum(last, 0)]))
+
+
+def held(stamps: FloatArray, values: np.ndarray[Any, Any], time: FloatArray) -> FloatArray:
+    """Last value at every time (M,), NaN before the first stamp."""
+    last = np.searchsorted(stamps, time, side="right") - 1
+    return np.where(last < 0, np.nan, np.asarray(values, np.float64)[np.maximum(last, 0)])
