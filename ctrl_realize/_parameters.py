@@ -191,7 +191,7 @@ def with_error(value: float, error: float) -> str:
 
 
 def formula(parameters: Sequence[Parameter], integrators: int = 0, time_unit: str = "s") -> str:
-    """Write a transfer function in one line, the gain with its standard error.
+    """Write a transfer function in one line, the gain with its standard error and four digits.
 
     It is in seconds, because the s of Laplace beside another unit reads as seconds.
 
@@ -220,7 +220,11 @@ def formula(parameters: Sequence[Parameter], integrators: int = 0, time_unit: st
     if gain is None:
         return ""
     number, _, error = with_error(gain.value, gain.std).partition(" +-")
-    head = [number + (f" (+-{error})" if error else "") + (gain.unit and f" {gain.unit}")]
+    said = (f" (+-{error})" if error else "") + (gain.unit and f" {gain.unit}")
+    known = not gain.low <= 0 <= gain.high
+    if "." in number and sum(map(str.isdigit, number.lstrip("-0."))) > 4:
+        number = f"{gain.value:#.4g}".rstrip(".")
+    head = [number + said if known else "K"]
     dead_time = values.get("dead_time")
     if dead_time is not None and dead_time.value > 0:
         head.append(f"e^(-{_short(dead_time)} s)")
@@ -232,6 +236,8 @@ def formula(parameters: Sequence[Parameter], integrators: int = 0, time_unit: st
         joined = "".join(below[1:] if below[0].startswith("s") else below)
         joined = f"{below[0]} {joined}".strip() if below[0].startswith("s") else joined
         text += f" / {joined}" if len(below) == 1 else f" / ({joined})"
+    if not known:
+        text += f", gain K not determined: {number}{said}"
     if time_unit != "s":
         for one in parameters:
             letter = _LETTERS.get(one.name.rpartition("_")[0] or one.name)

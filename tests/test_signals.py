@@ -229,3 +229,31 @@ def test_a_held_input_keeps_its_levels_when_samples_with_jitter_are_resampled():
              for values, levels in ((record.time, record.input), (t, u))]  # fmt: skip
     np.testing.assert_allclose(*moved, rtol=0, atol=0.71)  # half a step and the jitter
     np.testing.assert_allclose(cr.Record.resampled(t, 2 * t, t).input, 2 * record.time)
+
+
+def test_a_record_tells_its_span_and_the_ranges_and_units_of_its_signals():
+    time = 0.5 * np.arange(5)
+    units = {"valve": "%", "time": "s (assumed)"}
+    record = cr.Record(time, [0, 0, 1, 1, 1], [[1, np.nan, 3, 4, 5], [np.nan] * 5], units=units,
+                       input_labels=["valve"], name="tank", missing="keep")  # fmt: skip
+    assert [" ".join(line.split()) for line in record.report().splitlines()] == [
+        "Record tank",
+        "samples 5 of 0.5 s (assumed), 2 s long",
+        "input valve 0 to 1 %",
+        "output y[0] 1 to 5",
+        "output y[1] missing",
+        "missing 6 values",
+    ]
+    assert "valve" in record._repr_html_()
+
+
+def test_what_new_users_type_is_answered_by_what_is_right():
+    arrays = np.arange(30.0), np.ones(30), np.ones(30)
+    with pytest.raises(DataError, match=r"got 3 arguments; arrays become a record by Record\("):
+        cr.identify(*arrays)
+    with pytest.raises(DataError, match="missing='keep' takes NaN as missing samples"):
+        cr.Record(arrays[0], arrays[1], np.full(30, np.nan))
+    with pytest.raises(AttributeError, match=r"did you mean ctrl_realize\.design\.pid\?"):
+        cr.pid  # noqa: B018
+    with pytest.raises(AttributeError, match="nothing"):
+        cr.nothing  # noqa: B018

@@ -3,6 +3,7 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
+from ctrl_realize._parameters import Parameter, formula
 from ctrl_realize._wording import interval_in_time, time_within
 
 SIZES = st.floats(1e-7, 1e5)
@@ -29,3 +30,11 @@ def test_an_estimate_before_its_rounded_interval_is_not_shown():
 def test_an_interval_without_width_has_four_digits():
     assert time_within(0.125, 0.125, 0.125) == "125.0 ms"
     assert interval_in_time(0.125, 0.125) == "125.0 to 125.0 ms"
+
+
+def test_a_formula_has_four_digits_and_says_where_its_gain_is_not_known():
+    lag = Parameter("lag_1", 12.0, times=1)
+    known = Parameter("gain", 1.79968, 0.0004, 1.7989, 1.8005)
+    assert formula([known, lag]) == "1.800 (+-0.0004) / (12 s + 1)"
+    unknown = Parameter("gain", 0.04, 0.2, -0.36, 0.44, unit="K/%")
+    assert formula([unknown, lag]) == "K / (12 s + 1), gain K not determined: 0.0 (+-0.2) K/%"

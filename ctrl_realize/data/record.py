@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .._checks import numbers, one_of, real, spelled_out
-from .._wording import ASSUMED
+from .._shown import html_card, text_card
+from .._wording import ASSUMED, in_time, shown_unit, times_in
 from ..errors import DataError, OptionError, TimeAxisError
 from ..numerics.arrays import BoolArray, FloatArray, read_only
 from ..numerics.signals.time_axis import axis_fault, sample_time
@@ -182,6 +183,44 @@ class Record(RecordConversions):
             + (", set point" if self.reference is not None else "")
             + (f", {self.n_missing} missing values>" if self.n_missing else ">")
         )
+
+    def report(self) -> str:
+        """Return samples, length and signals with units and ranges as plain text.
+
+        Examples
+        --------
+        >>> import ctrl_realize as cr
+        >>> units = {"u": "%", "y": "°C", "time": "min"}
+        >>> print(cr.Record([0, 60, 120], [40, 50, 50], [180, 180, 183], units=units).report())
+        Record
+          samples   3 of 60 s, 2 min long
+          input u   40 to 50 %
+          output y  180 to 183 °C
+        """
+        return text_card(*self._card())
+
+    def _repr_html_(self) -> str:
+        return html_card(*self._card())
+
+    def _card(self) -> tuple[str, list[tuple[str, str]]]:
+        told = self.units.get("time", "s")
+        step = f"{in_time(self.dt, 6)}" + " (assumed)" * (told == ASSUMED)
+        with times_in(shown_unit(told)):
+            length = in_time(float(self.time[-1] - self.time[0]), 4)
+        rows = [("samples", f"{self.n_samples} of {step}, {length} long")]
+        for kind, labels, units, values in (
+            ("input", self.input_labels, self.input_units, self.input),
+            ("output", self.output_labels, self.output_units, self.output),
+            ("set point of", self.output_labels, self.output_units, self.reference),
+        ):
+            several = () if values is None else np.atleast_2d(values)
+            for label, unit, row in zip(labels, units, several, strict=False):
+                known = row[~np.isnan(row)]
+                ends = f"{known.min():.4g} to {known.max():.4g}" if known.size else "missing"
+                rows.append((f"{kind} {label}", f"{ends} {unit}".rstrip()))
+        if self.n_missing:
+            rows.append(("missing", f"{self.n_missing} values"))
+        return f"Record {self.name}".rstrip(), rows
 
     def __len__(self) -> int:
         return self.n_samples

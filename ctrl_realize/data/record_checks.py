@@ -29,9 +29,11 @@ def check_finite(values: FloatArray | ComplexArray, what: str, *, allow_nan: boo
     bad = np.isinf(values) if allow_nan else ~np.isfinite(values)
     if bad.any():
         count = int(bad.sum())
+        missing = not allow_nan and np.isnan(values).any() and what in ("input", "output")
+        hint = "; missing='keep' takes NaN as missing samples" if missing else ""
         raise DataError(
             f"{what} has {count} non-finite sample{'s' if count > 1 else ''}, "
-            f"the first at index {_first(bad)}"
+            f"the first at index {_first(bad)}{hint}"
         )
 
 

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import wraps
 from inspect import signature
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, ParamSpec, TypeVar
 
 import control as ct
 import numpy as np
@@ -14,7 +15,7 @@ from ..data import Record
 from ..data.given import as_records
 from ..data.shown_units import in_shown_units
 from ..delayed import DelayedStateSpace, fit_of
-from ..errors import OptionError
+from ..errors import DataError, OptionError
 from ..numerics.blas_threads import single_threaded
 
 if TYPE_CHECKING:
@@ -27,8 +28,26 @@ if TYPE_CHECKING:
 Method = Literal["output_error", "scan", "paper"]
 
 METHODS: tuple[str, ...] = ("output_error", "scan", "paper")
+P = ParamSpec("P")
+T = TypeVar("T")
 
 
+def _of_records(function: Callable[P, T]) -> Callable[P, T]:
+    """Say how arrays become a record if they are given in its place."""
+
+    @wraps(function)
+    def checked(*args: P.args, **kwargs: P.kwargs) -> T:
+        if len(args) > 1:
+            raise DataError(
+                f"expected a Record or a list of them, got {len(args)} arguments; arrays become a "
+                "record by Record(time, input, output), and options have names"
+            )
+        return function(*args, **kwargs)
+
+    return checked
+
+
+@_of_records
 @single_threaded
 @in_shown_units
 def identify(

@@ -90,7 +90,7 @@ def controller_of(
         written.title, tuple(rows), (Column("enter"), Column("value", "number")),
         note="; ".join([*written.notes, *written.choices]),
     )  # fmt: skip
-    left_out = {"type", "rule", "sample time", "to enter it"}
+    left_out = {"type", "rule", "sample time", "next"}
     told = tuple(row for row in pid._card().rows if row[0] not in left_out)
     unstable = pid.check is not None and any(np.isinf(one.ms) for one in pid.check.corners)
     flags = () if pid.check is None else pid.check.flags

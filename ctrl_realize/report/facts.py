@@ -9,6 +9,7 @@ from .._parameters import Parameter, formula
 from .._wording import (
     in_time,
     poles_in_words,
+    times_in,
 )
 from ..delayed import DelayedStateSpace
 from ..design.models.conversions import to_continuous
@@ -42,7 +43,8 @@ def facts_of(system: DelayedStateSpace) -> tuple[tuple[str, str], ...]:
         facts.append(("order (without the delay)", str(system.delay_free.nstates)))
         if not formula_of(system):
             facts += [("gain", gain_of(system)), ("poles", poles_of(system))]
-    return (*facts, ("sample time", in_time(system.dt, 6)))
+    with times_in("s"):  # as sample times are set
+        return (*facts, ("sample time", in_time(system.dt, 6)))
 
 
 def poles_of(system: DelayedStateSpace) -> str:

@@ -9,7 +9,7 @@ from typing import Literal
 import numpy as np
 
 from .._flags import Flag, marked
-from .._wording import in_time, interval_in_time, number_within, time_within
+from .._wording import in_time, interval_in_time, number_within, time_within, times_in
 from ..delayed import DelayedStateSpace
 from ..frequency.comparison import FRFComparison
 from ..frequency.disagreement import CLOSE, FAR
@@ -171,7 +171,9 @@ def headline_of(system: DelayedStateSpace) -> str:
         within = f", {fit.interval_label} {interval_in_time(*interval)}"
     apparent = any(_code(flag) == "apparent_dead_time" for flag in _flags_of(system))
     kind = "Apparent dead time" if apparent else "Dead time"
-    sentence = f"{kind} {said} ({samples} samples of {in_time(system.dt, 6)}){within}."
+    with times_in("s"):  # as sample times are set
+        step = in_time(system.dt, 6)
+    sentence = f"{kind} {said} ({samples} samples of {step}){within}."
     if formula_of(system) and _sign_is_told(system):
         return sentence
     gain = gain_of(system)

@@ -68,7 +68,7 @@ class PIDController(ShownSystem, Delivered, BesideDelays):
       integral ti   200 ms
       gains         kp = 0.5, ki = kp / ti = 2.5 1/s
       sample time   1 ms, tustin rule
-      to enter it   .as_form(name), .forms(); .algorithm() has limits and code
+      next          pid.as_form("siemens_pid_compact"); pid.forms() lists all
     """
 
     def __init__(
@@ -224,5 +224,5 @@ class PIDController(ShownSystem, Delivered, BesideDelays):
         if self.check is not None:
             rows += self.check.rows()
             flags = [str(flag) for flag in self.check.flags]
-        rows.append(("to enter it", ".as_form(name), .forms(); .algorithm() has limits and code"))
+        rows.append(("next", 'pid.as_form("siemens_pid_compact"); pid.forms() lists all'))
         return Card(f"PID controller {self.name}", rows, flags=flags)

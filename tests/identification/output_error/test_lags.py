@@ -91,6 +91,6 @@ def test_a_pure_dead_time_is_told_in_samples(structure, seed):
     fit = cr.identify(cr.Record(t, (t >= AT).astype(float), y), structures=structure).fit
     assert fit.interval[0] <= 3.2 <= fit.interval[1]
     assert fit.total_delay_interval == fit.interval
-    assert fit.formula.endswith("e^(-3.5 s)")
+    assert "e^(-3.5 s)" in fit.formula
     assert "7 samples (3.00 to 3.50 s give the same samples" in fit.report()
     assert np.isreal(fit.poles).all()  # P2D has two lags, no pair

@@ -50,7 +50,7 @@ def test_an_integrator_is_exact_in_the_model_and_in_words():
     system = cr.fit_output_error(record(INTEGRATOR), structures="P1DI")
     assert np.isclose(system.delay_free.poles(), 1.0, rtol=0, atol=1e-12).sum() == 1
     assert system.fit.integrators == 1
-    form = r"0\.3000\d \(\+-0\.0000\d\) e\^\(-1\.50\d s\) / \(s \(3\.00\d s \+ 1\)\)"
+    form = r"0\.300\d \(\+-0\.0000\d\) e\^\(-1\.50\d s\) / \(s \(3\.00\d s \+ 1\)\)"
     assert re.fullmatch(form, system.fit.formula)
 
 
