@@ -301,6 +301,21 @@ def test_noise_at_the_actuator_is_that_of_a_simulated_loop(fitted):
     assert told == pytest.approx(np.std(loop.output[2000:]), rel=0.03)
 
 
+def test_a_loop_that_is_slow_beside_its_samples_is_drawn_as_it_is():
+    record = step_record(count=6000, dt=0.005)
+    session = Session()
+    session.add_record(record)
+    session.apply(put("model", structure=[1, 1]))
+    drawn = layer(panel(finished(session), "loop", "measured-set-point"), "model")
+    system = cr.identify(record, structures=[(1, 1)])
+    pid = cr.design.pid(system, closed_loop_time=1.2)
+    loop = cr.design.simulate_loop(system, pid, 4000)
+    assert drawn["x"][1] > 5 * record.dt
+    there = np.interp(drawn["x"], loop.time, loop.measured)
+    # the hold of the coarser samples is half a sample more dead time
+    np.testing.assert_allclose(drawn["y"][:300], there[:300], atol=0.03)
+
+
 def test_limits_of_the_output_are_kept(fitted):
     session = Session()
     session.add_record(step_record())

@@ -261,3 +261,39 @@ def test_the_page_is_whole_at_every_width(page, width, dark):
     assert page.run("return document.querySelectorAll('[role=slider]').length;") >= 8
     colour = page.run("return getComputedStyle(document.body).backgroundColor;")
     assert (colour == "rgb(255, 255, 255)") is not dark
+
+
+def test_a_widget_draws_itself_apart_from_the_styles_of_its_page(page):
+    """The model of a notebook is one of get, set and events; here they end at the server."""
+    page.run(
+        """
+        window.outside = getComputedStyle(document.querySelector('h1')).fontSize;
+        const held = {}, heard = {};
+        const model = {
+          get: (name) => held[name], set: (name, value) => { held[name] = value; },
+          on: (name, call) => { heard[name] = call; },
+          save_changes: () => fetch('command', {
+            method: 'POST', headers: {'Content-Type': 'application/json'},
+            body: JSON.stringify(held.command),
+          }).then((one) => one.json()).then((one) => {
+            held.answer = one; heard['change:answer']();
+          }),
+        };
+        const el = document.body.appendChild(document.createElement('div'));
+        el.id = 'cell';
+        Promise.all([import('./app.js'), fetch('app.css').then((one) => one.text())])
+          .then(([app, style]) => { held.style = style; window.end = app.render({model, el}); });
+        """
+    )
+    page.wait(
+        "const root = document.querySelector('#cell').shadowRoot;"
+        "return root && root.querySelectorAll('svg.panel').length === 10;"
+    )
+    ink, size = page.run(
+        "const root = document.querySelector('#cell').shadowRoot;"
+        "return [getComputedStyle(root.querySelector('path.measured')).stroke,"
+        "  getComputedStyle(root.querySelector('h1')).fontSize];"
+    )
+    assert ink == "rgb(0, 114, 178)"
+    assert size == page.run("return window.outside;")
+    page.run("window.end(); document.querySelector('#cell').remove();")

@@ -19,6 +19,7 @@ _SHOWN_LEVEL = 6.0  # multiples of the limit of the criterion, up to which it is
 _BESIDE = 0.1  # of the range of dead times, shown on both sides of it
 _FIRST_BAR, _NEXT_BAR = 0.72, 0.06  # heights of the intervals of structures, parts of the axis
 _MOST_ROWS, _MOST_BARS = 8, 4
+_OTHER = "a state-space model fits better: the loop is its own; the best one of lags is drawn here"
 
 
 def model_view(
@@ -49,6 +50,8 @@ def _in_words(system: DelayedStateSpace) -> JSON:
     verdicts = [{key: getattr(one, key) for key in ("question", "level", "sentence")}
                 for one in fit.verdicts]  # fmt: skip
     notes = [str(flag) for flag in fit.flags]
+    if not isinstance(fit, OutputErrorFit):
+        notes.insert(0, _OTHER)
     return {"verdicts": verdicts, "notes": notes, "formula": fit.formula, "report": fit.report()}
 
 

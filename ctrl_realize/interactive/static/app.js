@@ -22,6 +22,21 @@ function s(tag, given = {}, ...children) {
   return made;
 }
 
+const said = (look, text) => (text ? h("p", { class: look }, text) : null);
+const same = (choices) => choices.map((one) => [one, one]);
+const press = (name, words, onclick, more = {}) =>
+  h("button", { type: "button", "data-do": name, "data-key": name, onclick, ...more }, words);
+const link = (key, words, onclick, more = {}) =>
+  h("button", { type: "button", class: "link", "data-key": key, onclick, ...more }, words);
+const row = (cells, looks = [], more = {}) =>
+  h("tr", more, cells.map((one, k) => h("td", { class: looks[k] ?? "" }, one)));
+const heads = (words, looks = []) => words.map((one, k) => h("th", { scope: "col", class: looks[k] ?? "" }, one));
+
+function table(rows, { top, look } = {}) {
+  const head = top ? h("thead", {}, h("tr", {}, top)) : null;
+  return h("div", { class: "scroll" }, h("table", { class: look ?? "" }, head, h("tbody", {}, rows)));
+}
+
 const short = (value) => String(Number(Number(value).toPrecision(4)));
 
 function ticks(low, high, most) {
@@ -176,12 +191,14 @@ class Plot {
     const along = one.along;
     const upright = along === "x";
     const { w, tall } = this.box;
-    const group = s("g", { class: `handle ${along}`, tabindex: 0, role: "slider", "data-handle": one.name, "data-key": `${this.panel.key}-${one.name}`,
+    const group = s("g", { class: `handle ${along}`, tabindex: 0, role: "slider",
+      "data-handle": one.name, "data-key": `${this.panel.key}-${one.name}`,
       "aria-label": one.label, "aria-orientation": upright ? "horizontal" : "vertical" });
-    const grip = upright ? `M-8,${PAD.top + 2 + 19 * (k % 4)}h16v11l-8,7l-8,-7z` : `M${PAD.left + w},-8h-12l-7,8l7,8h12z`;
+    const down = PAD.top + 2 + 19 * (k % 4);
+    const grip = upright ? `M-8,${down}h16v11l-8,7l-8,-7z` : `M${PAD.left + w},-8h-12l-7,8l7,8h12z`;
     const line = upright ? `M0,${PAD.top}V${PAD.top + tall}` : `M${PAD.left},0H${PAD.left + w}`;
     const words = upright
-      ? s("text", { x: 12, y: PAD.top + 13 + 19 * (k % 4) })
+      ? s("text", { x: 12, y: down + 11 })
       : s("text", { x: PAD.left + w - 24, y: -6, "text-anchor": "end" });
     group.append(s("path", { class: "reach", d: line }), s("path", { class: "rule", d: line }),
       s("path", { class: "grip", d: grip }), words);
@@ -236,17 +253,20 @@ class Plot {
     const { one, group, words } = state;
     state.value = value;
     const px = this.at(one, value);
-    group.setAttribute("transform", one.along === "x" ? `translate(${px.toFixed(2)} 0)` : `translate(0 ${px.toFixed(2)})`);
+    const by = one.along === "x" ? `${px.toFixed(2)} 0` : `0 ${px.toFixed(2)}`;
+    group.setAttribute("transform", `translate(${by})`);
     const shown = one.along === "x" ? value * one.per_unit : value;
-    const said = text ?? `${short(shown)} ${one.along === "x" ? this.panel.x.unit : ""}`.trim();
+    const told = text ?? `${short(shown)} ${one.along === "x" ? this.panel.x.unit : ""}`.trim();
     if (one.along === "x") {
       const right = px > PAD.left + 0.72 * this.box.w;
       words.setAttribute("x", right ? -12 : 12);
       words.setAttribute("text-anchor", right ? "end" : "start");
     }
-    words.textContent = `${one.label} ${said}`;
-    for (const [name, now] of [["min", one.low], ["max", one.high], ["now", value]]) group.setAttribute(`aria-value${name}`, now);
-    group.setAttribute("aria-valuetext", said);
+    words.textContent = `${one.label} ${told}`;
+    for (const [name, now] of [["min", one.low], ["max", one.high], ["now", value]]) {
+      group.setAttribute(`aria-value${name}`, now);
+    }
+    group.setAttribute("aria-valuetext", told);
   }
 
   release(state) {
@@ -381,7 +401,9 @@ class App {
 
   busy(words) {
     const begun = performance.now();
-    const tell = () => { this.status.textContent = `${words} … ${((performance.now() - begun) / 1000).toFixed(1)} s`; };
+    const tell = () => {
+      this.status.textContent = `${words} … ${((performance.now() - begun) / 1000).toFixed(1)} s`;
+    };
     tell();
     const clock = setInterval(tell, 100);
     this.bar.hidden = false;
@@ -394,21 +416,25 @@ class App {
   }
 
   build() {
-    const input = h("input", { type: "file", multiple: true, hidden: true, onchange: () => { this.open(input.files); input.value = ""; } });
-    const button = (name, words, call, more = {}) => h("button", { type: "button", "data-do": name, onclick: call, ...more }, words);
-    this.undo = button("undo", "Undo", () => this.change({ do: "undo" }), { title: "Ctrl+Z" });
-    this.redo = button("redo", "Redo", () => this.change({ do: "redo" }), { title: "Ctrl+Y" });
+    const input = h("input", { type: "file", multiple: true, hidden: true, onchange: async () => {
+      await this.open(input.files);
+      input.value = "";
+    } });
+    this.undo = press("undo", "Undo", () => this.change({ do: "undo" }), { title: "Ctrl+Z" });
+    this.redo = press("redo", "Redo", () => this.change({ do: "redo" }), { title: "Ctrl+Y" });
     this.status = h("span", { role: "status", "aria-live": "off" });
     this.bar = h("div", { class: "bar", hidden: true }, h("progress", { "aria-label": "progress" }), this.status,
-      button("cancel", "Cancel", () => this.ask({ do: "cancel" }, "long")));
+      press("cancel", "Cancel", () => this.ask({ do: "cancel" }, "long")));
     this.error = h("p", { class: "error", role: "alert", hidden: true });
     this.again = h("p", { class: "under", hidden: true }, "Model and loop are not up to date. ",
-      button("fit", "Fit", () => { this.paused = false; this.say(""); this.parts(); this.compute(); }));
-    this.sections = Object.fromEntries(["data", "model", "loop", "plan", "out"].map((name) => [name, h("section", { class: `part ${name}`, "data-part": name })]));
+      press("fit", "Fit", () => { this.paused = false; this.say(""); this.parts(); this.compute(); }));
+    const section = (name) => [name, h("section", { class: `part ${name}`, "data-part": name })];
+    this.sections = Object.fromEntries(["data", "model", "loop", "plan", "out"].map(section));
     this.top = h("div", { class: "app", tabindex: -1 },
       h("header", { class: "top" }, h("h1", {}, "Data, model, loop"),
-        h("div", { class: "buttons" }, button("open", "Open files …", () => input.click()), input, this.undo, this.redo,
-          button("save", "Save work", () => this.write("work")))),
+        h("div", { class: "buttons" },
+          press("open", "Open files …", () => input.click()), input, this.undo, this.redo,
+          press("save", "Save work", () => this.write("work")))),
       this.bar, this.error, this.again, ...Object.values(this.sections));
     this.root.append(this.top);
     this.top.addEventListener("keydown", (event) => {
@@ -510,7 +536,10 @@ class App {
 
   field(key, label, value, commit, more = {}) {
     const shown = value === null || value === undefined ? "" : String(value);
-    const input = h("input", { "data-key": key, "data-shown": shown, type: "text", ...more, onchange: () => { input.dataset.shown = input.value; commit(input.value.trim()); } });
+    const input = h("input", { "data-key": key, "data-shown": shown, type: "text", ...more, onchange: () => {
+      input.dataset.shown = input.value;
+      commit(input.value.trim());
+    } });
     input.value = shown;
     return h("label", {}, label, input);
   }
@@ -526,22 +555,31 @@ class App {
   data(view) {
     const { records, panels, preview } = view.data;
     if (!records.length) {
-      return [h("p", { class: "drop" }, "Drop files here, or open them: CSV of loggers and historians, Excel, MATLAB, Parquet, HDF5, TDMS, npz; a measured frequency response; or saved work.")];
+      const { frf } = view.data;
+      return [said("under", frf && `Measured frequency response: ${frf}. It is drawn beside the model of a record.`),
+        said("drop", "Drop files here, or open them: CSV of loggers and historians, Excel, MATLAB, Parquet, HDF5, "
+          + "TDMS, npz; a measured frequency response; or saved work.")];
     }
     const chosen = view.state.selected;
-    const rows = records.map((one, k) => h("tr", { class: k === chosen && records.length > 1 ? "best" : "" },
-      h("td", {}, h("input", { type: "checkbox", checked: one.used, "data-key": `use${k}`, "aria-label": `use ${one.name}`,
-        onchange: (event) => this.record({ used: event.target.checked }, k) })),
-      h("td", { class: "name" }, h("button", { type: "button", class: "link", "data-key": `select${k}`, onclick: () => this.change({ do: "select", index: k }) }, one.name)),
-      h("td", {}, one.facts, ...one.notes.map((note) => h("p", { class: one.bad ? "bad" : "under" }, note))),
-      h("td", {}, h("button", { type: "button", class: "link", "aria-label": `remove ${one.name}`, onclick: () => this.change({ do: "remove", index: k }) }, "remove"))));
-    const strike = h("button", { type: "button", "data-do": "strike", "data-key": "strike", "aria-pressed": String(Boolean(this.strike)), onclick: () => { this.strike = !this.strike; this.parts(); } },
-      this.strike ? "Strike out: drag over the output" : "Strike out …");
+    const rows = records.map((one, k) => row([
+      h("input", { type: "checkbox", checked: one.used, "data-key": `use${k}`, "aria-label": `use ${one.name}`,
+        onchange: (event) => this.record({ used: event.target.checked }, k) }),
+      link(`select${k}`, one.name, () => this.change({ do: "select", index: k })),
+      [one.facts, ...one.notes.map((note) => said(one.bad ? "bad" : "under", note))],
+      link(`remove${k}`, "remove", () => this.change({ do: "remove", index: k }),
+        { "aria-label": `remove ${one.name}` }),
+    ], ["", "name"], { class: k === chosen && records.length > 1 ? "best" : "" }));
+    const strike = press("strike", this.strike ? "Strike out: drag over the output" : "Strike out …", () => {
+      this.strike = !this.strike;
+      this.parts();
+    }, { "aria-pressed": String(Boolean(this.strike)) });
+    const whole = { range: null, rest: null, shift: 0, struck: [] };
     return [
-      h("div", { class: "scroll" }, h("table", {}, h("tbody", {}, rows))),
-      view.data.frf ? h("p", { class: "under" }, `Measured frequency response: ${view.data.frf}`) : null,
+      table(rows, { look: "records" }),
+      said("under", view.data.frf && `Measured frequency response: ${view.data.frf}`),
       this.preview(view, preview, chosen),
-      panels.length ? h("div", { class: "buttons" }, strike, h("button", { type: "button", "data-do": "restore", onclick: () => this.record({ range: null, rest: null, shift: 0, struck: [] }) }, "Whole record again")) : null,
+      panels.length ? h("div", { class: "buttons" }, strike,
+        press("restore", "Whole record again", () => this.record(whole))) : null,
       this.figures(panels),
     ];
   }
@@ -553,23 +591,33 @@ class App {
     const taken = preview.taken ?? {};
     const read = (more) => this.record({ options: { ...options, ...more } });
     const unit = (more) => this.record({ units: { ...state.units, ...more } });
-    const roles = [["", "–"], ["time", "time"], ["input", "input"], ["output", "output"]];
+    const roles = [["", "–"], ...same(["time", "input", "output"])];
     const role = (k) => ["time", "input", "output"].find((name) => taken[name] === k) ?? "";
-    const heads = preview.columns.map((one, k) => h("th", { scope: "col" }, this.choice(`role${k}`, one.unit ? `${one.name} [${one.unit}]` : one.name, role(k), roles, (name) => {
-      if (name) read({ ...Object.fromEntries(Object.entries(taken).filter(([key, value]) => value !== null && value !== k && key !== name)), [name]: k });
-    })));
-    const cells = Array.from({ length: Math.max(...preview.columns.map((one) => one.cells.length)) }, (_, row) =>
-      h("tr", {}, preview.columns.map((one) => h("td", { class: "mono" }, one.cells[row] ?? ""))));
+    const take = (name, k) => {
+      const others = Object.entries(taken).filter(([key, value]) => value !== null && value !== k && key !== name);
+      if (name) read({ ...Object.fromEntries(others), [name]: k });
+    };
+    const title = (one) => (one.unit ? `${one.name} [${one.unit}]` : one.name);
+    const top = heads(preview.columns.map((one, k) =>
+      this.choice(`role${k}`, title(one), role(k), roles, (name) => take(name, k))));
+    const most = Math.max(...preview.columns.map((one) => one.cells.length));
+    const rows = Array.from({ length: most }, (_, at) =>
+      row(preview.columns.map((one) => one.cells[at] ?? ""), preview.columns.map(() => "mono")));
     const units = view.data.panels[0]?.units ?? {};
-    const open = view.data.records[index].bad;
-    return h("details", { "data-key": "preview", open }, h("summary", {}, "Columns and units as they were read"),
-      h("div", { class: "scroll" }, h("table", { class: "preview" }, h("thead", {}, h("tr", {}, heads)), h("tbody", {}, cells))),
+    const missing = [["auto", "keep and tell"], ...same(["refuse", "keep"]), ["hold", "input holds its value"]];
+    // A choice of how to read; the first is that without an argument.
+    const how = (key, label, choices) => this.choice(key, label, options[key] ?? choices[0][0], choices,
+      (value) => read({ [key]: choices.slice(1).find(([one]) => String(one) === value)?.[0] ?? null }));
+    return h("details", { "data-key": "preview", open: view.data.records[index].bad },
+      h("summary", {}, "Columns and units as they were read"),
+      table(rows, { top, look: "preview" }),
       h("div", { class: "fields" },
-        this.choice("time_unit", "unit of time", options.time_unit ?? "auto", ["auto", "s", "ms", "us", "min", "h", "day"].map((one) => [one, one]), (value) => read({ time_unit: value === "auto" ? null : value })),
-        this.field("dt", "sample time in s, if there is no time", options.dt, (value) => read({ dt: value ? Number(value) : null, time: value ? null : options.time })),
-        this.choice("missing", "bad cells and gaps", options.missing ?? "auto", [["auto", "keep and tell"], ["refuse", "refuse"], ["keep", "keep"], ["hold", "input holds its value"]], (value) => read({ missing: value === "auto" ? null : value })),
-        this.choice("resample", "jitter", options.resample ? "true" : "", [["", "refuse"], ["true", "resample"]], (value) => read({ resample: value ? true : null })),
-        this.choice("decimal", "decimal sign", options.decimal ?? "auto", [["auto", "auto"], [".", "."], [",", ","]], (value) => read({ decimal: value === "auto" ? null : value })),
+        how("time_unit", "unit of time", same(["auto", "s", "ms", "us", "min", "h", "day"])),
+        this.field("dt", "sample time in s, if there is no time", options.dt, (value) =>
+          read({ dt: value ? Number(value) : null, time: value ? null : options.time })),
+        how("missing", "bad cells and gaps", missing),
+        how("resample", "jitter", [["", "refuse"], [true, "resample"]]),
+        how("decimal", "decimal sign", same(["auto", ".", ","])),
         this.field("unit-input", "unit of the input", units.input, (input) => unit({ input })),
         this.field("unit-output", "unit of the output", units.output, (output) => unit({ output }))));
   }
@@ -647,11 +695,11 @@ class App {
     if (model?.error) return [h("p", { class: "bad" }, model.error)];
     if (!model) return [h("p", { class: "under" }, view.pending && !this.paused ? "Fitting …" : "No model yet.")];
     this.told = h("p", { class: "told", "aria-live": "polite" }, model.misfit?.text ?? "");
-    const verdicts = h("dl", { class: "verdicts" }, model.verdicts.map((one) => h("div", { class: one.level.replace(" ", "-") },
-      h("dt", {}, one.question), h("dd", {}, h("b", {}, one.level), ` ${one.sentence}`))));
+    const verdict = (one) => h("div", { class: one.level.replace(" ", "-") },
+      h("dt", {}, one.question), h("dd", {}, h("b", {}, one.level), ` ${one.sentence}`));
     return [
-      model.formula ? h("p", { class: "formula" }, model.formula) : null,
-      verdicts,
+      said("formula", model.formula),
+      h("dl", { class: "verdicts" }, model.verdicts.map(verdict)),
       model.notes.length ? h("ul", { class: "reasons" }, model.notes.map((one) => h("li", {}, one))) : null,
       this.told,
       this.figures(this.with_plan(view)),
@@ -667,41 +715,54 @@ class App {
     return view.model.panels.map((panel) => {
       if (!next || panel.key !== "criterion") return panel;
       const { per_unit } = panel.handles[0];
-      const layer = { kind: "span", look: "next", name: next.text, low: next.low * per_unit, high: next.high * per_unit };
+      const [low, high] = [next.low * per_unit, next.high * per_unit];
+      const layer = { kind: "span", look: "next", name: next.text, low, high };
       return { ...panel, layers: [...panel.layers, layer] };
     });
   }
 
   parameters(view) {
+    const looks = ["", "number", "number", "wide"];
     const rows = view.model.parameters.map((one) => {
-      const range = h("input", { type: "range", min: String(one.low), max: String(one.high), step: "any", "data-key": `range-${one.name}`,
-        "aria-label": one.label, "aria-valuetext": one.text,
-        oninput: () => { if (one.name === "dead_time") this.other(Number(range.value)); this.drag(one.name, Number(range.value)); },
-        onchange: () => this.know(one.name, Number(range.value)),
+      const moved = () => {
+        if (one.name === "dead_time") this.other(Number(range.value));
+        this.drag(one.name, Number(range.value));
+      };
+      const range = h("input", { type: "range", min: String(one.low), max: String(one.high), step: "any",
+        "data-key": `range-${one.name}`, "aria-label": one.label, "aria-valuetext": one.text,
+        oninput: moved, onchange: () => this.know(one.name, Number(range.value)),
         onkeydown: (event) => {
           const by = { ArrowRight: 1, ArrowUp: 1, ArrowLeft: -1, ArrowDown: -1 }[event.key];
           if (!by) return;
           event.preventDefault();
           range.value = String(Number(range.value) + by * (one.high - one.low) / (event.shiftKey ? 20 : 200));
-          range.dispatchEvent(new Event("input"));
+          moved();
           clearTimeout(this.quiet);
-          this.quiet = setTimeout(() => range.dispatchEvent(new Event("change")), QUIET);
+          this.quiet = setTimeout(() => this.know(one.name, Number(range.value)), QUIET);
         } });
       range.value = String(one.value);
-      const known = h("input", { type: "checkbox", checked: one.known, "data-key": `known-${one.name}`, "aria-label": `${one.label} is known`,
+      const known = h("input", { type: "checkbox", checked: one.known, "data-key": `known-${one.name}`,
+        "aria-label": `${one.label} is known`,
         onchange: () => this.know(one.name, known.checked ? one.value : null) });
-      return h("tr", { "data-name": one.name }, h("td", {}, one.label), h("td", { class: "number" }, one.text), h("td", { class: "number" }, one.interval), h("td", { class: "wide" }, range), h("td", {}, h("label", { class: "check" }, known, "known")));
+      const check = h("label", { class: "check" }, known, "known");
+      return row([one.label, one.text, one.interval, range, check], looks, { "data-name": one.name });
     });
-    return h("div", { class: "scroll" }, h("table", { class: "parameters" }, h("thead", {}, h("tr", {}, ["parameter", "value and std", "95 % interval", "drag", ""].map((one) => h("th", { scope: "col" }, one)))), h("tbody", {}, rows)));
+    const top = heads(["parameter", "value and std", "95 % interval", "drag", ""], looks);
+    return table(rows, { top, look: "parameters" });
   }
 
   structures(view) {
-    const stated = view.state.model.structure;
-    const rows = view.model.structures.map((one) => h("tr", { class: `${one.chosen ? "best" : ""} ${one.ruled_out ? "out" : ""}`, "data-structure": one.structure.join(",") },
-      h("td", {}, h("button", { type: "button", class: "link", "data-key": `structure${one.structure}`, onclick: () => this.set("model", { structure: one.structure, known: {} }) }, one.name)),
-      h("td", { class: "number" }, one.delta_bic), h("td", { class: "number" }, one.dead_time), h("td", { class: "number" }, one.interval), h("td", { class: "number" }, one.gain)));
-    const back = stated ? h("button", { type: "button", "data-do": "choose", onclick: () => this.set("model", { structure: null, known: {} }) }, "Choose from the data") : null;
-    return h("details", { "data-key": "structures", open: true }, h("summary", {}, "Structures: click to state one"), h("div", { class: "scroll" }, h("table", {}, h("thead", {}, h("tr", {}, ["structure", "ΔBIC", "dead time", "95 % interval", "gain"].map((one, k) => h("th", { scope: "col", class: k ? "number" : "" }, one)))), h("tbody", {}, rows))), back);
+    const looks = ["", "number", "number", "number", "number"];
+    const state = (structure) => this.set("model", { structure, known: {} });
+    const rows = view.model.structures.map((one) => row(
+      [link(`structure${one.structure}`, one.name, () => state(one.structure)), one.delta_bic, one.dead_time,
+        one.interval, one.gain], looks,
+      { class: `${one.chosen ? "best" : ""} ${one.ruled_out ? "out" : ""}`,
+        "data-structure": one.structure.join(",") }));
+    return h("details", { "data-key": "structures", open: true },
+      h("summary", {}, "Structures: click to state one"),
+      table(rows, { top: heads(["structure", "ΔBIC", "dead time", "95 % interval", "gain"], looks) }),
+      view.state.model.structure ? press("choose", "Choose from the data", () => state(null)) : null);
   }
 
   evidence() {
@@ -732,8 +793,8 @@ class App {
     const { loop, choices } = view;
     const given = view.state.loop;
     const tune = (more) => this.set("loop", more);
-    const kinds = choices.rules[given.rule];
-    const range = h("input", { type: "range", min: "0", max: "1", step: "0.02", "data-key": "speed", "aria-label": "from cautious to quick", disabled: !choices.speeds.includes(given.rule),
+    const range = h("input", { type: "range", min: "0", max: "1", step: "0.02", "data-key": "speed",
+      "aria-label": "from cautious to quick", disabled: !choices.speeds.includes(given.rule),
       oninput: () => this.follow({ do: "slide", speed: Number(range.value) }, ({ slide }) => this.slid(slide)),
       onchange: () => { this.wanted = null; tune({ speed: Number(range.value) }); } });
     range.value = String(given.speed ?? 0.5);
@@ -746,32 +807,42 @@ class App {
       };
       return this.field(key, label, given[key] ? given[key].join(" to ") : "", typed, { placeholder: "low to high" });
     };
-    const number = (key, label) => this.field(key, label, given[key], (text) => (Number.isFinite(Number(text)) && text ? tune({ [key]: Number(text) }) : this.say(`${label}: expected a number, got "${text}"`)));
+    const number = (key, label) => this.field(key, label, given[key], (text) => {
+      if (text && Number.isFinite(Number(text))) tune({ [key]: Number(text) });
+      else this.say(`${label}: expected a number, got "${text}"`);
+    });
+    const kind_for = (rule) => (choices.rules[rule].includes(given.kind) ? given.kind : choices.rules[rule][0]);
     const controls = h("div", { class: "fields" },
-      this.choice("rule", "rule", given.rule, Object.keys(choices.rules).map((one) => [one, one]), (rule) => tune({ rule, kind: choices.rules[rule].includes(given.kind) ? given.kind : choices.rules[rule][0] })),
-      this.choice("kind", "controller", given.kind, kinds.map((one) => [one, one]), (kind) => tune({ kind })),
+      this.choice("rule", "rule", given.rule, same(Object.keys(choices.rules)), (rule) =>
+        tune({ rule, kind: kind_for(rule) })),
+      this.choice("kind", "controller", given.kind, same(choices.rules[given.rule]), (kind) => tune({ kind })),
       h("label", { class: "speed" }, "cautious – quick", range),
       number("setpoint", "step of the set point"), number("load", "step of the load"),
       ends("limits", "limits of the output, from its level"));
     const form = h("div", { class: "fields" },
       this.choice("form", "form", given.form, Object.entries(choices.forms), (value) => tune({ form: value })),
-      this.choice("pid_time_unit", "unit of times", given.time_unit ?? "", [["", "of the record"], ...choices.time_units.map((one) => [one, one])], (value) => tune({ time_unit: value || null })),
+      this.choice("pid_time_unit", "unit of times", given.time_unit ?? "",
+        [["", "of the record"], ...same(choices.time_units)], (value) => tune({ time_unit: value || null })),
       ends("measured_range", "range of the measured value"), ends("output_range", "range of the output"));
-    if (!loop || loop.error) return [controls, h("p", { class: loop ? "bad" : "under" }, loop ? loop.error : "Waiting for the model."), form];
+    const waits = !loop || view.model?.error;
+    if (waits) return [controls, said("under", "Waiting for the model."), form];
+    if (loop.error) return [controls, said("bad", loop.error), form];
     this.margins = h("dl", { class: "facts" });
     this.numbers = h("div", { class: "numbers" });
     this.tell(loop);
-    return [controls, this.margins, ...loop.warnings.map((one) => h("p", { class: "warning" }, one)), loop.noise ? h("p", { class: "under" }, loop.noise) : null,
-      loop.unsafe.length ? h("details", { "data-key": "unsafe" }, h("summary", {}, "It would be unstable if …"), h("ul", { class: "reasons" }, loop.unsafe.map((one) => h("li", {}, one)))) : null,
-      this.figures(loop.panels), h("h3", {}, "What to enter"), form, this.numbers];
+    const unsafe = h("details", { "data-key": "unsafe" }, h("summary", {}, "It would be unstable if …"),
+      h("ul", { class: "reasons" }, loop.unsafe.map((one) => h("li", {}, one))));
+    return [controls, this.margins, ...loop.warnings.map((one) => said("warning", one)), said("under", loop.noise),
+      loop.unsafe.length ? unsafe : null, this.figures(loop.panels), h("h3", {}, "What to enter"), form, this.numbers];
   }
 
-  tell(loop) {
-    this.margins.replaceChildren(...loop.margins.map(([name, value]) => h("div", {}, h("dt", {}, name), h("dd", { class: /unstable/.test(value) ? "bad" : "" }, value))));
-    const { numbers } = loop;
-    this.numbers.replaceChildren(...(numbers.error ? [h("p", { class: "bad" }, numbers.error)] : [
-      h("table", {}, h("tbody", {}, numbers.rows.map(([name, value]) => h("tr", {}, h("td", {}, name), h("td", { class: "number" }, h("b", {}, value)))))),
-      ...numbers.notes.map((one) => h("p", { class: "under" }, one))]));
+  tell({ margins, numbers }) {
+    const fact = ([name, value]) => h("div", {}, h("dt", {}, name),
+      h("dd", { class: /unstable/.test(value) ? "bad" : "" }, value));
+    this.margins.replaceChildren(...margins.map(fact));
+    const entered = numbers.rows.map(([name, value]) => row([name, h("b", {}, value)], ["", "number"]));
+    this.numbers.replaceChildren(...(numbers.error ? [said("bad", numbers.error)]
+      : [table(entered), ...numbers.notes.map((one) => said("under", one))]));
   }
 
   slid(slide) {
@@ -788,26 +859,31 @@ class App {
     const asked = view.state.plan;
     const time = this.field("plan_time", "length in s (empty: as the record)", asked.time ?? "", () => {});
     const go = (want) => this.set("plan", { want, time: Number(time.querySelector("input").value) || null });
-    const buttons = h("div", { class: "fields" }, time, h("div", { class: "buttons" },
-      Object.entries(view.choices.want).map(([want, words]) => h("button", { type: "button", "data-do": `plan-${want}`, "aria-pressed": String(asked.want === want), onclick: () => go(want) }, words))));
-    const intro = h("p", { class: "under" }, "The input that tells most about …");
-    if (!asked.want) return [intro, buttons];
+    const button = ([want, words]) =>
+      press(`plan-${want}`, words, () => go(want), { "aria-pressed": String(asked.want === want) });
+    const intro = [said("under", "The input that tells most about …"), h("div", { class: "fields" }, time,
+      h("div", { class: "buttons" }, Object.entries(view.choices.want).map(button)))];
     const { plan } = view;
-    if (!plan || plan.error) return [intro, buttons, h("p", { class: plan ? "bad" : "under" }, plan ? plan.error : this.paused ? "Not planned." : "Planning …")];
-    return [intro, buttons, plan.interval ? h("p", { class: "told" }, plan.interval.text) : null, this.figures(plan.panels),
-      h("div", { class: "scroll" }, h("table", {}, h("tbody", {}, plan.rows.map(([name, value]) => h("tr", {}, h("td", {}, name), h("td", {}, value)))))),
-      h("div", { class: "buttons" }, h("button", { type: "button", "data-do": "write-plan", onclick: () => this.write("plan") }, "Input as CSV"))];
+    if (!asked.want) return intro;
+    if (!plan) return [...intro, said("under", this.paused ? "Not planned." : "Planning …")];
+    if (plan.error) return [...intro, said("bad", plan.error)];
+    return [...intro, said("told", plan.interval?.text), this.figures(plan.panels),
+      table(plan.rows.map((one) => row(one))),
+      h("div", { class: "buttons" }, press("write-plan", "Input as CSV", () => this.write("plan")))];
   }
 
   outward(view) {
-    const words = { report: "HTML report", model: "Model file", script: "Python file", st: "Structured Text", c: "C", python: "Python class", matlab: "MATLAB" };
-    const copy = h("button", { type: "button", "data-do": "copy", onclick: async () => {
+    const words = { report: "HTML report", model: "Model file", script: "Python file", st: "Structured Text", c: "C",
+      python: "Python class", matlab: "MATLAB" };
+    const button = ([what, label]) =>
+      press(`write-${what}`, label, () => this.write(what), { disabled: !view.model || !view.loop });
+    const copy = press("copy", "Copy", async () => {
       await navigator.clipboard.writeText(view.script);
       copy.textContent = "Copied";
-    } }, "Copy");
+    });
     return [
-      h("div", { class: "buttons" }, Object.entries(words).map(([what, said]) => h("button", { type: "button", "data-do": `write-${what}`, disabled: !view.model || !view.loop, onclick: () => this.write(what) }, said))),
-      h("p", { class: "under" }, "The same in Python"), h("pre", { class: "script" }, view.script), copy];
+      h("div", { class: "buttons" }, Object.entries(words).map(button)),
+      said("under", "The same in Python"), h("pre", { class: "script" }, view.script), copy];
   }
 }
 
