@@ -13,7 +13,7 @@ from ..design.tuning.entered import Scaling
 from ..design.tuning.pid import KINDS, RULES
 from ..report.controller import unsafe_if
 from .inputs import python_keywords
-from .terminal import say
+from .terminal import complain, say
 
 
 @dataclass(frozen=True)
@@ -43,6 +43,9 @@ class Tuning:
         say(f"\n{controller.report()}\n\n{form.report()}\n\nIt would be unstable if")
         for reason in unsafe_if(system, controller):
             say(f"  - {reason}")
+        for one in () if system.fit is None else system.fit.verdicts:
+            if one.question == "tuning" and one.level != "good":
+                complain(f"warning: verdict on {one}")
         return {"controller": controller, "form": form}
 
     def in_python(self) -> str:

@@ -86,11 +86,16 @@ def test_the_step_response_of_each_form_is_that_of_the_ideal_one(form):
 
 def test_every_form_is_compared_with_its_equation_and_names_its_document():
     listed = cr.design.pid_forms()
-    assert set(listed["form"]) == {*DOCUMENTED, "honeywell_hc900"}
+    bands = {"omron_pidat": "Tik", "abb_commander_1900": "Integral Action Time"}
+    assert set(listed["form"]) == {*DOCUMENTED, "honeywell_hc900", *bands}
     assert listed["source"].str.len().min() > 20
     # of which only P and PI are documented: 100 / PB, repeats per minute
     written = PID(0.5, 120.0).as_form("honeywell_hc900", measured_range=(0, 400))
     assert values_of(written) == pytest.approx({"Prop Band": 50.0, "Reset": 0.5})
+    for form, integral in bands.items():  # 100 / PB, and the integral time in s
+        written = values_of(PID(0.5, 120.0).as_form(form, measured_range=(0, 400)))
+        assert list(written.values()) == [50.0, 120.0]
+        assert written[integral] == 120.0
     with pytest.raises(cr.errors.OptionError, match="P and PI only"):
         PID(*FULL).as_form("honeywell_hc900")
 

@@ -83,8 +83,8 @@ def choose_columns(
     clocks += dates_of(table, clock, taken)
     known = [*clocks, *taken, *clocks_of(table, [*clocks, *inputs, *outputs, *taken], every=True)]
     setpoints = named(table, NAMES["setpoint"]) + _tagged(table, NAMES["setpoint_tag"], known)
-    free = [k for k in range(len(table.columns)) if k not in (*known, *setpoints)]
-    loop = bool(setpoints) and sum(holds_numbers(table, k) for k in free) > 1
+    others = [k for k in range(len(table.columns)) if k not in (*known, *setpoints)]
+    loop = bool(setpoints) and sum(holds_numbers(table, k) for k in others) > 1
     inputs = inputs or _signals(table, "input", [*known, *outputs], loop)
     outputs = outputs or _signals(table, "output", [*known, *inputs], loop)
     rest = [
