@@ -13,6 +13,7 @@ import pytest
 
 import ctrl_realize as cr
 from ctrl_realize.cli import main
+from tests.traps import csv, signals
 
 FAST = ["--method", "scan", "--order", "3", "--max-delay", "80"]
 
@@ -94,6 +95,28 @@ def test_tune_tells_the_numbers_of_the_same_calls_in_python(tmp_path, capsys):
     assert files_in(tmp_path) == {"heater.csv"}
     assert main(["tune", *words, "--closed-loop-time", "1", "--rule", "amigo"]) == 2
     assert "--closed-loop-time is an argument of simc" in capsys.readouterr().err
+
+
+def test_tune_tells_a_doubtful_verdict_beside_the_numbers(tmp_path, capsys):
+    file = tmp_path / "loud.csv"
+    csv(*signals(noise=6.0))(file)
+    words = ["--structures", "FOPDT", "--structures", "SOPDT"]
+    assert main(["tune", str(file), *words, "--require", "tuning"]) == 4
+    said = capsys.readouterr()
+    assert "integral ti" in said.out
+    assert "warning: verdict on tuning: no" in said.err
+
+
+def test_a_model_is_kept_where_no_controller_can_be_tuned(tmp_path, capsys):
+    file = tmp_path / "short.csv"
+    csv(*(one[:50] for one in signals(noise=3.0)))(file)
+    words = [str(file), "--structures", "SOPDT"]
+    assert main(["identify", *words, "--json", "-", "--tune", "ideal"]) == 0
+    said = capsys.readouterr()
+    assert '"controller": null' in said.out
+    assert "no controller: a PID controller needs the sign of the gain" in said.err
+    assert main(["tune", *words]) == 2
+    assert "needs the sign of the gain" in capsys.readouterr().err
 
 
 def test_the_report_of_identify_has_the_controller_if_it_is_wanted(folder, tmp_path, capsys):

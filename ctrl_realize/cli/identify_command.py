@@ -10,7 +10,7 @@ from typing import Any
 from .._checks import one_of
 from ..data import MeasuredFRF
 from ..delayed import DelayedStateSpace, fit_of
-from ..errors import CtrlRealizeError, DataError, OptionError
+from ..errors import CtrlRealizeError, DataError, OptionError, UnsuitableSystemError
 from ..frequency import FRFComparison, compare_frf
 from ..identification.campaign.campaign import Campaign
 from ..identification.campaign.run import identify_campaign
@@ -40,7 +40,7 @@ def run_identify(
     files: list[Path], folder: Path | None, *, tune: str | None, json: str | None, **given: Any
 ) -> int:
     """Identify, write the results, and return the exit code."""
-    tuning = None if tune is None else Tuning({}, {"form": tune})
+    tuning = None if tune is None else Tuning({}, {"form": tune}, optional=True)
     if json is not None:
         return told_as_json(
             json, lambda told: identified(files, folder, tuning=tuning, told=told, **given)
@@ -137,7 +137,12 @@ class _Task:
         """What the files say about a model, and its controller if one is wanted."""
         tuned: dict[str, Any] = {}
         if self.tuning is not None:
-            tuned = self.tuning.of(system)
+            try:
+                tuned = self.tuning.of(system)
+            except UnsuitableSystemError as error:
+                if not self.tuning.optional:
+                    raise
+                complain(f"no controller: {one_line(error)}")
             terminal, (name, lines) = calls
             calls = [terminal, (name, f"{lines}\n{self.tuning.in_python()}")]
         report = self.run.report

@@ -18,10 +18,14 @@ from .terminal import complain, say
 
 @dataclass(frozen=True)
 class Tuning:
-    """How to tune, and how the numbers are entered: arguments of `design.pid` and `as_form`."""
+    """How to tune, and how the numbers are entered: arguments of `design.pid` and `as_form`.
+
+    If it is `optional`, a model without a controller is a result, too.
+    """
 
     tuned: Mapping[str, Any]
     entered: Mapping[str, Any]
+    optional: bool = False
 
     def __post_init__(self) -> None:
         """Check names and ranges before a model is identified."""
