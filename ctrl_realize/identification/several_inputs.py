@@ -35,7 +35,6 @@ from ..numerics.blas_threads import single_threaded
 from ..numerics.engine.poles import parameters_from_poles, poles_from_parameters
 from ..results import ModelFit
 from .impulse.from_io import impulse_from_io
-from .output_error.any_input import UnrelatedError
 from .output_error.fit import fit_output_error
 from .output_error.result import OutputErrorFit
 from .plausible import continuous_core
@@ -274,8 +273,8 @@ def _one(
     )  # fmt: skip
     try:
         return fit_output_error(one, structures=structures, **options)
-    except UnrelatedError as error:
-        raise UnrelatedError(f"{error}; leave the input {name!r} out of the record") from None
+    except DataError as error:
+        raise DataError(f"{error}. Or leave the input {name!r} out of the record") from None
 
 
 def _kept(fit: OutputErrorFit, structures: Structures | None) -> Any:
