@@ -34,8 +34,6 @@ class TextOptions:
         for name in ("delimiter", "decimal", "encoding"):
             if not isinstance(getattr(self, name), str):
                 raise OptionError(f"{name}={getattr(self, name)!r}; expected text, such as 'auto'")
-        if self.delimiter != "auto" and (len(self.delimiter) != 1 or self.delimiter in "\r\n\"'"):
-            raise OptionError(f"delimiter={self.delimiter!r} must be one character or 'auto'")
         if self.decimal not in ("auto", ".", ","):
             raise OptionError(f"decimal={self.decimal!r} must be '.', ',' or 'auto'")
         known = (*_THOUSANDS, "auto", None)
@@ -44,10 +42,10 @@ class TextOptions:
                 f"thousands={self.thousands!r}; expected ',', '.', ' ' or \"'\", another sign than "
                 "the decimal one, 'auto' or None"
             )
-        comment: object = self.comment
-        if comment not in ("auto", None) and not (isinstance(comment, str) and len(comment) == 1):
-            raise OptionError(f"comment={self.comment!r} must be one character, None or 'auto'")
         for name, mark in (("delimiter", self.delimiter), ("comment", self.comment)):
+            single = isinstance(mark, str) and len(mark) == 1 and mark not in "\r\n\"'"
+            if not single and mark not in (("auto", None) if name == "comment" else ("auto",)):
+                raise OptionError(f"{name}={mark!r} must be one character or 'auto'")
             if str(mark) in _IN_NUMBERS[name]:
                 raise OptionError(f"{name}={mark!r} would split numbers")
         if self.header not in (True, False, "auto"):

@@ -63,8 +63,7 @@ def keyed_as_table(source: TextSource) -> TextSource:
                 rows.append({"time": stamp[1] or "", **dict(_PAIR.findall(line))})
     if not rows:
         return source
-    names = list(dict.fromkeys(name for row in rows for name in row))
-    if not any(row["time"] for row in rows):
-        names.remove("time")
+    every = dict.fromkeys(name for row in rows for name in row)
+    names = [name for name in every if any(row.get(name) for row in rows)]
     text = "\n".join("\t".join(row.get(name, "") for name in names) for row in rows)
     return TextSource(source.path, ("\t".join(names) + "\n" + text + "\n").encode(), "row")
