@@ -291,8 +291,7 @@ def test_plants_that_a_quick_loop_makes_unstable_are_drawn_apart():
 def test_noise_at_the_actuator_is_that_of_a_simulated_loop(fitted):
     _, view = fitted
     system = cr.identify(step_record())
-    pid = cr.design.pid(system, closed_loop_time=float(
-        view["script"].rpartition("closed_loop_time=")[2].partition(")")[0]))  # fmt: skip
+    pid = cr.design.pid(system)
     loop = cr.design.simulate_loop(
         system, pid, 40_000, setpoint_step=0.0, noise_std=system.fit.noise_model.std
     )
@@ -308,7 +307,7 @@ def test_a_loop_that_is_slow_beside_its_samples_is_drawn_as_it_is():
     session.apply(put("model", structure=[1, 1]))
     drawn = layer(panel(finished(session), "loop", "measured-set-point"), "model")
     system = cr.identify(record, structures=[(1, 1)])
-    pid = cr.design.pid(system, closed_loop_time=1.2)
+    pid = cr.design.pid(system)
     loop = cr.design.simulate_loop(system, pid, 4000)
     assert drawn["x"][1] > 5 * record.dt
     there = np.interp(drawn["x"], loop.time, loop.measured)
@@ -367,3 +366,19 @@ def test_a_measured_response_is_drawn_beside_the_model():
 def test_what_is_written_is_what_its_name_says(fitted, what, text):
     written = fitted[0].apply({"do": "write", "what": what})["written"]
     assert text in base64.b64decode(written["content"])
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        {"do": "drag"}, {"do": "slide", "speed": "quick"}, {"do": "set"}, {"do": "select"},
+        {"do": "open", "name": "x.csv", "content": "%"}, {"do": "write", "what": "everything"},
+        put("loop", rule="best"), put("loop", limits=[3, 1]), put("model", structure=[0]),
+        put("record", 5, used=True), put("record", 0, options={"path": "/etc/passwd"}),
+    ],
+)  # fmt: skip
+def test_a_command_that_makes_no_sense_is_a_sentence_and_changes_nothing(fitted, command):
+    session, _ = fitted
+    before = json.dumps(session.state)
+    assert session.apply(command)["error"]
+    assert json.dumps(session.state) == before

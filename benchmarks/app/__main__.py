@@ -18,7 +18,9 @@ from pathlib import Path
 import numpy as np
 
 import ctrl_realize as cr
+from benchmarks.speed.measure import cpu_seconds
 from ctrl_realize.interactive.hosting import Host
+from ctrl_realize.interactive.models import identified
 from ctrl_realize.interactive.server import AppServer
 from ctrl_realize.interactive.session import Session
 from tests.browser import Browser
@@ -133,6 +135,22 @@ def opened(given: cr.Record | Path) -> tuple[float, float, int]:
     return drawn - start, fitted - drawn, len(json.dumps(answer)) // 1000
 
 
+def computed(count: int) -> str:
+    """Processor time in ms of a step of a drag, and of the fits at a stated structure."""
+    given, session = record(count), Session()
+    session.add_record(given)
+    session.apply({"do": "set", "part": "model", "values": {"structure": [1, 1]}})
+    while session.apply({"do": "compute"})["view"]["pending"]:
+        pass
+    known = {"name": "P1D", "fixed": {"dead_time": 1.25}}
+    works = (
+        lambda: json.dumps(session.apply({"do": "drag", "values": {"dead_time": 1.25}})),
+        lambda: identified([given], [1, 1], {}),
+        lambda: identified([given], None, known),
+    )
+    return f"| {count} | " + " | ".join(f"{1e3 * cpu_seconds(one):.0f}" for one in works) + " |"
+
+
 def line(name: str, times: list[float]) -> str:
     middle, high, worst = np.percentile(times, [50, 90, 100])
     return f"| {name} | {middle:.0f} | {high:.0f} | {worst:.0f} |"
@@ -150,6 +168,7 @@ def main() -> None:
                     what = f"release to the fit of one lag, {count} samples"
                     rows.append(line(what, released(window, session)))
         files = []
+        processor = [computed(count) for count in (3000, 100_000)]
         for count in (3000, 100_000):
             path = Path(folder) / f"{count}.csv"
             record(count).to_frame().to_csv(path)
@@ -160,6 +179,8 @@ def main() -> None:
         "| most ms |", "|---|---|---|---|", *rows, "",
         "| samples of a CSV file | read and drawn | all structures fitted | size of the view |",
         "|---|---|---|---|", *files, "",
+        "| samples | processor time of a step of a drag, ms | of the fit of one lag | of the same "
+        "with a known dead time |", "|---|---|---|---|", *processor, "",
     ]  # fmt: skip
     parser.parse_args().table.write_text("\n".join(parts), encoding="utf-8")
 

@@ -20,10 +20,10 @@ from ..numerics.arrays import BoolArray, FloatArray
 from ..report.controller import unsafe_if
 from .drawing import JSON, axis, layer, line, panel, time_axis
 
-SPEEDS = {"simc": 4.0, "imc": 4.0, "lambda": 4.0, "optimal": 1.0}
-"""Rules that can be made quicker or more cautious, and the ratio of their closed-loop times at the
-ends to that in the middle; for the optimal one it is Ms that changes."""
-_MIDDLE = {"lambda": 3.0}  # closed-loop time in the middle, in dead times, where it is not one
+SPEEDS = {"simc": 1.0, "imc": 1.7, "lambda": 3.0, "optimal": 0.0}
+"""Rules that can be made quicker or more cautious, and their usual closed-loop times in dead times
+of the reduced model; for the optimal one it is Ms that changes."""
+_MIDDLE, _RATIO = 0.5, 4.0  # where a rule is as it is, and times at the ends over that
 _MS = (1.2, 2.0)
 _SAMPLES, _FEW_SAMPLES = 500, 250  # of a simulated loop, at rest and while the slider moves
 _SETTLED = 4.0  # integral times and dead times, which a loop is shown for
@@ -51,13 +51,15 @@ def middle_time(system: DelayedStateSpace) -> float:
 
 def rule_options(settings: Mapping[str, Any], system: DelayedStateSpace) -> JSON:
     """Keyword arguments of `pid` for the settings of a page."""
-    rule, speed = settings["rule"], settings["speed"]
-    name, value = "closed_loop_time", middle_time(system) * _MIDDLE.get(rule, 1.0)
+    rule, kind, speed = (settings[key] for key in ("rule", "kind", "speed"))
+    options: JSON = {"rule": rule, "kind": kind}
     if rule == "optimal":
-        name, value = "max_sensitivity", _MS[0] + speed * (_MS[1] - _MS[0])
-    value *= SPEEDS.get(rule, 1.0) ** (1 - 2 * speed)
-    quick = {name: float(f"{value:.3g}")} if rule in SPEEDS else {}
-    return {"rule": rule, "kind": settings["kind"], **quick}
+        options["max_sensitivity"] = float(f"{_MS[0] + speed * (_MS[1] - _MS[0]):.3g}")
+    elif rule in SPEEDS and speed != _MIDDLE:
+        model = tuned(system, rule, kind, TuningOptions())[0].model
+        usual = SPEEDS[rule] * max(model.dead_time if model else 0.0, float(system.dt))
+        options["closed_loop_time"] = float(f"{usual * _RATIO ** (1 - speed / _MIDDLE):.3g}")
+    return options
 
 
 def tuned_loop(
@@ -110,7 +112,7 @@ def _simulated(
     }  # fmt: skip
 
 
-def noise_at_actuator(system: DelayedStateSpace, controller: PIDController) -> float:
+def _noise(system: DelayedStateSpace, controller: PIDController) -> float:
     """Standard deviation of the controller output from the noise of the record.
 
     The noise passes ``C / (1 + P C)``; its spectrum is that of the noise model of the fit.
@@ -131,8 +133,7 @@ def drawn(
 ) -> JSON:  # fmt: skip
     """Panels, margins and noise of a loop; while a slider moves, of the model alone."""
     runs = _simulated(system, loop.controller, settings, all_plants)
-    noise = noise_at_actuator(system, loop.controller)
-    unstable = ~np.isfinite(loop.sensitivities[1:])
+    noise, unstable = _noise(system, loop.controller), ~np.isfinite(loop.sensitivities[1:])
     said = f"the noise of the record moves the controller output by {noise:.4g} (std)"
     return {
         "panels": [_panel(name, part, each, unstable, settings, noise)

@@ -55,6 +55,7 @@ class AppServer(ThreadingHTTPServer):
 
 class _Handler(BaseHTTPRequestHandler):
     protocol_version = "HTTP/1.1"
+    disable_nagle_algorithm = True  # which holds back the second part of an answer for 40 ms
     server: AppServer
 
     def do_GET(self) -> None:

@@ -25,7 +25,7 @@ from .drawing import JSON
 from .state import State, changed, empty
 
 _KEPT, _MOST_UNDONE = 48, 200
-_REFUSED = (CtrlRealizeError, ArithmeticError)
+_REFUSED = (CtrlRealizeError, ArithmeticError, ValueError, KeyError)
 
 
 @dataclass(frozen=True)

@@ -316,6 +316,7 @@ class App {
     this.quick = Promise.resolve();
     this.plots = new Map();
     this.drawn = {};
+    this.marks = {}; // of what was drawn and need not be drawn again
     model.on("change:answer", () => this.answered(model.get("answer")));
     try {
       this.channel = new BroadcastChannel(`ctrl_realize ${location.pathname}`);
@@ -356,7 +357,10 @@ class App {
     this.say("");
     this.paused = false;
     const answer = await this.ask(command);
-    if (answer.error) this.say(answer.error);
+    if (answer.error) {
+      this.say(answer.error);
+      this.marks = {}; // a choice that was refused is taken back
+    }
     if (answer.view) this.show(answer.view);
     this.channel?.postMessage("changed");
   }
@@ -483,18 +487,24 @@ class App {
     const { view } = this;
     const waiting = Boolean(view.pending);
     this.again.hidden = !(waiting && this.paused);
-    this.fill("data", () => [h("h2", {}, "Data"), ...this.data(view)]);
+    const { records, selected } = view.state;
     const draw = {
-      model: () => [h("h2", {}, "Model"), ...this.modelled(view)],
-      loop: () => [h("h2", {}, "Loop"), ...this.looped(view)],
-      plan: () => [h("h2", {}, "Which test next?"), ...this.planned(view)],
-      out: () => [h("h2", {}, "Out"), ...this.outward(view)],
+      model: [() => [h("h2", {}, "Model"), ...this.modelled(view)]],
+      loop: [() => [h("h2", {}, "Loop"), ...this.looped(view)]],
+      data: [() => [h("h2", {}, "Data"), ...this.data(view)], view.data, records, selected, this.strike],
+      plan: [() => [h("h2", {}, "Which test next?"), ...this.planned(view)], view.plan, view.state.plan, this.paused,
+        records.length],
+      out: [() => [h("h2", {}, "Out"), ...this.outward(view)], view.script, !view.model, !view.loop, records.length],
     };
-    for (const [name, call] of Object.entries(draw)) {
+    for (const [name, [call, ...given]] of Object.entries(draw)) {
       const stale = waiting && (name === "model" || name === "loop") && !view[name] && this.drawn[name];
+      const mark = given.length ? JSON.stringify(given) : null;
       this.sections[name].classList.toggle("stale", Boolean(stale));
-      if (!stale) this.fill(name, view.state.records.length ? call : () => []);
-      this.drawn[name] = view.state.records.length && (stale || Boolean(view[name] && !view[name].error));
+      if (!stale && !(mark && mark === this.marks[name])) {
+        this.fill(name, records.length || name === "data" ? call : () => []);
+      }
+      this.marks[name] = mark;
+      this.drawn[name] = records.length && (stale || Boolean(view[name] && !view[name].error));
     }
   }
 
