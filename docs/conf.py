@@ -123,6 +123,11 @@ TABLES = {
         "docs/tables/campaign_table.md",
         "python -m benchmarks.campaign --output docs/tables/campaign_table.md",
     ),
+    "closed_loop": (
+        "docs/tables/closed_loop_table.md",
+        "python -m benchmarks.closed_loop --store loops.jsonl --table "
+        "docs/tables/closed_loop_table.md",
+    ),
     "relay": (
         "docs/tables/relay_table.md",
         "python -m benchmarks.relay --store relay.jsonl --output docs/tables/relay_table.md",

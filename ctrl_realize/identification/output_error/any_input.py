@@ -23,6 +23,7 @@ from ...numerics.signals.counters import counter_period
 from ...numerics.validation.own_response import OwnResponse
 from .averaging import common_sample_time
 from .flags import sampled_flags
+from .loop_flags import loop_choices
 from .repeat_flags import repeat_flags
 from .repeatability import (
     Repeatability,
@@ -156,6 +157,8 @@ def _summary(
         reasons.append(
             chosen("samples.condensed", samples=count, sums=size, lags=lags, noise_lags=order)
         )
+    if fit.averaged:
+        reasons += loop_choices(records[0])
     choices = (*reasons, *choices_of(fit))
     return OutputErrorFit(fit, shown, time, records, repeats, choices=choices, flags=tuple(flags))
 

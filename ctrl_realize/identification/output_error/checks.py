@@ -23,6 +23,7 @@ from .loop_flags import (
     feedback_flags,
     generalised_step,
     past_inputs,
+    set_point_flags,
     unstable_flags,
 )
 from .repeat_flags import time_apart
@@ -68,6 +69,7 @@ def checked(fit: OutputErrorFit, *, alone: bool = True) -> OutputErrorFit:
     in_loop = bool(flags)
     if complete and not fit.at_noise_level:  # else an unstable plant is excluded
         flags += unstable_flags(complete, fit.delay_interval[1])
+    flags += set_point_flags(fit)
     if len(fit.records) == 1:
         shown = _shown(fit)
         flags += sensor_flags(fit, shown.output, shown.fitted)
@@ -78,7 +80,13 @@ def checked(fit: OutputErrorFit, *, alone: bool = True) -> OutputErrorFit:
         white = bool(fit.estimate.residual.noise_lags)
         # Neither do they hold for means over blocks of samples.
         complete = complete if shown.rows is None else ()
-        coloured = alone and complete and (white or "coloured_residual" in codes)
+        # In a loop one step of generalised least squares is biased by the first estimate.
+        coloured = (
+            alone
+            and complete
+            and not fit.estimate.averaged
+            and (white or "coloured_residual" in codes)
+        )
         step = generalised_step(fit, shown.output, shown.drive) if coloured else None
         if step is not None:
             flags += coloured_flags(fit, step, shown.output, shown.drive)
@@ -86,7 +94,7 @@ def checked(fit: OutputErrorFit, *, alone: bool = True) -> OutputErrorFit:
             low = max(min(low, step.dead_time - Z_95 * step.dead_time_error), 0.0)
             high = max(high, step.dead_time + Z_95 * step.dead_time_error)
         # Parts of one step are not several responses.
-        if not in_loop and not (stepped and _moves(shown.drive) < 2):
+        if not (in_loop or fit.estimate.averaged) and not (stepped and _moves(shown.drive) < 2):
             changes, notes = against_one_model(shown, fit.delay)
             flags += changes
             if complete and not stepped and all(flag.code != "not_linear" for flag in flags):

@@ -42,6 +42,7 @@ from .averaging import (
 )
 from .checks import checked
 from .flags import fit_flags
+from .loop_flags import in_automatic
 from .own_gains import fit_own_gains
 from .repeat_flags import repeat_flags, same_record_flags
 from .repeatability import delay_outliers, fit_alike, unlike_records
@@ -257,6 +258,7 @@ def fit_output_error(
         huber=loss == "huber",
         whiten=noise == "auto",
         simulates=focus == "simulation",
+        loop=all(in_automatic(record) for record in several),
     )
     setting = {"own_gains": gains == "own", "may_clip": actuator is None}
     free = partial(_linear, several, tried, **setting)
@@ -306,7 +308,9 @@ def _linear(
     several, at_limits = _without_cut_noise(several)
     # Complete records of one step each can be averaged. Of more steps the mean would end at the
     # second one: a relay test of 40 samples a half period left 40 samples of a record of 600.
-    stepped = all(not record.n_missing and len(edges_of(record)) == 1 for record in several)
+    stepped = not requested.loop and all(
+        not record.n_missing and len(edges_of(record)) == 1 for record in several
+    )
     way = _fit_mean if stepped else any_input
     if own_gains:
         start = relative_gains(aligned_steps(several)) if stepped else None
@@ -332,7 +336,7 @@ def _fit_one(
     requested: Requested,
     any_input: Callable[..., OutputErrorFit],
 ) -> OutputErrorFit:
-    data = step_data_of(record)
+    data = None if requested.loop else step_data_of(record)
     if data is None:
         return any_input((record,), requested)
     data, fit = fit_step_record(data, requested)

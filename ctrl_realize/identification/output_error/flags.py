@@ -117,7 +117,7 @@ def model_flags(
     if reached and fit.high >= 0.98 * fit.latest:
         yield flagged("delay_at_bound", max_delay=fit.latest / dt)
     none = _may_be_none(fit, dt)
-    if none or fit.open_start or _is_wide(fit, dt):
+    if none or fit.open_start or (not fit.averaged and _is_wide(fit, dt)):
         yield flagged(
             "no_delay_resolved" if none else "structures_disagree",
             interval=interval_in_time(fit.low, fit.high),

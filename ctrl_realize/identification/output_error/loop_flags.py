@@ -8,9 +8,9 @@ import numpy as np
 from scipy.special import ndtr
 
 from ..._flags import Flag, flagged
-from ..._wording import in_time
+from ..._wording import chosen, in_time, interval_in_time
 from ...data import Record
-from ...numerics.arrays import FloatArray
+from ...numerics.arrays import BoolArray, FloatArray
 from ...numerics.constants import Z_95
 from ...numerics.output_error.result import UnweightedModel
 from ...numerics.signals.excitation import lively_start
@@ -26,16 +26,84 @@ were below 1e-4."""
 REGRESSED = 4000
 """Largest number of samples in the long regressions."""
 _LEAST_PAST, _MOST_PAST = 30, 150  # past inputs in them; time grows with the square
+_WIDE = 0.5  # width of an interval, in dead times, from which a set point moved too little
+_HALVED = 2.0  # move over that of the record: errors are in proportion to its inverse
+_LEVELS = 10  # of an input: a relay has two, or three
+_STRETCH = 20  # samples of a stretch in manual that is worth a word
 _OFF = 0.2  # relative difference of gains or total delays that is worth a flag: presentation
+
+
+def in_automatic(record: Record) -> bool:
+    """Whether a set point is known, and moves while it is in force."""
+    wanted = record.reference
+    if wanted is None or not record.issiso() or np.isnan(wanted).all():
+        return False
+    return float(np.nanmax(wanted) - np.nanmin(wanted)) > 0.0
+
+
+def loop_choices(record: Record) -> Iterator[str]:
+    """Say how a record of a loop whose set point moved is used."""
+    assert record.reference is not None
+    wanted = np.ravel(record.reference)
+    moves = np.diff(wanted)
+    moves = moves[~np.isnan(moves) & (moves != 0)]
+    size = float(np.nanmax(wanted) - np.nanmin(wanted))
+    yield chosen("loop.set_point", moves=moves.size, size=size)
+    if spans := _spans(record, np.isnan(wanted)):
+        yield chosen("loop.manual", spans=spans)
+    signal = np.ravel(record.input)
+    still = np.r_[np.diff(signal) == 0, False] & ~np.isnan(wanted)
+    # At its limits the output of a controller does not move either.
+    still &= (signal > np.nanmin(signal)) & (signal < np.nanmax(signal))
+    if spans := _spans(record, still):
+        yield chosen("loop.held", spans=spans)
+
+
+def _spans(record: Record, where: BoolArray) -> str:
+    """Longest stretches of some samples in words, the first three; short ones are left out."""
+    edges = np.flatnonzero(np.diff(np.r_[False, where, False])).reshape(-1, 2)
+    longest = [(a, b - 1) for a, b in edges if b - a >= _STRETCH][:3]
+    time = record.time
+    return ", ".join(interval_in_time(float(time[a]), float(time[b])) for a, b in longest)
+
+
+def set_point_flags(fit: OutputErrorFit) -> Iterator[Flag]:
+    """Report a set point that moves too little, and the move that would do."""
+    low, high = fit.interval
+    if not fit.estimate.averaged or high - low <= max(_WIDE * fit.dead_time, fit.dt):
+        return
+    every = [record.reference for record in fit.records if record.reference is not None]
+    moved = max(float(np.nanmax(wanted) - np.nanmin(wanted)) for wanted in every)
+    yield flagged(
+        "small_set_point",
+        total=in_time(fit.total_delay),
+        interval=interval_in_time(low, high),
+        moved=moved,
+        enough=_HALVED * moved,
+        times=_HALVED**2,
+    )
 
 
 def feedback_flags(records: tuple[Record, ...], delay: float) -> Iterator[Flag]:
     """Test whether the input depends on the output; `delay` in samples is an upper bound."""
+    if all(_regulates(record) for record in records):
+        yield flagged("feedback.regulation")
+        return
     chances = [
         feedback_chance(y[0], u[0], past_inputs(y[0].size, delay)) for y, u in _stretches(records)
     ]
-    if _rare(chances):
+    if not _rare(chances):
+        return
+    if all(in_automatic(record) for record in records):
+        yield flagged("feedback.moved", chance=min(chances))
+    else:
         yield flagged("feedback", chance=min(chances))
+
+
+def _regulates(record: Record) -> bool:
+    """Whether a known set point does not move, and the input is not that of a relay."""
+    wanted = record.reference
+    return wanted is not None and np.ptp(wanted) == 0 and np.unique(record.input).size > _LEVELS
 
 
 def unstable_flags(records: tuple[Record, ...], delay: float) -> Iterator[Flag]:

@@ -33,7 +33,9 @@ def choices_of(fit: OutputErrorEstimate) -> Iterator[str]:
     chain = fit.distributed.chain
     kind = model_words(chain) if chain else order_words(fit.structure)
     count = len(fit.structures)
-    if fit.process.form is not None:
+    if fit.averaged and fit.process.form is None:
+        yield chosen("dead_time.averaged", kinds=f"1 to {count}", kind=kind)
+    elif fit.process.form is not None:
         yield chosen("structure.requested", form=form_words(fit.process.form))
     elif fit.distributed.follows_flow:
         yield chosen("structure.flow", kind=kind, count=count)
@@ -71,6 +73,8 @@ def choices_of(fit: OutputErrorEstimate) -> Iterator[str]:
 
 def _interval_of(fit: OutputErrorEstimate) -> str:
     """Describe the interval: structures, and other models that extend it."""
+    if fit.averaged:
+        return chosen("interval.averaged")
     ends = [line.interval for line in fit.structures if line.interval is not None]
     if fit.process.form is not None:
         return chosen("interval.forms")

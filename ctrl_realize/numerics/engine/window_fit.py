@@ -322,18 +322,18 @@ def _residual(
     rivals[chosen] = min(rivals.values(), default=np.inf)
     best = candidates[chosen]
     error = window.output - window.predict(problem, best)
-    kept = _clipped(error, max(0.5 * quantum, 0.1 * sigma)) if huber else error.copy()
+    kept = clipped(error, max(0.5 * quantum, 0.1 * sigma)) if huber else error.copy()
     after = kept[window.start :]
     freedom = max(after.size - _estimated(window, best.structure), 1)
     level = float(np.sqrt(float(after @ after) / freedom))
     # Far below the noise the residual is rounding, and its correlation has no meaning.
     floor = 0.3 * sigma
     correlation = correlation_time(after) if level > floor else 1.0
-    has_outliers = _has_outliers(error)
+    outliers = has_outliers(error)
     kept -= error
     kept += window.output
     return _Residual(
-        best, kept, has_outliers, max(level, floor), correlation, after.size / correlation, rivals,
+        best, kept, outliers, max(level, floor), correlation, after.size / correlation, rivals,
         window.counted,
     )  # fmt: skip
 
@@ -354,7 +354,7 @@ def among(fit: WindowFit, structures: Sequence[Structure]) -> WindowFit:
     return replace(fit, candidates=candidates, criterion=fit.criteria(candidates))
 
 
-def _clipped(error: FloatArray, least: float) -> FloatArray:
+def clipped(error: FloatArray, least: float) -> FloatArray:
     """Residuals clipped at 1.345 sigma and rescaled by the fraction that was not."""
     limit = HUBER * max(mad_sigma(error), least)
     left = np.clip(error, -limit, limit)
@@ -362,7 +362,7 @@ def _clipped(error: FloatArray, least: float) -> FloatArray:
     return np.divide(left, max(inside, 0.5), out=left)
 
 
-def _has_outliers(error: FloatArray) -> bool:
+def has_outliers(error: FloatArray) -> bool:
     """Whether there are more residuals beyond four sigma than in Gaussian noise."""
     return bool(np.mean(np.abs(error) > 4 * mad_sigma(error)) > 0.002)
 

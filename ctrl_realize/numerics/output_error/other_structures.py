@@ -56,6 +56,8 @@ class Requested:
         Prewhiten the data if the noise is coloured.
     simulates : bool
         But not if the model then simulates them worse than coloured noise explains.
+    loop : bool
+        The input is that of a controller whose set point moved: see `any_input.lags`.
     """
 
     structures: tuple[Structure, ...] | None = None
@@ -67,6 +69,7 @@ class Requested:
     huber: bool = True
     whiten: bool = True
     simulates: bool = True
+    loop: bool = False
 
 
 def other_structures(fits: WindowFit, refit: Callable[[], WindowFit]) -> OtherStructures:

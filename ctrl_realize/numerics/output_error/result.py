@@ -216,7 +216,8 @@ class OutputErrorEstimate:
     `close` are decisions that rounding errors may reverse. `unweighted` is the model of
     plain least squares, if the residual was whitened. `load` is a step of a load; it is part
     of the model unless it is early. `plausible` are models that the data do not rule out, all
-    equally likely. `points` are the profiles of structures that are not ruled out.
+    equally likely. `points` are the profiles of structures that are not ruled out. `averaged`: the
+    dead time is the mean over them, and the interval holds 95 % of their weight.
     """
 
     dead_time: float
@@ -245,6 +246,7 @@ class OutputErrorEstimate:
     load: LoadStep | None = None
     plausible: tuple[PlausibleModel, ...] = ()
     points: Mapping[Structure, Points] = field(default_factory=dict)
+    averaged: bool = False
 
     @property
     def robust(self) -> bool:

@@ -132,4 +132,5 @@ def _without(record: Record, samples: BoolArray) -> Record:
         units=record.units,
         output_labels=record.output_labels,
         missing="keep",
+        reference=record.reference,
     )

@@ -61,6 +61,8 @@ class SampledData:
         Inputs in a block for each output, and the samples of it of which an output is the mean.
     known : KnownFactor
         Dynamics in cascade that are not part of the plant.
+    past : tuple of ndarray
+        Of every record, columns (N, order) that are estimated with level and drift: see `whitened`.
     """
 
     inputs: tuple[FloatArray, ...]
@@ -72,6 +74,7 @@ class SampledData:
     every: int
     width: int
     known: KnownFactor
+    past: tuple[FloatArray, ...] = ()
 
     @property
     def step(self) -> float:
@@ -145,8 +148,13 @@ class SampledData:
         """Bounds of the records in the concatenated data."""
         return np.concatenate([[0], np.cumsum(self.counts)]).astype(np.int64)
 
-    def whitened(self, noise: FloatArray) -> SampledData:
+    def whitened(self, noise: FloatArray, residual: tuple[FloatArray, ...] = ()) -> SampledData:
         """Filter inputs and outputs alike, with the polynomial that makes the noise white.
+
+        With a `residual` (N,) of every record its earlier samples become terms that are estimated:
+        to first order the fit is then one of model and noise together, as a prediction error
+        method is (Ljung, System Identification, 2nd ed. 1999, section 7.2). In a loop both depend
+        on each other; otherwise nothing changes.
 
         The plant is linear and remains the same. What the filter does to the first input samples,
         whose past is unknown, has arrived before the samples that are left.
@@ -159,6 +167,7 @@ class SampledData:
             inputs=tuple(_filtered(noise, u, self.every) for u in self.inputs),
             outputs=tuple(lfilter(noise, [1.0], y) for y in self.outputs),
             starts=tuple(start + order for start in self.starts),
+            past=tuple(_earlier(left, order) for left in residual),
         )
 
     @cached_property
@@ -169,6 +178,9 @@ class SampledData:
             for rows, start in zip(self.rows, self.starts, strict=True)
         ]
         shapes = [_own_shapes(clock, self.known) for clock in clocks]
+        if self.past:
+            own = [past[rows] for past, rows in zip(self.past, self.rows, strict=True)]
+            shapes = [np.hstack(both) for both in zip(shapes, own, strict=True)]
         m = int(self.edges[-1])
         inputs = [self._input(i) for i in range(len(self.inputs))]
         drive = SeveralInputs(*zip(*inputs, strict=True))
@@ -239,6 +251,12 @@ def _filtered(noise: FloatArray, values: FloatArray, every: int) -> FloatArray:
     for lag, weight in enumerate(noise[1:], start=1):
         whole[lag * every :] += weight * values[: -lag * every]
     return whole
+
+
+def _earlier(residual: FloatArray, order: int) -> FloatArray:
+    """Columns (N, order) of a residual (N,), one to `order` samples before."""
+    late = np.concatenate([np.zeros(order), residual])
+    return np.stack([late[order - k : late.size - k] for k in range(1, order + 1)], axis=1)
 
 
 def _own_shapes(clock: FloatArray, known: KnownFactor) -> FloatArray:

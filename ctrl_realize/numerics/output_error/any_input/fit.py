@@ -42,7 +42,8 @@ from ..process_models import fit_without_fast_lags, process_fit
 from ..result import OutputErrorEstimate, followed_by
 from ..selection import chains_of
 from .condensed import MOST_LAGS, Condensed, condensed
-from .data import SampledData, cut
+from .data import MOST_SAMPLES, SampledData, cut
+from .lags import fit_lags, plain_lags
 from .stretch import WHITE, explained, fit_stretch, response_samples, samples_in_a_block
 from .window import ORDERS, SampledWindow, modelled, window_of
 
@@ -121,10 +122,18 @@ def fit_sampled(
     `condensed.MOST_LAGS` samples, all samples are fitted afterwards; if the plant is slower, means
     over blocks of samples, with which the part is longer (`stretch`).
 
+    Records of a loop are fitted by lags, unless these are ruled out (`lags`).
+
     Where samples are missing, there is no filter, and the correlation of the residual is that of
     its samples as if they were neighbours: an average over the gaps, as it counts for the errors of
     slow parameters.
     """
+    if requested.loop and plain_lags(requested) and not any(np.isnan(y).any() for y in outputs):
+        every = -(-max(y.size for y in outputs) // MOST_SAMPLES)
+        found, fit = fit_lags(cut(outputs, inputs, dt, every, requested.known), requested)
+        if requested.forms or fit.better is None:
+            fit = _of_measured(found, fit, found.noise.size - 1)
+            return SampledFit(fit, found.data, explained(found.fit), found.noise, None)
     structures, tried = requested.structures, requested
     every, part = samples_in_a_block(outputs, inputs, dt, requested)
     if part is None or structures is not None:

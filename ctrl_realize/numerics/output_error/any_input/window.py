@@ -83,28 +83,29 @@ def fit_windows(
     within: tuple[float, float],
     huber: bool,
     noise: FloatArray,
+    residual: tuple[FloatArray, ...] = (),
 ) -> SampledWindow:
     """Fit structures to filtered records, every record weighted by its noise.
 
-    Dead times are sought `within` these, in s.
+    Dead times are sought `within` these, in s; `residual` as for `SampledData.whitened`.
     """
     dt, n, usual = data.step, max(y.size for y in data.outputs), data.spacing * data.dt
     order = noise.size - 1
     alike = (1.0,) * len(data.outputs)
     data = replace(data, starts=tuple(y.size // 20 for y in data.outputs), scales=alike)
-    filtered = data.whitened(noise)
+    filtered = data.whitened(noise, residual)
     rough = _first_order(filtered.problem, n, dt, usual, within, _seen(filtered, within[1]))
     lag = float(-1.0 / rough.poles[0].real)
     data = data.after(rough.dead_time)
     length = (max(data.lengths) - order) * dt
     onset, rise = max(rough.dead_time, 0.5 * usual), max(lag, 2 * usual)
     scales = Scales(onset, rise, length, dt, within[1], within[0])
-    fits = _fit(data.whitened(noise), structures, scales, huber)
-    levels = _noise_levels(data.whitened(noise), fits)
+    fits = _fit(data.whitened(noise, residual), structures, scales, huber)
+    levels = _noise_levels(data.whitened(noise, residual), fits)
     if levels.max() > _UNLIKE * levels.min():
         mean = float(np.exp(np.mean(np.log(levels))))
         data = replace(data, scales=tuple(float(level) / mean for level in levels))
-        fits = _fit(data.whitened(noise), structures, scales, huber)
+        fits = _fit(data.whitened(noise, residual), structures, scales, huber)
     return SampledWindow(data, noise, scales, fits, huber)
 
 

@@ -1,0 +1,243 @@
+"""Lags with dead time in slow noise: the dead time is the mean over all that is not ruled out.
+
+Slow noise hides the second lag of a plant. The information criterion then chooses one lag, whose
+dead time is that of the plant and most of its second lag. The mean over dead times, weighted by the
+profile likelihoods [1]_ of one to three real lags with Akaike's charge for each further one [2]_,
+has no such bias. In loops, moreover, zeros and pairs of poles imitate the slow noise that the
+controller answers.
+
+Noise is the autoregression of the residual of these lags, and both are fitted in turn [3]_, for
+lags that were asked for as for those that were not. Measured: `benchmarks.closed_loop`.
+
+References
+----------
+.. [1] S. A. Murphy and A. W. van der Vaart, On profile likelihood, J. Amer. Statist. Assoc. 95
+   (2000) 449-465, doi:10.1080/01621459.2000.10474219.
+.. [2] K. P. Burnham and D. R. Anderson, Model Selection and Multimodel Inference, 2nd ed., Springer
+   2002, sections 2.9 (Akaike weights) and 4.2 (model averaging).
+.. [3] D. W. Clarke, Generalized least squares estimation of the parameters of a dynamic model, IFAC
+   Symposium on Identification in Automatic Control Systems, Prague 1967, paper 3.17.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+from scipy.interpolate import PchipInterpolator
+
+from ...arrays import FloatArray
+from ...constants import SMALLEST, VERY_STRONG
+from ...engine.eliminate import evaluate
+from ...engine.plausible_models import plausible_models
+from ...engine.problem import Structure
+from ...engine.profile import Points, profile_curve, profile_points
+from ...engine.structures import Candidate
+from ...engine.window_fit import WindowFit, clipped, has_outliers
+from ...families.form_fit import fit_form
+from ...families.lag_profiles import with_profiled_lags
+from ...families.process_form import ProcessForm
+from ...signals.noise import correlation_time
+from ...signals.noise_model import coloured_criterion, noise_lags, whitening_filter
+from ..other_structures import Requested, line_of
+from ..result import (
+    DelayInterval,
+    OtherStructures,
+    OutputErrorEstimate,
+    ProcessEstimate,
+    StructureFit,
+    assembled,
+)
+from .data import SampledData
+from .window import SampledWindow, fit_windows, modelled
+
+LAGS = tuple(ProcessForm(f"P{n}D", n) for n in (1, 2, 3))
+_RIVALS = (Structure(1, 1), Structure(2, 2), Structure(2, 1))
+_TURNS = 5  # of noise model and lags, at most
+_ALIKE = 0.01  # largest difference of coefficients of noise models that are one
+_BEYOND = 1.5  # total delays of the first fit, up to which a dead time is sought
+_AKAIKE = 2.0  # for each parameter, in twice the log of the likelihood
+_BETWEEN = 8  # dead times between two points of a profile
+_TAIL = 0.025  # of the weight, beyond each end of an interval
+
+
+def plain_lags(requested: Requested) -> bool:
+    """Whether lags with a dead time are asked for, or nothing."""
+    forms = all(
+        form.dead_time and not (form.prescribed or form.pair or form.lead or form.integrator)
+        for form in requested.forms
+    )
+    return forms and (bool(requested.forms) or requested.structures is None)
+
+
+def fit_lags(data: SampledData, requested: Requested) -> tuple[SampledWindow, OutputErrorEstimate]:
+    """Fit lags and noise in turn; what rules out the lags is told by `others` of the estimate."""
+    limit = 0.25 * data.longest if requested.latest is None else requested.latest
+    within = requested.earliest, max(limit, requested.earliest)
+    forms = requested.forms or LAGS
+    noise, fitted = np.ones(1), list[Candidate]()
+    left: tuple[FloatArray, ...] = ()
+    for turn in range(_TURNS):
+        # Huber's loss would pull the data towards one lag.
+        part = fit_windows(data, (Structure(1, 1),), within, False, noise, left)
+        fits, fitted = _fitted(part.fit, forms, fitted)
+        best = _plain(min(fitted, key=partial(_value, fits)))
+        errors = _left(part, best)
+        following = whitening_filter(np.concatenate(errors), noise_lags(min(part.data.counts)))
+        alike = following.size == noise.size and np.abs(following - noise).max() <= _ALIKE
+        if alike or not requested.whiten or turn == _TURNS - 1:
+            break
+        noise, left = following, _from_the_first(part.data, errors)
+        # Noise hides how a delay divides, and not the whole of it.
+        total = best.dead_time - float(np.sum(1.0 / best.poles.real))
+        within = within[0], max(min(within[1], _BEYOND * total), within[0])
+    if requested.huber:
+        fits, fitted = _robust(fits, forms, fitted)
+    part, problem, scales = replace(part, fit=fits), fits.problem, fits.scales
+    profiles = [profile_points(problem, one, fits.variance, scales) for one in fitted]
+    dead_times, shares = _weighted(fits, profiles)
+    weights = shares.sum(axis=0)
+    mean = float(np.sum(weights * dead_times))
+    first, last = np.interp([_TAIL, 1.0 - _TAIL], np.cumsum(weights), dead_times)
+    std = float(np.sqrt(np.sum(weights * (dead_times - mean) ** 2)))
+    chosen = _with_dead_time(fits, mean, forms, fitted)
+    curves = {
+        one.structure: profile_curve(points, one, fits.variance, scales)
+        for one, points in zip(fitted, profiles, strict=True)
+    }
+    found = assembled(
+        fits, chosen, True, (), curves, DelayInterval(float(first), float(last), std),
+        curves[chosen.structure],
+    )  # fmt: skip
+    form = forms[fitted.index(fits.candidates[chosen.structure])]
+    lags = with_profiled_lags(problem, scales, form, found.process.parameters, fits.error_variance)
+    process = ProcessEstimate(lags, form if requested.forms else None)
+    plain = {s.plain: _plain(one) for s, one in fits.candidates.items()}
+    plainly = replace(fits, candidates=plain, criterion=fits.criteria(plain))
+    better = _better(part, min(fitted, key=partial(_value, fits)), within)
+    evidence = dict(zip(plain, shares.sum(axis=1).tolist(), strict=True))
+    points = {
+        one.structure.plain: {at: _plain(point) for at, point in own.items()}
+        for one, own in zip(fitted, profiles, strict=True)
+    }
+    others = OtherStructures(better)
+    found = replace(found, process=process, points=points, others=others, averaged=True)
+    return part, replace(found, plausible=plausible_models(plainly, evidence, plain))
+
+
+def _fitted(
+    fits: WindowFit, forms: Sequence[ProcessForm], like: Sequence[Candidate]
+) -> tuple[WindowFit, list[Candidate]]:
+    """Fit lags, starting from others, and take the noise from the closest."""
+    start = [*fits.candidates.values(), *like]
+    fitted = [fit_form(fits.problem, form, fits.scales, start) for form in forms]
+    return _with_noise(fits, fitted), fitted
+
+
+def _robust(
+    fits: WindowFit, forms: Sequence[ProcessForm], fitted: list[Candidate]
+) -> tuple[WindowFit, list[Candidate]]:
+    """Repeat the fit with Huber's loss if there are outliers, as `fit_window` does."""
+    window, best = fits.window, _plain(min(fitted, key=partial(_value, fits)))
+    error = window.output - window.predict(fits.problem, best)
+    if not has_outliers(error):
+        return fits, fitted
+    pulled = window.output - error + clipped(error, 0.0)
+    return _fitted(replace(fits, problem=window.with_output(pulled)), forms, fitted)
+
+
+def _from_the_first(data: SampledData, errors: Sequence[FloatArray]) -> tuple[FloatArray, ...]:
+    """Residuals from the first sample of every record on, in its unit; 0 before they are known."""
+    whole = []
+    for y, rows, error, scale in zip(data.outputs, data.rows, errors, data.scales, strict=True):
+        whole.append(np.zeros(y.size))
+        whole[-1][rows] = scale * error
+    return tuple(whole)
+
+
+def _left(part: SampledWindow, model: Candidate) -> list[FloatArray]:
+    """What a model leaves of every record."""
+    state = evaluate(part.fit.problem, model.structure, model.parameters[None])
+    fitted = modelled(part.data, model.parameters, state.numerator[0])
+    return np.split(part.data.problem.data - fitted, part.data.edges[1:-1])
+
+
+def _better(
+    part: SampledWindow, lags: Candidate, within: tuple[float, float]
+) -> StructureFit | None:
+    """A structure with a zero or a pair that rules lags out, each with noise of its own.
+
+    The noise of lags takes what they miss of a response that rings: only that of the rival tells.
+    """
+    rivals = fit_windows(part.data, _RIVALS, within, False, np.ones(1))
+    count = min(*part.data.counts, *rivals.data.counts)
+
+    def value(window: SampledWindow, model: Candidate) -> float:
+        left = [error[-count:] for error in _left(window, model)]
+        free = model.structure.free * float(np.log(count * len(left)))
+        return coloured_criterion(left)[0] + free
+
+    every = [
+        one
+        for one in rivals.fit.candidates.values()
+        if one.structure.zeros or np.abs(one.poles.imag).max() > 0
+    ]
+    if not every:
+        return None
+    best = min(every, key=partial(value, rivals))
+    excess = value(rivals, best) - value(part, _plain(lags))
+    return line_of(rivals.fit, best, excess) if excess < -VERY_STRONG else None
+
+
+def _with_dead_time(
+    fits: WindowFit, dead_time: float, forms: Sequence[ProcessForm], fitted: Sequence[Candidate]
+) -> Candidate:
+    """Best lags with a given dead time: the fewest that are not clearly worse (BIC)."""
+    fixed = {"dead_time": dead_time}
+    found = {}
+    for form, one in zip(forms, fitted, strict=True):
+        there = fit_form(fits.problem, replace(form, fixed=fixed), fits.scales, [one])
+        found[one.structure] = Candidate(one.structure, there.parameters, there.cost)
+    values = fits.criteria(found)
+    return found[min(values, key=lambda structure: values[structure])]
+
+
+def _with_noise(fits: WindowFit, lags: Sequence[Candidate]) -> WindowFit:
+    """Compare lags with the noise that the closest of them leaves."""
+    closest = min(lags, key=lambda one: one.cost)
+    residual = evaluate(fits.problem, closest.structure, closest.parameters[None]).residual[0]
+    terms = 2 + closest.structure.order + fits.problem.local_count(closest.structure.order)
+    sigma = float(np.sqrt(closest.cost / max(residual.size - terms, 1)))
+    correlation = correlation_time(residual)
+    candidates = {one.structure: one for one in lags}
+    made = replace(
+        fits, candidates=candidates, sigma=sigma, rounding=0.0, correlation=correlation, rivals={},
+        normalized_rms=1.0,
+    )  # fmt: skip
+    return replace(made, criterion=made.criteria(candidates))
+
+
+def _weighted(fits: WindowFit, profiles: Sequence[Points]) -> tuple[FloatArray, FloatArray]:
+    """Dead times (G,), and the weights (S, G) of every number of lags; they sum to 1."""
+    values = []
+    for points in profiles:
+        at = np.array(sorted(points))
+        values.append((at, np.array([_value(fits, points[float(one)]) for one in at])))
+    every = np.unique(np.concatenate([at for at, _ in values]))
+    part = np.arange(_BETWEEN) / _BETWEEN
+    fine = np.append(every[:-1, None] + np.diff(every)[:, None] * part, every[-1])
+    least = min(float(value.min()) for _, value in values)
+    density = [np.exp(-0.5 * (PchipInterpolator(*one)(fine) - least)) for one in values]
+    weights = np.stack(density) * np.gradient(fine)
+    return fine, weights / max(float(weights.sum()), SMALLEST)
+
+
+def _plain(lags: Candidate) -> Candidate:
+    """Lags of a form, with the parameters of a structure."""
+    return Candidate(lags.structure.plain, lags.theta, lags.cost)
+
+
+def _value(fits: WindowFit, lags: Candidate) -> float:
+    return lags.cost / fits.variance + _AKAIKE * lags.structure.order

@@ -1,0 +1,108 @@
+"""Records of running loops whose set point is known (simulated)."""
+
+import control as ct
+import numpy as np
+import pytest
+
+import ctrl_realize as cr
+from benchmarks.closed_loop.cases import CASES, GAIN, PLANTS, record
+
+PLANT = PLANTS["0.4"]
+TOTAL = PLANT.dead_time + sum(PLANT.lags)
+TIME = np.arange(900.0)
+
+
+def loop(case, moves="three", seed=7):
+    """Record of a loop with the plant above."""
+    wanted, bare = record(PLANT, CASES[case], moves, seed)
+    return cr.Record(bare.time, bare.input, bare.output, reference=wanted)
+
+
+def flag(fit, code):
+    """Message of the one flag with a code."""
+    (found,) = [one.message for one in fit.flags if one.code == code]
+    return found
+
+
+@pytest.fixture(scope="module")
+def slow():
+    """Noise with a pole at 0.9, of a tenth of the moves: the second lag hardly shows."""
+    return cr.identify(loop("AR(0.9)")).fit
+
+
+@pytest.fixture(scope="module")
+def stated():
+    return cr.identify(loop("AR(0.9)"), structures="P2D").fit
+
+
+def test_the_interval_holds_and_the_delay_in_all_is_known(slow):
+    low, high = slow.interval
+    assert low <= PLANT.dead_time <= high
+    first, last = slow.total_delay_interval
+    assert first <= TOTAL <= last
+    assert slow.gain_interval[0] <= GAIN <= slow.gain_interval[1]
+
+
+def test_it_is_said_what_was_used_and_that_noise_hides_the_lags(slow):
+    said = " ".join(slow.choices)
+    for words in ("direct identification", "mean over 1 to 3 real lags", "noise model of order 1"):
+        assert words in said
+    assert "its set point moved" in flag(slow, "feedback")
+    hidden = flag(slow, "small_set_point")
+    assert f"total delay, {slow.total_delay:.3g} s" in hidden
+    assert "Moves of 2, or 4 times as many" in hidden
+
+
+def test_lags_that_are_stated_are_fitted_in_the_same_noise(stated, slow):
+    assert stated.order == 2
+    assert any("P2D: as requested" in one for one in stated.choices)
+    assert any("noise model of order 1" in one for one in stated.choices)
+    assert stated.interval[0] <= PLANT.dead_time <= stated.interval[1]
+    # one of the structures over which the other is the mean
+    assert slow.interval[0] < stated.dead_time < slow.interval[1]
+
+
+def test_units_do_not_change_the_dead_time(stated):
+    data = loop("AR(0.9)")
+    other = cr.Record(
+        data.time / 60, 3 * data.input + 5, 10 * data.output - 7, reference=10 * data.reference - 7
+    )
+    fit = cr.identify(other, structures="P2D").fit
+    # the search ends within a thousandth of a standard error
+    assert 60 * fit.dead_time == pytest.approx(stated.dead_time, abs=0.02)
+    assert fit.gain == pytest.approx(stated.gain * 10 / 3, rel=0.01)
+
+
+def test_in_white_noise_the_dead_time_is_known_to_half_a_sample():
+    fit = cr.identify(loop("white", "nine"), structures="P2D").fit
+    assert abs(fit.dead_time - PLANT.dead_time) < 0.5
+    assert fit.interval[0] <= PLANT.dead_time <= fit.interval[1]
+    assert "small_set_point" not in {one.code for one in fit.flags}
+
+
+def test_stretches_in_manual_are_told():
+    data = loop("white", "nine")
+    wanted = np.where(data.time < 250, np.nan, data.reference)
+    partly = cr.Record(data.time, data.input, data.output, reference=wanted)
+    fit = cr.identify(partly, structures="P2D").fit
+    assert any("manual: 0 to 249 s" in one for one in fit.choices)
+    # the same samples, whoever moved the input
+    assert fit.interval[0] <= PLANT.dead_time <= fit.interval[1]
+
+
+def test_regulation_alone_is_told():
+    data = loop("AR(0.9)")
+    first = data[0:99]  # before the set point moves
+    fit = cr.identify(first).fit
+    assert "the set point does not move" in flag(fit, "feedback")
+
+
+def test_lags_that_are_ruled_out_are_not_fitted():
+    rng = np.random.default_rng(3)
+    drive = np.repeat(rng.standard_normal(14), 25)
+    ringing = ct.sample_system(ct.tf([0.01], [1, 0.04, 0.01]), 1.0)
+    output = ct.forced_response(ringing, TIME[:350], drive).outputs
+    output = np.r_[np.zeros(5), output[:-5]] + 0.02 * rng.standard_normal(350)
+    fit = cr.fit_output_error(cr.Record(TIME[:350], drive, output, reference=drive)).fit
+    assert np.abs(fit.poles.imag).max() == pytest.approx(np.sqrt(0.01 - 0.02**2), rel=0.02)
+    assert fit.interval[0] <= 5 <= fit.interval[1]
