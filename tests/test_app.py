@@ -77,6 +77,31 @@ def test_a_dragged_model_is_the_closed_form_with_that_value(fitted, name):
     assert drag["misfit"]["residual"] > 1.1 * drag["misfit"]["best"]
 
 
+@pytest.mark.parametrize("count", [1, 2])
+def test_a_dragged_model_of_any_input_is_its_simulation(count):
+    """Several records, one after the other: what is unknown of the past is left out of each."""
+    time, rng = 0.1 * np.arange(500), np.random.default_rng(3)
+    plant = cr.design.ProcessModel(gain=2.0, lag=1.5, dead_time=0.8).system(0.1)
+    session, records = Session(), []
+    for _ in range(count):
+        signal = 40 + 5 * np.sign(rng.standard_normal(50)).repeat(10)
+        output = plant.simulate(signal - 40) + 0.1 * rng.standard_normal(500)
+        records.append(cr.Record(time, signal, output))
+        session.add_record(records[-1])
+    session.apply(put("model", structure=[1, 1]))
+    view = finished(session)
+    values = {one["name"]: one["value"] for one in view["model"]["parameters"]}
+    drag = session.apply({"do": "drag", "values": {"gain": 1.5 * values["gain"]}})["drag"]
+    at, output = (np.array(drag["lines"]["response"][key]) for key in "xy")
+    before = layer(panel(view, "model", "response"), "model")
+    moved = output - np.interp(at, before["x"], before["y"])
+    alone = plant.simulate(records[0].input - records[0].input[0])
+    there = at < 49
+    expected = 0.5 * np.interp(at[there], time, alone)
+    # of the parameters, which the fit finds to 1 %; the move is as large as 10
+    np.testing.assert_allclose(moved[there], expected, atol=0.3)
+
+
 def test_a_drag_says_whether_the_record_allows_the_dead_time(fitted):
     session, _ = fitted
     low, high = cr.identify(step_record()).fit.interval

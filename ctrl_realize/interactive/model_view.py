@@ -127,11 +127,9 @@ def _gain_handle(drawn: Drawn) -> list[JSON]:
     moved, gain = float(drawn.own[-1]), drawn.parameters["gain"]
     if not gain.value or not np.isfinite(moved) or not moved:
         return []
-    low, high = _range(gain)
-    said, base = f"{gain.value:.4g}", float(drawn.fit.fitted[-1]) - moved
-    place: JSON = {"per_unit": moved / gain.value, "offset": base}
-    step = (high - low) / 200
-    return [handle("gain", "gain", gain.value, said, (low, high), step, along="y", **place)]
+    said, step = f"{gain.value:.4g}", abs(gain.value) / 100
+    place = {"per_unit": moved / gain.value, "offset": float(drawn.fit.fitted[-1]) - moved}
+    return [handle("gain", "gain", gain.value, said, _range(gain), step, along="y", **place)]
 
 
 def _criterion(free: OutputErrorFit, fit: OutputErrorFit) -> JSON:

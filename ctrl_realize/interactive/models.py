@@ -102,8 +102,21 @@ class Drawn:
         poles = np.r_[np.roots(below), np.zeros(self.fit.integrators)].astype(np.complex128)
         core, data = continuous_core((sides["above"] / below[0])[::-1], poles), self.fit.data
         model = delayed_ss(core, dead_time=max(values["dead_time"], 0.0), dt=data.dt)
-        moves = np.ravel(model.simulate(data.input - data.input[0]))
-        return np.asarray(moves[np.minimum(data.rows * data.every, moves.size - 1)])
+        if data.motion is None:
+            return self._on_records(model)
+        return np.asarray(np.ravel(model.simulate(data.input - data.input[0]))[data.rows])
+
+    def _on_records(self, model: DelayedStateSpace) -> FloatArray:
+        """Response (N,) of a fit of other inputs than steps, which has one record after another."""
+        time, first = self.fit.time, self.fit.records[0]
+        found, late, done = np.zeros(time.size), time[0] - first.time[0], 0
+        for one in self.fit.records:
+            at = time[done:] - time[min(done, time.size - 1)] + one.time[0] + late
+            at = at[at <= one.time[-1] + 0.5 * one.dt]
+            moves = np.ravel(model.simulate(one.input - one.input[0]))
+            found[done : done + at.size] = np.interp(at, one.time, moves)
+            done += at.size
+        return found
 
     def output(self, moved: Mapping[str, float]) -> FloatArray:
         """Output (N,) with some parameters changed."""
@@ -120,10 +133,10 @@ class Drawn:
 
 def step_time(fit: OutputErrorFit) -> float:
     """Time in s, on the axis of the fit, at which the input first moves."""
-    data = fit.data
-    moves = np.flatnonzero(np.diff(data.input))
-    first = data.edges[0][0] if data.motion is not None else int(moves[0]) + 1 if moves.size else 0
-    return float(fit.time[0] + (first - data.rows[0] * data.every) * data.dt)
+    data, record = fit.data, fit.records[0]
+    if data.motion is not None:
+        return float(fit.time[0] + (data.edges[0][0] - data.rows[0]) * data.dt)
+    return float(record.time[int(np.argmax(record.input != record.input[0]))])
 
 
 def start_of(fit: OutputErrorFit) -> slice:

@@ -15,7 +15,7 @@ from .._wording import in_time
 from ..delayed import DelayedStateSpace
 from ..design import PIDController
 from ..design.tuning.layouts import LAYOUTS
-from ..design.tuning.pid import KINDS, RULES
+from ..design.tuning.pid import RULES
 from ..design.tuning.rules import kinds_of
 from ..experiment import ExperimentPlan
 from ..identification import OutputErrorFit
@@ -30,20 +30,15 @@ from .records import python_lines
 from .state import FACTS
 
 CHOICES: JSON = {
-    "kinds": list(KINDS),
-    "rules": {rule: list(kinds_of(rule)) for rule in RULES},
+    "rules": {rule: list(kinds_of(rule)) for rule in RULES}, "speeds": list(loops.SPEEDS),
     "forms": {name: layout.title for name, layout in LAYOUTS.items()},
-    "speeds": list(loops.SPEEDS),
-    "time_units": list(SECONDS),
-    "want": FACTS["want"],
-}
+    "time_units": list(SECONDS), "want": FACTS["want"],
+}  # fmt: skip
 """What a page offers."""
 CODE: dict[str, tuple[str, Callable[..., Any]]] = {
-    "st": ("controller.st", export.to_structured_text),
-    "c": ("controller.c", export.to_c),
-    "python": ("controller.py", export.to_python),
-    "matlab": ("controller.m", export.to_matlab),
-}
+    "st": ("controller.st", export.to_structured_text), "c": ("controller.c", export.to_c),
+    "python": ("controller.py", export.to_python), "matlab": ("controller.m", export.to_matlab),
+}  # fmt: skip
 
 
 def written(name: str, text: str) -> JSON:

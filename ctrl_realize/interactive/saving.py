@@ -41,9 +41,7 @@ def opened(text: str) -> tuple[State, dict[str, bytes]]:
     except (ValueError, RecursionError) as error:
         raise FileFormatError(f"not a file of saved work, or truncated: {error}") from error
     if content.get("schema") != SCHEMA:
-        raise FileFormatError(
-            f"schema {content.get('schema')!r}; this version reads {SCHEMA}: update ctrl_realize"
-        )
+        raise FileFormatError(f"schema {content.get('schema')!r}; expected {SCHEMA}: update this")
     if content.get("sha256") != checksum(content):
         raise FileFormatError("the checksum does not match: the file was edited or damaged")
     files = {key: base64.b64decode(value) for key, value in content["files"].items()}

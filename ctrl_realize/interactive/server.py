@@ -39,8 +39,7 @@ class AppServer(ThreadingHTTPServer):
 
     def __init__(self, host: Host, port: int = 0) -> None:
         super().__init__((LOOPBACK, port), _Handler)
-        self.host = host
-        self.token = secrets.token_urlsafe(24)
+        self.host, self.token = host, secrets.token_urlsafe(24)
 
     def handle_error(self, *request: Any) -> None:
         """Tell a defect; a browser that has gone away is none."""

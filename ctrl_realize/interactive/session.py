@@ -80,9 +80,8 @@ class Session:
 
     def add_file(self, path: str | Path) -> JSON:
         """Open a file of this machine, as the command ``"open"`` does with its content."""
-        file = Path(path)
-        content = base64.b64encode(file.read_bytes()).decode()
-        return self.apply({"do": "open", "name": file.name, "content": content, "path": str(path)})
+        name, content = Path(path).name, base64.b64encode(Path(path).read_bytes()).decode()
+        return self.apply({"do": "open", "name": name, "content": content, "path": str(path)})
 
     def add_record(self, record: Record) -> None:
         """Take a record that there is already."""
@@ -168,7 +167,7 @@ class Session:
             self._open(command)
         elif name in ("undo", "redo"):
             there = self._at + (1 if name == "redo" else -1)
-            self._at = min(max(there, 0), len(self._states) - 1)
+            self._at = sorted((0, there, len(self._states) - 1))[1]
         elif name not in ("view", "compute"):
             self._change(command)
         return {}
