@@ -29,7 +29,7 @@ import numpy as np
 from scipy.interpolate import PchipInterpolator
 
 from ...arrays import FloatArray
-from ...constants import SMALLEST, VERY_STRONG
+from ...constants import SMALLEST
 from ...engine.eliminate import evaluate
 from ...engine.plausible_models import plausible_models
 from ...engine.problem import Structure
@@ -55,6 +55,9 @@ from .window import SampledWindow, fit_windows, modelled
 
 LAGS = tuple(ProcessForm(f"P{n}D", n) for n in (1, 2, 3))
 _RIVALS = (Structure(1, 1), Structure(2, 2), Structure(2, 1))
+_RULED_OUT = 30.0
+"""Of the criterion: a zero beside a pole slower than the record reached 11 in loops without one, a
+pair of poles 375 and more where there was one (350 samples)."""
 _TURNS = 5  # of noise model and lags, at most
 _ALIKE = 0.01  # largest difference of coefficients of noise models that are one
 _BEYOND = 1.5  # total delays of the first fit, up to which a dead time is sought
@@ -188,7 +191,7 @@ def _better(
         return None
     best = min(every, key=partial(value, rivals))
     excess = value(rivals, best) - value(part, _plain(lags))
-    return line_of(rivals.fit, best, excess) if excess < -VERY_STRONG else None
+    return line_of(rivals.fit, best, excess) if excess < -_RULED_OUT else None
 
 
 def _with_dead_time(
