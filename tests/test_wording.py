@@ -3,8 +3,8 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ctrl_realize._parameters import Parameter, formula
 from ctrl_realize._wording import interval_in_time, time_within
+from ctrl_realize.results import Parameter, formula
 
 SIZES = st.floats(1e-7, 1e5)
 
