@@ -142,7 +142,7 @@ TRAPS = [
     Trap("a clean step", CLEAN, yes=ANY),
     Trap("a step down", step_with(height=-10.0), yes=ANY),
     Trap("a negative gain", step_with(gain=-2.0), yes=ANY),
-    Trap("steps to and fro", csv(T, 40 + (s := steps(T, [(30, 10.0), (110, -5.0)])),
+    Trap("steps up and down", csv(T, 40 + (s := steps(T, [(30, 10.0), (110, -5.0)])),
          20 + response(T, s, GAIN, DEAD_TIME, LAGS) + noise(T.size)), yes=ANY),
     Trap("one per cent of noise", step_with(noise=0.2), yes=("gain", "tuning")),
     Trap("minutes", csv(SLOW / 60, U, Y, "time [min],u,y"), yes=ANY, truth={"dead_time": 300.0}),
@@ -212,7 +212,7 @@ TRAPS = [
          flags=("output_at_limit", "may_be_at_limit")),
     # not a stable linear plant in open loop
     Trap("a loop without moves", loop([], disturbance=0.05), refused="explains nothing"),
-    Trap("a loop with moves to and fro", loop([(50, 5.0), (150, -3.0), (250, 4.0)]),
+    Trap("a loop with moves up and down", loop([(50, 5.0), (150, -3.0), (250, 4.0)]),
          flags=("feedback",)),
     Trap("a loop with one move", loop([(50, 5.0)]), flags=("feedback",)),
     Trap("an integrating plant", csv(T, U, integrated(T, U)), flags=("integrating",)),

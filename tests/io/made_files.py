@@ -354,7 +354,7 @@ def summer_time(path):
 
 
 def encoder(path):
-    """A counter of 12 bits behind a motor that is driven to and fro."""
+    """A counter of 12 bits behind a motor that is driven up and down."""
     t = np.round(0.002 * np.arange(1500), 9)
     rng = np.random.default_rng(26)
     u = np.repeat(rng.choice([-3.0, 5.0], 60), 25)
