@@ -63,6 +63,8 @@ class Samples:
         An input holds its value through a gap if it has the same behind it; where it moved
         meanwhile, a gap in time is refused, and a missing value stays missing.
         """
+        if self.time.size < 2:
+            return self, "refuse"
         fault = axis_fault(self.time)
         lost = [np.isnan(np.atleast_2d(one)) for one in (self.input, self.output)]
         if fault is not None and (
