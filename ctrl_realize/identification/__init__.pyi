@@ -23,8 +23,8 @@ from .realization.order_scan import OrderScan as OrderScan
 from .realization.order_scan import scan_orders as scan_orders
 from .realization.realize import realize as realize
 from .realization.result import Realization as Realization
-from .several_inputs import SeveralInputsFit as SeveralInputsFit
 from .several_inputs import fit_several_inputs as fit_several_inputs
+from .several_inputs_result import SeveralInputsFit as SeveralInputsFit
 from .state_space_fit.fit import fit_state_space as fit_state_space
 from .state_space_fit.fit import refine_state_space as refine_state_space
 from .state_space_fit.result import StateSpaceFit as StateSpaceFit

@@ -15,7 +15,7 @@ from ..identification.joint.result import JointFit
 from ..identification.output_error.result import OutputErrorFit
 from ..identification.realization.delay_scan_result import DelayScan
 from ..identification.realization.result import Realization
-from ..identification.several_inputs import SeveralInputsFit
+from ..identification.several_inputs_result import SeveralInputsFit
 from ..io.stored_fit import FitSummary
 from .campaigns import campaign_plot, gain_plot
 from .delays import bootstrap_plot, delay_comparison_plot, track_plot

@@ -17,7 +17,7 @@ from ..delayed.simulation import simulate_record
 from ..errors import OptionError
 from ..identification.output_error.repeatability import distinct
 from ..identification.output_error.result import OutputErrorFit
-from ..identification.several_inputs import SeveralInputsFit
+from ..identification.several_inputs_result import SeveralInputsFit
 from ..identification.step.steps import unit_step
 from ..numerics.constants import VERY_STRONG
 from ..numerics.signals.correlation import fit_percent
