@@ -11,30 +11,21 @@ import numpy as np
 from .._wording import in_time
 from ..errors import CtrlRealizeError
 from ..io import read_record
-from ..io.checks import MAX_BYTES
-from ..io.read import read_table
-from ..io.signals.long_format import long_table, tags_as_columns
-from ..io.signals.names import choose_columns
-from ..io.signals.quality import rules_of
+from ..io.records import asked
+from ..io.signals.reading import Reading
 from ..io.tables import Table
-from ..io.text_options import TextOptions
 from .manifest import Run
 from .terminal import complain, one_line, printable, say, table
-
-_TEXT = ("delimiter", "decimal", "encoding", "comment", "header", "skip_rows", "thousands")
 
 
 def run_look(file: Path, *, record: Mapping[str, Any], run: Run) -> int:
     """Show columns and record, and return the exit code: 2 if the file is no record yet."""
-    options = TextOptions(**{name: record[name] for name in _TEXT if name in record})
-    found = read_table(file, options, variable=record.get("variable"), max_bytes=MAX_BYTES)
-    signals = record.get("input"), record.get("output")
-    long = long_table(found, record.get("time"), signals)
-    shown = found if long is None else tags_as_columns(found, long)
+    how = asked(file, record)
+    shown, long = how.signals(how.table())
     used: dict[int, str] = {}
     failed = ""
     try:
-        used = _uses(shown, record, is_long=long is not None)
+        used = _uses(shown, how, is_long=long is not None)
         made = read_record(file, **record)
     except CtrlRealizeError as error:
         failed = one_line(error)
@@ -52,15 +43,18 @@ def run_look(file: Path, *, record: Mapping[str, Any], run: Run) -> int:
     return 0
 
 
-def _uses(shown: Table, record: Mapping[str, Any], *, is_long: bool) -> dict[int, str]:
+def _uses(shown: Table, how: Reading, *, is_long: bool) -> dict[int, str]:
     """What each column is used as."""
-    rules = rules_of(True, None, record.get("quality", "auto"), None)
-    qualities = [] if is_long else rules.columns(shown)
-    time, dt = (None, 1.0) if is_long else (record.get("time"), record.get("dt"))
-    parts = choose_columns(shown, time, record.get("input"), record.get("output"), dt, qualities)
-    clock = [k for k in (parts.time, parts.date) if k is not None]
-    named = (("quality", qualities), ("time", clock), ("input", parts.inputs),
-             ("output", parts.outputs))  # fmt: skip
+    qualities = [] if is_long else how.rules.columns(shown)
+    parts = how.parts(shown, None if is_long else qualities)
+    clock, mode = (
+        [k for k in columns if k is not None]
+        for columns in ((parts.time, parts.date), (parts.mode,))
+    )
+    named = (
+        ("quality", qualities), ("time", clock), ("input", parts.inputs),
+        ("output", parts.outputs), ("set point", parts.references), ("mode", mode),
+    )  # fmt: skip
     return {k: name for name, columns in named for k in columns}
 
 

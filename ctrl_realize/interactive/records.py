@@ -8,7 +8,6 @@ import tempfile
 import warnings
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
-from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
@@ -96,8 +95,7 @@ def read_response(content: bytes, name: str) -> MeasuredFRF:
 def preview(content: bytes, row: Mapping[str, Any]) -> JSON:
     """First rows of a file with its columns, and what they are taken for."""
     options = row["options"]
-    text = {one.name for one in fields(TextOptions)} & options.keys()
-    how = TextOptions(**{key: options[key] for key in text})
+    how = TextOptions.among(options)
     try:
         with _file(content, row["name"]) as path:
             table = read_table(path, how, variable=options.get("variable"), max_bytes=MAX_BYTES)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import math
 import re
 from pathlib import Path
 from typing import Literal
@@ -90,7 +91,9 @@ def measured(cell: str) -> tuple[str, str]:
 
 
 def number_of(text: str, notation: str) -> float:
-    """Value of a text that matches the pattern of a notation."""
+    """Value of a text in a notation; NaN if it is no number."""
+    if not NUMBER[notation].fullmatch(text):
+        return math.nan
     plain = "".join(text.split()).replace("’", "'").replace(notation[1:] or " ", "")
     return float(plain.replace(",", "."))
 

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -23,6 +22,7 @@ from .units import plain_unit
 
 _NAMES = facts("io/words.toml")["frf"]
 _IN_HZ = {"hz": 1.0, "khz": 1e3, "mhz": 1e6, "rad/s": 1 / (2 * np.pi)}
+_UNITS = {"frequency": tuple(_IN_HZ), "magnitude": ("", "db"), "phase": ("deg", "rad")}
 
 
 def read_frf(
@@ -115,18 +115,10 @@ def read_frf(
     >>> print(abs(frf.frdata[0, 0]).round(6))
     [1.  0.1]
     """
-    asked = {
-        "frequency": frequency, "magnitude": magnitude, "phase": phase, "real": real,
-        "imag": imag, "response": response, "coherence": coherence, "std": std,
-    }  # fmt: skip
-    units = _Units(
-        _checked_unit(frequency_unit, "frequency_unit", _IN_HZ),
-        _checked_unit(magnitude_unit, "magnitude_unit", ("", "db")),
-        _checked_unit(phase_unit, "phase_unit", ("deg", "rad")),
-    )
-    options = TextOptions(delimiter, decimal, encoding, comment, header, skip_rows)
-    table = read_table(path, options, variable=variable, max_bytes=max_bytes)
-    columns = _columns(table, asked)
+    given = locals()
+    units = {part: _checked_unit(given, f"{part}_unit", known) for part, known in _UNITS.items()}
+    table = read_table(path, TextOptions.among(given), variable=variable, max_bytes=max_bytes)
+    columns = _columns(table, given)
     check_lengths(table, columns.values())
     coherence_values, std_values = (
         table.numbers(columns[key]) if key in columns else None for key in ("coherence", "std")
@@ -134,7 +126,7 @@ def read_frf(
     try:
         return MeasuredFRF(
             _response(table, columns, units),
-            _frequency_hz(table, columns["frequency"], units.frequency),
+            _frequency_hz(table, columns["frequency"], units["frequency"]),
             coherence=coherence_values,
             std=std_values,
             name=Path(path).stem if name is None else name,
@@ -145,16 +137,9 @@ def read_frf(
         raise DataError(f"{table.path}: {error}") from error
 
 
-@dataclass(frozen=True)
-class _Units:
-    """Options of the caller; None is determined from the file."""
-
-    frequency: str | None
-    magnitude: str | None
-    phase: str | None
-
-
-def _checked_unit(unit: str, argument: str, known: Iterable[str]) -> str | None:
+def _checked_unit(given: Mapping[str, Any], argument: str, known: Iterable[str]) -> str | None:
+    """Unit that the caller gives; None is determined from the file."""
+    unit = given[argument]
     if unit == "auto":
         return None
     plain = plain_unit(unit)
@@ -164,12 +149,10 @@ def _checked_unit(unit: str, argument: str, known: Iterable[str]) -> str | None:
     return plain
 
 
-def _columns(table: Table, asked: dict[str, str | int | None]) -> dict[str, int]:
+def _columns(table: Table, asked: Mapping[str, Any]) -> dict[str, int]:
     """Position of each part that is present."""
     columns = {
-        part: find_column(table, wanted, part)
-        for part, wanted in asked.items()
-        if wanted is not None
+        part: find_column(table, asked[part], part) for part in _NAMES if asked[part] is not None
     }
     if not has_header(table) and not columns and len(table.columns) == 3:
         return {"frequency": 0, "magnitude": 1, "phase": 2}
@@ -207,13 +190,15 @@ def _frequency_hz(table: Table, index: int, unit: str | None) -> FloatArray:
     return table.numbers(index) * _IN_HZ[unit]
 
 
-def _response(table: Table, columns: dict[str, int], units: _Units) -> ComplexArray:
+def _response(
+    table: Table, columns: dict[str, int], units: Mapping[str, str | None]
+) -> ComplexArray:
     if "response" in columns:
-        return np.asarray(table.values(columns["response"]), dtype=np.complex128)
+        return table.numbers(columns["response"], complex_too=True)
     if "real" in columns:
         return table.numbers(columns["real"]) + 1j * table.numbers(columns["imag"])
-    magnitude = _magnitude(table, columns["magnitude"], units.magnitude)
-    phase = _phase(table, columns["phase"], units.phase)
+    magnitude = _magnitude(table, columns["magnitude"], units["magnitude"])
+    phase = _phase(table, columns["phase"], units["phase"])
     return np.asarray(magnitude * np.exp(1j * phase), dtype=np.complex128)
 
 

@@ -15,10 +15,12 @@ MAX_HEAD_LINES = 1000
 _MOST_JOINED = 10
 """Largest number of lines of a quoted cell; a quote that is not closed by then is a stray one."""
 
-_LINE = re.compile(r"([^\r\n]*)(\r\n|\n|\r|$)")
-_START = rf"(^|[{''.join(DELIMITERS).strip(' ')}\r\n]) *"
-_QUOTED = re.compile(rf'{_START}"(?:[^"]|"")*"(?!")')
-_OPEN = re.compile(rf'{_START}"')
+_END = r"(?:\r\n|\n|\r)"
+_BETWEEN = "".join(DELIMITERS).strip(" ")
+_INSIDE = r'(?:[^"\r\n]++|"")*+'
+_QUOTED = rf'(?<![^{_BETWEEN}\r\n]) *"{_INSIDE}(?:{_END}{_INSIDE}){{0,{_MOST_JOINED - 1}}}+"'
+_QUOTING = re.compile(rf"((?:{_QUOTED}|[{_BETWEEN}]|[^{_BETWEEN}\r\n]++)*+)({_END}|$)")
+_LINE = re.compile(rf"([^\r\n]*)({_END}|$)")
 
 
 @dataclass(frozen=True)
@@ -39,40 +41,18 @@ def head_lines(path: Path, head: bytes, encoding: str, skip: int) -> list[Line]:
         text = codecs.getincrementaldecoder(encoding)("replace").decode(head)
     except (UnicodeError, ValueError) as error:
         raise FileFormatError(f"{path} is not text in {encoding}: {error}") from error
-    found = list(_LINE.finditer(text))
-    # the last match is empty, after the last line end, or a line without one
-    lines = [Line(one[1], number, one.start()) for number, one in enumerate(found[:-1])]
+    lines, number, start = [], 0, 0
+    while start < len(text):
+        found = (_LINE if number < skip else _QUOTING).match(text, start)
+        assert found is not None  # a line may have no end
+        lines.append(Line(found[1], number, start))
+        number, start = number + len(re.findall(_END, found[0])), found.end()
     if len(head) == HEAD_BYTES:
-        if lines and found[len(lines) - 1][2] == "":
+        if lines and not text.endswith(("\n", "\r")):
             lines.pop()  # incomplete
         if not lines:
             raise FileFormatError(
                 f"the first line of {path} is longer than {HEAD_BYTES} bytes; expected a "
                 "table with one row per sample"
             )
-    return _joined(lines[:MAX_HEAD_LINES], skip, text)
-
-
-def _joined(lines: list[Line], skip: int, text: str) -> list[Line]:
-    """Join lines that are one cell."""
-    if not any('"' in line.text for line in lines[skip:]):
-        return lines
-    out = lines[:skip]
-    at = skip
-    while at < len(lines):
-        last = at
-        if _stays_open(lines[at].text):
-            for stop in range(at + 1, min(at + _MOST_JOINED, len(lines))):
-                whole = text[lines[at].start : lines[stop].start + len(lines[stop].text)]
-                if not _stays_open(whole):
-                    last = stop
-                    break
-        end = lines[last].start + len(lines[last].text)
-        out.append(Line(text[lines[at].start : end], lines[at].number, lines[at].start))
-        at = last + 1
-    return out
-
-
-def _stays_open(line: str) -> bool:
-    """Whether a quoted cell is not closed within a line; a quote inside a cell is doubled."""
-    return bool(_OPEN.search(_QUOTED.sub(r"\1", line)))
+    return lines[:MAX_HEAD_LINES]

@@ -4,40 +4,13 @@ from __future__ import annotations
 
 import inspect
 import os
-from collections.abc import Sequence
-from functools import cached_property
-from pathlib import Path
-from types import SimpleNamespace
+from collections.abc import Mapping, Sequence
 from typing import Any, Literal
 
-import numpy as np
-
-from .._checks import one_of, positive
 from ..data import Record
-from ..data.samples import Samples
-from ..errors import DataError, OptionError, TimeAxisError
 from .checks import MAX_BYTES
 from .columns import Selector, find_columns
-from .read import read_table
-from .signals.advice import explained
-from .signals.long_format import long_table, tags_as_columns
-from .signals.names import choose_columns
-from .signals.quality import Rules, rules_of
-from .signals.samples import (
-    check_part,
-    labels_of,
-    long_samples,
-    span_of,
-    wide_axis,
-    wide_samples,
-)
-from .tables import Table
-from .text_options import TextOptions
-from .time_column import Clock, time_axis
-
-_JUMP = 10.0
-"""Length of a jump of time that separates two tests, in usual steps; missing samples of one test
-leave shorter gaps, and tests are mostly hours apart."""
+from .signals.reading import Reading, record_of, tests_in
 
 
 def read_record(
@@ -202,9 +175,8 @@ def read_record(
     >>> record
     <Record 'valve': 3 samples of 0.01 s, 1 input, 1 output>
     """
-    how = _Reading(**{key: value for key, value in locals().items() if key != "path"})
-    table = read_table(path, how.text, variable=variable, max_bytes=max_bytes)
-    return _record(table, how, Path(path).stem if name is None else name)
+    how = Reading(**locals())
+    return record_of(how.table(), how, how.label)
 
 
 def read_records(
@@ -248,126 +220,17 @@ def read_records(
     >>> [record.name for record in records]
     ['tests up', 'tests down']
     """
-    given = inspect.signature(read_record).bind(path, **options)
-    given.apply_defaults()
-    how = _Reading(**{name: value for name, value in given.arguments.items() if name != "path"})
-    table = read_table(path, how.text, variable=how.variable, max_bytes=how.max_bytes)
-    label = Path(path).stem if how.name is None else how.name
+    how = asked(path, options)
+    table = how.table()
     taken = [] if by is None else find_columns(table, by, "by")
     return [
-        _record(table.rows(rows, range(len(table.columns))), how, f"{label} {value}", taken)
-        for value, rows in _tests(table, how, taken)
+        record_of(table.rows(rows, range(len(table.columns))), how, f"{how.label} {value}", taken)
+        for value, rows in tests_in(table, how, taken)
     ]
 
 
-class _Reading(SimpleNamespace):
-    """Arguments of `read_record` by their names, checked."""
-
-    def __init__(self, **given: Any) -> None:
-        super().__init__(**given)
-        self.treatment = one_of(self.missing, "missing", ("auto", "refuse", "keep", "hold"))
-        if self.dt is not None:
-            positive(self.dt, "dt", "sample time in s")
-        if self.wrap:
-            positive(self.wrap, "wrap", "number of values of a counter")
-        if self.treatment not in ("refuse", "auto") and self.resample:
-            raise OptionError(
-                f"missing={self.missing!r} and resample=True exclude each other: expected one of "
-                "them"
-            )
-        if self.rest is not None and (
-            isinstance(self.rest, str) or np.shape(self.rest)[:1] != (2,)
-        ):
-            raise OptionError(f"rest={self.rest!r}; expected input and output in the steady state")
-        _ = self.text, self.rules  # which are checked as well
-
-    @property
-    def clock(self) -> Clock:
-        """How to read time."""
-        return Clock(self.time_unit, self.time_format, self.time_zone)
-
-    @cached_property
-    def text(self) -> TextOptions:
-        """How to read text."""
-        return TextOptions(
-            self.delimiter,
-            self.decimal,
-            self.encoding,
-            self.comment,
-            self.header,
-            self.skip_rows,
-            self.thousands,
-        )
-
-    @cached_property
-    def rules(self) -> Rules:
-        """What counts as a missing sample."""
-        kept = self.treatment != "refuse" and not self.resample
-        return rules_of(kept, self.na_values, self.quality, self.good)
-
-
-def _record(table: Table, how: _Reading, name: str, taken: Sequence[int] = ()) -> Record:
-    """Make a record of a table; columns that are `taken` are no signals."""
-    samples, labels = _samples(table, how, taken)
-    labels["name"] = name
-    samples, treatment = samples.without_turns(table.path, how.wrap), how.treatment
-    try:
-        if treatment == "auto" and not how.resample:
-            samples, treatment = samples.as_found(table.path)
-        record = samples.record(labels, treatment=treatment, resample=how.resample)
-    except TimeAxisError as error:
-        raise TimeAxisError(explained(error, table, samples)) from error
-    except DataError as error:
-        raise DataError(f"{table.path}: {error}") from error
-    return record if how.rest is None else record.with_baseline(*how.rest)
-
-
-def _samples(table: Table, how: _Reading, taken: Sequence[int]) -> tuple[Samples, dict[str, Any]]:
-    """Samples and their labels."""
-    long = long_table(table, how.time, (how.input, how.output, how.reference))
-    if long is not None:
-        axis = time_axis(table, long.time, how.clock, long.date)
-        tags = tags_as_columns(table, long)
-        parts = choose_columns(tags, None, how.input, how.output, 1.0, (), how.reference, how.mode)
-        span = span_of(how.start, how.stop, axis)
-        samples = long_samples(table, long, parts, axis, span, how.rules)
-        check_part(table.path, span, samples.time, axis)
-        return samples, labels_of(tags, parts, axis.unit)
-    taken = [*taken, *how.rules.columns(table)]
-    parts = choose_columns(
-        table, how.time, how.input, how.output, how.dt, taken, how.reference, how.mode
-    )
-    axis, rows = wide_axis(table, parts, how.clock)
-    span = span_of(how.start, how.stop, axis)
-    inside = (axis.seconds >= span[0]) & (axis.seconds <= span[1])
-    check_part(table.path, span, axis.seconds[inside], axis)
-    samples = wide_samples(table, parts, axis.seconds[inside], rows[inside], how.rules)
-    return samples, labels_of(table, parts, axis.unit)
-
-
-def _tests(
-    table: Table, how: _Reading, separating: Sequence[int]
-) -> list[tuple[str, np.ndarray[Any, np.dtype[np.intp]]]]:
-    """Name and rows of each test."""
-    if separating:
-        cells = [str(cell).strip() for cell in table.columns[separating[0]].cells]
-        rows: dict[str, list[int]] = {}
-        for row, cell in enumerate(cells):
-            rows.setdefault(cell, []).append(row)
-        rows.pop("", None)
-        return [(value, np.array(found)) for value, found in rows.items()]
-    taken = how.rules.columns(table)
-    parts = choose_columns(table, how.time, how.input, how.output, how.dt, taken)
-    if parts.time is None:
-        raise OptionError(
-            f"{table.path} has no time whose jumps would separate tests; give by=, the column "
-            "that tells them apart"
-        )
-    seconds = time_axis(table, parts.time, how.clock, parts.date).seconds
-    steps = np.diff(seconds)
-    if np.sum(steps < 0) > steps.size / 2:  # the newest sample comes first
-        steps = -steps
-    usual = float(np.median(np.abs(steps))) if steps.size else 0.0
-    cuts = np.flatnonzero((steps < 0) | (steps > _JUMP * usual)) + 1
-    groups = np.split(np.arange(seconds.size), cuts)
-    return [(str(number), rows) for number, rows in enumerate(groups, start=1)]
+def asked(path: str | os.PathLike[str], options: Mapping[str, Any]) -> Reading:
+    """Return the arguments of `read_record`, checked."""
+    given = inspect.signature(read_record).bind(path, **options)
+    given.apply_defaults()
+    return Reading(**given.arguments)

@@ -98,7 +98,8 @@ class Table:
         keep_missing: bool = False,
         words: frozenset[str] = frozenset(),
         ignored: BoolArray | None = None,
-    ) -> FloatArray:
+        complex_too: bool = False,
+    ) -> np.ndarray[Any, np.dtype[Any]]:
         """Return a column as finite real numbers; missing ones are refused, or become NaN.
 
         Parameters
@@ -109,59 +110,36 @@ class Table:
             Further words and numbers that stand for a missing value.
         ignored : ndarray of bool, shape (N,), optional
             Cells that become NaN, whatever they are.
+        complex_too : bool, optional
+            Allow complex numbers.
 
         Raises
         ------
         DataError
             A cell is not a finite number; the message names the first one.
         """
-        values = self.values(index, keep_missing=keep_missing, words=words, ignored=ignored)
-        if np.iscomplexobj(values):
+        cells = self.columns[index].cells
+        skipped = np.zeros(cells.size, dtype=bool) if ignored is None else ignored
+        if cells.dtype.kind in "biufc":
+            standing = [float(word) for word in words if NUMBER["."].fullmatch(word)]
+            values, missing = cells, np.isnan(cells) | np.isin(cells, standing)
+        else:
+            values, missing = self._parsed(index, words, skipped)
+        bad = ~(np.isfinite(values) & ~missing | skipped)
+        if keep_missing:
+            bad &= ~missing
+        if bad.any():
+            row = int(np.argmax(bad))
+            self._refuse(index, row, missing=missing[row], infinite=np.isinf(values[row]))
+        if np.iscomplexobj(values) and not complex_too:
             raise DataError(f"{self.path}: {self.title(index)} is complex; expected real numbers")
-        return np.asarray(values, dtype=np.float64)
-
-    def values(
-        self,
-        index: int,
-        *,
-        keep_missing: bool = False,
-        words: frozenset[str] = frozenset(),
-        ignored: BoolArray | None = None,
-    ) -> np.ndarray[Any, np.dtype[Any]]:
-        """Return a column as finite numbers, real or complex."""
-        cells = self.columns[index].cells
-        if cells.dtype.kind not in "biufc":
-            cells = self._parsed(index, keep_missing, words, ignored)
-        elif words or (ignored is not None and ignored.any()):
-            cells = self._without(index, keep_missing, words, ignored)
-        finite = ~np.isinf(cells) if keep_missing else np.isfinite(cells)
-        if ignored is not None:
-            finite |= ignored
-        if not finite.all():
-            row = int(np.argmin(finite))
-            raise DataError(
-                f"{self.path}: {self.title(index)}, {self.place(row)}: {cells[row]} is not "
-                "finite (or too large for double precision)"
-            )
-        return cells
-
-    def _without(
-        self, index: int, keep_missing: bool, words: frozenset[str], ignored: BoolArray | None
-    ) -> np.ndarray[Any, np.dtype[Any]]:
-        """Numbers with NaN for those that stand for a missing value."""
-        cells = self.columns[index].cells
-        standing = [float(word) for word in words if NUMBER["."].fullmatch(word)]
-        missing = np.isin(cells, standing)
-        if missing.any() and not keep_missing:
-            row = int(np.argmax(missing))
-            self._refuse(index, row, f"{cells[row]:g}", missing=True)
-        if ignored is not None:
-            missing |= ignored
-        return np.where(missing, np.nan, cells)
+        kind = np.complex128 if complex_too else np.float64
+        return np.where(missing | skipped, np.nan, values).astype(kind)
 
     def _parsed(
-        self, index: int, keep_missing: bool, words: frozenset[str], ignored: BoolArray | None
-    ) -> FloatArray:
+        self, index: int, words: frozenset[str], skipped: BoolArray
+    ) -> tuple[FloatArray, BoolArray]:
+        """Numbers of a column of text, NaN for other cells, and which of them have no value."""
         import pandas as pd
 
         # cells that are equal are read once
@@ -169,22 +147,16 @@ class Table:
         place, kinds = pd.factorize(np.array(texts, dtype=object))
         low = [kind[:_LONGEST_WORD].lower() for kind in kinds]
         missing = MISSING | BAD_VALUES | {word.strip().lower() for word in words}
-        empty = np.array([word in missing for word in low], dtype=bool)
-        positions = self._positions(set(low) - missing)
+        # positions of a switch, if the cells hold nothing else
+        others = set(low) - missing
+        positions = STATES if others <= STATES.keys() else {}
         parts = [measured(positions.get(word, kind)) for word, kind in zip(low, kinds, strict=True)]
-        good = np.array([NUMBER[self.decimal].fullmatch(one) for one, _ in parts], dtype=bool)
-        good &= ~empty
-        bad = ~(good | empty)[place] if keep_missing else ~good[place]
-        if ignored is not None:
-            bad &= ~ignored
-        if bad.any():
-            row = int(np.argmax(bad))
-            self._refuse(index, row, kinds[place[row]], missing=bool(empty[place[row]]))
-        values = np.full(len(kinds), np.nan)
-        values[good] = [number_of(parts[k][0], self.decimal) for k in np.flatnonzero(good)]
-        found = values[place] if ignored is None else np.where(ignored, np.nan, values[place])
-        self._check_units(index, np.array([unit for _, unit in parts], dtype=object)[place], found)
-        return np.asarray(found)
+        empty = np.array([word in missing for word in low], dtype=bool)
+        found = np.array([number_of(one, self.decimal) for one, _ in parts], dtype=np.float64)
+        values = np.where(empty, np.nan, found)[place]
+        units = np.array([unit for _, unit in parts], dtype=object)[place]
+        self._check_units(index, units, np.where(skipped, np.nan, values))
+        return values, empty[place]
 
     def _check_units(
         self, index: int, units: np.ndarray[Any, np.dtype[Any]], values: FloatArray
@@ -205,20 +177,16 @@ class Table:
                 "spreadsheet: one number format for the column)"
             )
 
-    @staticmethod
-    def _positions(found: set[str]) -> Mapping[str, str]:
-        """Numbers of the positions of a switch, if the cells hold nothing else."""
-        return STATES if found and found <= STATES.keys() else {}
-
-    def _refuse(self, index: int, row: int, text: str, *, missing: bool) -> NoReturn:
-        what = "a value is missing" if missing else "is not a number"
+    def _refuse(self, index: int, row: int, *, missing: bool, infinite: bool) -> NoReturn:
+        text = str(self.columns[index].cells[row]).strip()
         advice = "; try decimal=',' or '.'" if "," in text or "." in text else ""
         if "," in text and "." in text:
             advice = f"; thousands={min(',.', key=text.find)!r} if it separates thousands"
-        if missing:
-            advice = "; missing='keep' keeps gaps in a record"
-        elif not advice and not any(letter.isdigit() for letter in text):
+        if not advice and not any(letter.isdigit() for letter in text):
             advice = f"; na_values={text[:60]!r} if it stands for a missing value"
-        raise DataError(
-            f"{self.path}: {self.title(index)}, {self.place(row)}: {text[:60]!r}: {what}{advice}"
-        )
+        what = f"{text[:60]!r}: is not a number{advice}"
+        if infinite:
+            what = f"{text[:60]} is not finite (or too large for double precision)"
+        elif missing:
+            what = f"{text[:60]!r}: a value is missing; missing='keep' keeps gaps in a record"
+        raise DataError(f"{self.path}: {self.title(index)}, {self.place(row)}: {what}")

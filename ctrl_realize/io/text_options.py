@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from typing import Any, Self
 
 from .._checks import integer
 from ..errors import OptionError
@@ -22,6 +24,11 @@ class TextOptions:
     header: bool | str = "auto"
     skip_rows: int = 0
     thousands: str | None = "auto"
+
+    @classmethod
+    def among(cls, given: Mapping[str, Any]) -> Self:
+        """Return those among the arguments of a reading function."""
+        return cls(**{one.name: given[one.name] for one in fields(cls) if one.name in given})
 
     @property
     def notations(self) -> list[str]:

@@ -7,6 +7,7 @@ import pytest
 from numpy.testing import assert_array_equal
 
 import ctrl_realize as cr
+from ctrl_realize.cli import main
 from ctrl_realize.errors import DataError, OptionError
 
 TIME = np.arange(6.0)
@@ -99,3 +100,14 @@ def test_codes_of_modes_that_are_not_known_are_not_guessed(tmp_path):
 def test_one_set_point_for_each_output(tmp_path):
     with pytest.raises(OptionError, match="one for each of 1 outputs"):
         read(tmp_path, LOOP, output="TIC1.PV", reference=["TIC1.SP", "TIC1.MODE"])
+
+
+@pytest.mark.parametrize("text", [LOOP, HISTORIAN])
+def test_the_preview_of_a_file_names_set_point_and_mode(tmp_path, capsys, text):
+    file = tmp_path / "loop.csv"
+    file.write_text(text)
+    assert main(["look", str(file)]) == 0
+    uses = {"SP": "set point", "PV": "output", "OP": "input", "MODE": "mode"}
+    lines = capsys.readouterr().out.splitlines()
+    for tag, use in uses.items():
+        assert next(line for line in lines if f"TIC1.{tag} " in line).endswith(use)

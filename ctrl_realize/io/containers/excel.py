@@ -6,13 +6,13 @@ headers, units, dates and bad cells follow the same rules.
 
 from __future__ import annotations
 
-import csv
 import datetime
-import io
 import zipfile
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 from ...errors import FileFormatError, OptionError
 from ..checks import MAX_COLUMNS, check_size, package_for, told_if_damaged
@@ -75,18 +75,14 @@ def sheet_as_text(path: Path, name: str | None, max_bytes: float) -> TextSource:
 
 def _text(path: Path, rows: Iterable[Iterable[Any]]) -> str:
     """Rows as lines of tab-separated cells, without columns that are empty throughout."""
-    table = [[_cell(cell) for cell in row] for row in rows]
-    while table and not any(table[-1]):
-        table.pop()
-    width = max(map(len, table), default=0)
-    if width > MAX_COLUMNS:
-        raise FileFormatError(f"{path} has {width} columns, the limit is {MAX_COLUMNS}")
-    table = [row + [""] * (width - len(row)) for row in table]
-    used = [k for k in range(width) if any(row[k] for row in table)]
-    out = io.StringIO()
-    writer = csv.writer(out, delimiter="\t", lineterminator="\n")
-    writer.writerows([row[k] for k in used] for row in table)
-    return out.getvalue()
+    import pandas as pd
+
+    table = pd.DataFrame([[_cell(cell) for cell in row] for row in rows], dtype=object).fillna("")
+    if table.shape[1] > MAX_COLUMNS:
+        raise FileFormatError(f"{path} has {table.shape[1]} columns, the limit is {MAX_COLUMNS}")
+    rows, columns = np.nonzero(np.asarray(table != ""))
+    used = table.iloc[: rows.max(initial=-1) + 1, np.unique(columns)]
+    return used.to_csv(sep="\t", header=False, index=False, lineterminator="\n")
 
 
 def _cell(cell: Any) -> str:
@@ -94,18 +90,10 @@ def _cell(cell: Any) -> str:
     value = cell.value
     if value is None:
         return ""
-    if isinstance(value, bool):
-        return "TRUE" if value else "FALSE"
-    if isinstance(value, int | float):
-        # what is shown as 20 % is stored as 0.2
-        if "%" in str(cell.number_format):
-            return f"{100 * value:.15g}%"
-        return repr(value)
-    if isinstance(value, datetime.datetime):
-        midnight = value.time() == datetime.time()
-        return value.date().isoformat() if midnight else value.isoformat(" ")
-    if isinstance(value, datetime.date | datetime.time):
-        return value.isoformat()
+    if isinstance(value, int | float) and "%" in str(cell.number_format):
+        return f"{100 * value:.15g}%"  # what is shown as 20 % is stored as 0.2
+    if isinstance(value, datetime.datetime) and value.time() == datetime.time():
+        value = value.date()
     if isinstance(value, datetime.timedelta):
         minutes, seconds = divmod(value.total_seconds(), 60)
         return f"{int(minutes) // 60}:{int(minutes) % 60:02}:{seconds:09.6f}"

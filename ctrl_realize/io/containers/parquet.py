@@ -130,22 +130,19 @@ def _first(file: Any, field: pa.Field, count: int) -> Iterator[Any]:
 
 def _cells(values: Any) -> AnyArray:
     """Convert a column of Arrow to an array; integers with gaps become floats with NaN."""
+    import pandas as pd
     import pyarrow as pa
     import pyarrow.types as kinds
 
     if kinds.is_decimal(values.type):
         values = values.cast(pa.float64())
+    found = values.to_pandas()
     if not kinds.is_dictionary(values.type):
-        return np.asarray(values.to_pandas())
-    parts = [values] if isinstance(values, pa.Array) else values.chunks
+        return np.asarray(found)
     # one object for all cells with the same text; the last entry is for empty cells
-    found = [
-        np.array([*part.dictionary.to_pylist(), None], dtype=object)[
-            part.indices.fill_null(len(part.dictionary)).to_numpy(zero_copy_only=False)
-        ]
-        for part in parts
-    ]
-    return np.concatenate(found) if found else _NOTHING
+    texts = pd.Categorical(found)
+    cells: AnyArray = np.array([*texts.categories, None], dtype=object)[texts.codes]
+    return cells
 
 
 def _kind(of: pa.DataType) -> str:

@@ -218,7 +218,7 @@ def _shows_time(column: Column) -> bool:
 def _values(table: Table, index: int) -> FloatArray:
     """Numbers of a column without missing ones; none if it has other cells."""
     try:
-        values = table.numbers(index, keep_missing=True)
+        values: FloatArray = table.numbers(index, keep_missing=True)
     except DataError:
         return np.empty(0)
     return values[~np.isnan(values)]

@@ -32,7 +32,7 @@ import numpy as np
 
 from ...errors import DataError, DataWarning, OptionError, warn_caller
 from ...numerics.arrays import BoolArray, FloatArray
-from ..cells import BAD_VALUES, NUMBER
+from ..cells import BAD_VALUES, number_of
 from ..columns import find_column
 from ..tables import Table
 from ..units import split_unit
@@ -93,14 +93,14 @@ class Rules:
         values = table.numbers(
             index, keep_missing=self.keep, words=frozenset(self.missing), ignored=marked
         )
-        if not marked.any():
-            return values
-        warn_caller(
-            f"{title}: {np.sum(marked)} of {marked.size} samples are left out, since their quality "
-            f"is bad, the first in {table.place(int(np.argmax(marked)))}; quality=None keeps them",
-            DataWarning,
-        )
-        return np.where(marked, np.nan, values)
+        if marked.any():
+            first = table.place(int(np.argmax(marked)))
+            warn_caller(
+                f"{title}: {np.sum(marked)} of {marked.size} samples are left out, since their "
+                f"quality is bad, the first in {first}; quality=None keeps them",
+                DataWarning,
+            )
+        return values
 
     def _marked(self, table: Table, index: int) -> BoolArray:
         """Rows in which the quality of a column is bad."""
@@ -196,7 +196,7 @@ def _code(word: str) -> float:
     """Number of a code, decimal or hexadecimal; NaN if it is none."""
     if re.fullmatch(r"0x[0-9a-f]{1,8}", word):
         return float(int(word, 16))
-    return float(word) if NUMBER["."].fullmatch(word) else np.nan
+    return number_of(word, ".")
 
 
 def _bad_codes(codes: FloatArray) -> BoolArray | None:

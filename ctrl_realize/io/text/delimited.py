@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import codecs
+import math
 import re
-import warnings
 from itertools import islice
 from pathlib import Path
 from typing import Any
 
-from ...errors import DataWarning, FileFormatError
+from ...errors import DataWarning, FileFormatError, warn_caller
 from ..cells import NUMBER, number_of, split_line
 from ..tables import Column, Table
 from ..text_options import TextOptions
@@ -38,7 +38,7 @@ def read_delimited(source: TextSource, options: TextOptions) -> Table:
         frame = frame[frame[texts[0]] != layout.names[texts[0]]]
     cut = _cut_last_line(source, layout)
     if cut and len(frame) > 1:
-        warnings.warn(f"{path}: the last line is skipped: {cut}", DataWarning, stacklevel=4)
+        warn_caller(f"{path}: the last line is skipped: {cut}", DataWarning)
         # columns that are text only because of the incomplete line become numbers in Table.numbers
         frame = frame.iloc[:-1]
     while len(frame) and _is_blank(frame.iloc[-1]):
@@ -106,13 +106,10 @@ def _parse(source: TextSource, layout: TextLayout) -> Any:
 
 def _check_parsed(path: Path, layout: TextLayout, frame: Any) -> None:
     """Compare the parsed table with the lines of the file, so that no sample is lost silently."""
-    pattern = NUMBER[layout.decimal]
-    for column, cell in enumerate(layout.first_row[: frame.shape[1]]):
-        parsed = frame.iloc[0, column]
-        same = str(parsed).strip() == cell or not pattern.fullmatch(cell)
-        if not same and not isinstance(parsed, str):
-            same = float(parsed) == number_of(cell, layout.decimal)
-        if not same:
+    for cell, parsed in zip(layout.first_row, frame.iloc[0], strict=False):
+        number = number_of(cell, layout.decimal)
+        same = str(parsed).strip() == cell or math.isnan(number)
+        if not same and (isinstance(parsed, str) or float(parsed) != number):
             raise FileFormatError(
                 f"{path}: line {layout.first_line + 1} is the first data line, and its cell "
                 f"{cell!r} was read as {str(parsed)[:60]!r}; check its quotes and line ends"

@@ -1,0 +1,170 @@
+"""From the table in a file to its record, or to those of several tests."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from functools import cached_property
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+
+from ..._checks import one_of, positive
+from ...data import Record
+from ...data.samples import COARSE, Samples
+from ...errors import DataError, OptionError, TimeAxisError
+from ..read import read_table
+from ..tables import Table
+from ..text_options import TextOptions
+from ..time_column import Clock, time_axis
+from .long_format import LongTable, long_table, tags_as_columns
+from .names import Parts, choose_columns
+from .quality import Rows, Rules, rules_of
+from .samples import (
+    check_part,
+    labels_of,
+    long_samples,
+    span_of,
+    wide_axis,
+    wide_samples,
+)
+
+_JUMP = 10.0
+"""Length of a jump of time that separates two tests, in usual steps; missing samples of one test
+leave shorter gaps, and tests are mostly hours apart."""
+
+
+class Reading(SimpleNamespace):
+    """Arguments of `read_record` by their names, checked."""
+
+    def __init__(self, **given: Any) -> None:
+        super().__init__(**given)
+        self.treatment = one_of(self.missing, "missing", ("auto", "refuse", "keep", "hold"))
+        if self.dt is not None:
+            positive(self.dt, "dt", "sample time in s")
+        if self.wrap:
+            positive(self.wrap, "wrap", "number of values of a counter")
+        if self.treatment not in ("refuse", "auto") and self.resample:
+            raise OptionError(
+                f"missing={self.missing!r} and resample=True exclude each other: expected one of "
+                "them"
+            )
+        if self.rest is not None and (
+            isinstance(self.rest, str) or np.shape(self.rest)[:1] != (2,)
+        ):
+            raise OptionError(f"rest={self.rest!r}; expected input and output in the steady state")
+        self.text = TextOptions.among(given)
+        _ = self.rules  # which are checked as well
+
+    @property
+    def label(self) -> str:
+        """Name of the record."""
+        return Path(self.path).stem if self.name is None else str(self.name)
+
+    @property
+    def clock(self) -> Clock:
+        """How to read time."""
+        return Clock(self.time_unit, self.time_format, self.time_zone)
+
+    @cached_property
+    def rules(self) -> Rules:
+        """What counts as a missing sample."""
+        kept = self.treatment != "refuse" and not self.resample
+        return rules_of(kept, self.na_values, self.quality, self.good)
+
+    def table(self) -> Table:
+        """Read the file."""
+        return read_table(self.path, self.text, variable=self.variable, max_bytes=self.max_bytes)
+
+    def signals(self, table: Table) -> tuple[Table, LongTable | None]:
+        """Table with a column for each signal, and the rows of each in a long table."""
+        long = long_table(table, self.time, (self.input, self.output, self.reference))
+        return (table if long is None else tags_as_columns(table, long)), long
+
+    def parts(self, signals: Table, taken: Sequence[int] | None) -> Parts:
+        """Which column is what; `taken` are no signals, and None for those of a long table."""
+        time, dt = (None, 1.0) if taken is None else (self.time, self.dt)
+        return choose_columns(
+            signals, time, self.input, self.output, dt, taken or (), self.reference, self.mode
+        )
+
+
+def record_of(table: Table, how: Reading, name: str, taken: Sequence[int] = ()) -> Record:
+    """Make a record of a table; columns that are `taken` are no signals."""
+    samples, labels = _samples(table, how, taken)
+    labels["name"] = name
+    samples, treatment = samples.without_turns(table.path, how.wrap), how.treatment
+    try:
+        if treatment == "auto" and not how.resample:
+            samples, treatment = samples.as_found(table.path)
+        record = samples.record(labels, treatment=treatment, resample=how.resample)
+    except TimeAxisError as error:
+        raise TimeAxisError(_explained(error, table, samples)) from error
+    except DataError as error:
+        raise DataError(f"{table.path}: {error}") from error
+    return record if how.rest is None else record.with_baseline(*how.rest)
+
+
+@np.errstate(over="ignore", invalid="ignore")  # the largest doubles
+def _explained(error: TimeAxisError, table: Table, samples: Samples) -> str:
+    """Message of a fault of the time axis, with its place in the file and what helps."""
+    row = re.search(r"row (\d+)", str(error))
+    place = f" ({samples.place(int(row[1]))})" if row else ""
+    steps = np.diff(samples.time)
+    steps *= np.sign(np.median(steps)) or 1.0  # the newest sample may come first
+    # many repeated time stamps: the samples are faster than the resolution of the clock
+    if np.mean(steps == 0) > COARSE:
+        advice = "; the clock is coarser than the sample time, give dt= instead"
+    elif np.any(steps < 0):
+        advice = (
+            "; if the file has several tests, read them with read_records(path, by=); if the clock "
+            "was set for summer time, time_zone= is its zone, such as 'Europe/Berlin'"
+        )
+    else:
+        advice = (
+            "" if "missing=" in str(error) else "; missing='keep' takes the samples as they are"
+        )
+    return f"{table.path}{place}: {error}{advice}"
+
+
+def _samples(table: Table, how: Reading, taken: Sequence[int]) -> tuple[Samples, dict[str, Any]]:
+    """Samples and their labels."""
+    signals, long = how.signals(table)
+    if long is not None:
+        axis = time_axis(table, long.time, how.clock, long.date)
+        parts = how.parts(signals, None)
+        span = span_of(how.start, how.stop, axis)
+        samples = long_samples(table, long, parts, axis, span, how.rules)
+        check_part(table.path, span, samples.time, axis)
+        return samples, labels_of(signals, parts, axis.unit)
+    parts = how.parts(table, [*taken, *how.rules.columns(table)])
+    axis, rows = wide_axis(table, parts, how.clock)
+    span = span_of(how.start, how.stop, axis)
+    inside = (axis.seconds >= span[0]) & (axis.seconds <= span[1])
+    check_part(table.path, span, axis.seconds[inside], axis)
+    samples = wide_samples(table, parts, axis.seconds[inside], rows[inside], how.rules)
+    return samples, labels_of(table, parts, axis.unit)
+
+
+def tests_in(table: Table, how: Reading, separating: Sequence[int]) -> list[tuple[str, Rows]]:
+    """Name and rows of each test."""
+    if separating:
+        cells = np.array([str(cell).strip() for cell in table.columns[separating[0]].cells])
+        values = [value for value in dict.fromkeys(cells.tolist()) if value]
+        return [(value, np.flatnonzero(cells == value)) for value in values]
+    parts = how.parts(table, how.rules.columns(table))
+    if parts.time is None:
+        raise OptionError(
+            f"{table.path} has no time whose jumps would separate tests; give by=, the column "
+            "that tells them apart"
+        )
+    seconds = time_axis(table, parts.time, how.clock, parts.date).seconds
+    steps = np.diff(seconds)
+    if np.sum(steps < 0) > steps.size / 2:  # the newest sample comes first
+        steps = -steps
+    usual = float(np.median(np.abs(steps))) if steps.size else 0.0
+    cuts = np.flatnonzero((steps < 0) | (steps > _JUMP * usual)) + 1
+    groups = np.split(np.arange(seconds.size), cuts)
+    return [(str(number), rows) for number, rows in enumerate(groups, start=1)]
