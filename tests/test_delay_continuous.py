@@ -11,7 +11,7 @@ from scipy.optimize import brentq
 from scipy.special import lambertw
 
 import ctrl_realize as cr
-from ctrl_realize.errors import DelayRangeError, ModelWarning
+from ctrl_realize.errors import DelayRangeError, ModelWarning, UnsuitableSystemError
 
 LAG = ct.tf([1], [1, 1])
 OMEGA = np.geomspace(0.01, 200, 30)
@@ -307,6 +307,80 @@ def test_sampling_a_loop_states_its_error():
     assert errors[2] < errors[0] / 12
     with pytest.raises(DelayRangeError, match=r"whole samples.*choose dt"):
         loop.to_discrete(0.07)
+
+
+COUPLED = ct.ss(
+    [[-1, 0.4, 0], [0, -2, 0.7], [-0.5, 0, -3]],
+    [[1, 0], [0, 1], [0.3, 0.2]],
+    [[1, 0, 0.5], [0, 1, -0.2]],
+    np.zeros((2, 2)),
+)
+
+
+def ends(before, behind):
+    """Two inputs and outputs, each with its own delay."""
+    late = [np.diag([1.0, 0.0]) * cr.delay(a) + np.diag([0.0, 1.0]) * cr.delay(b)
+            for a, b in (before, behind)]  # fmt: skip
+    return late[1] * cr.DelaySystem(COUPLED) * late[0]
+
+
+def pairs(delays):
+    """A lag behind its own dead time for each pair of channels."""
+    e = np.eye(2)
+    return sum(
+        e[:, [i]] * (ct.tf([1 + i - 2 * j], [1 + i + 0.5 * j, 1]) * cr.delay(delays[i][j])) * e[[j]]
+        for i in range(2)
+        for j in range(2)
+    )
+
+
+UNEQUAL = {
+    "whole samples at both ends": ends((0.3, 0.5), (0, 0.2)),
+    "fractions at the inputs": ends((0.33, 0.57), (0.1, 0.2)),
+    "fractions at the outputs": ends((0.3, 0.5), (0.04, 0.21)),
+    "one fraction at all outputs": ends((0.33, 0.57), (0.14, 0.24)),
+    "one fraction at all inputs": ends((0.33, 0.53), (0.14, 0.21)),
+    "a delay for each pair": pairs([[0.3, 0.5], [0.7, 0.2]]),
+    "a fraction for each pair": pairs([[0.33, 0.51], [0.77, 0.26]]),
+    "a sum of outputs": np.array([[1, 0], [0, 1], [0, 0]]) * P1
+    + np.array([[0, 0], [0, 0], [1, 1]]) * cr.delay(0.42) * LAG,
+    "one input, two outputs": np.array([[1], [2]]) * P1
+    + np.array([[0], [1]]) * cr.delay(0.55) * P2,
+    "an output beside its echo": (np.ones((2, 1)) + np.array([[0], [1]]) * cr.delay(0.42)) * LAG,
+    "paths of one plant": P1 + 3 * LAG * cr.delay(0.87),
+}
+
+
+@pytest.mark.parametrize("case", UNEQUAL)
+def test_channels_with_delays_of_their_own_are_sampled_exactly_and_converted_back(case):
+    plant, dt = UNEQUAL[case], 0.1
+    t = np.arange(0, 5, dt)
+    sampled = plant.to_discrete(dt)
+    at_samples = sampled.step_response(t).outputs
+    assert_allclose(at_samples, plant.step_response(t).outputs, atol=1e-10)
+    if isinstance(sampled, cr.DelayedStateSpace):
+        model = cr.design.to_continuous(sampled)
+        back, again = model.system, cr.design.to_discrete(model)
+        total = np.add.outer(model.output_delays, model.input_delays)
+        assert_allclose(np.broadcast_to(model.dead_time, total.shape), total)
+    else:
+        back = sampled.to_continuous()
+        again = back.to_discrete(dt)
+    # the same system, not only the same samples
+    assert_allclose(back(1j * OMEGA), plant(1j * OMEGA), atol=1e-12)
+    assert_allclose(again.step_response(t).outputs, at_samples, atol=1e-12)
+
+
+def test_what_has_no_exact_conversion_is_refused():
+    with pytest.raises(DelayRangeError, match=r"different fractions.*both ends; choose dt"):
+        ends((0.33, 0.57), (0.13, 0.24)).to_discrete(0.1)
+    with pytest.raises(UnsuitableSystemError, match=r"direct feedthrough.*3\.5 samples"):
+        (ct.tf([1, 2], [1, 1]) * cr.delay(0.35)).to_discrete(0.1)
+    loop = ct.feedback(P1.to_discrete(0.1))
+    with pytest.raises(UnsuitableSystemError, match="a loop that is closed in discrete time"):
+        loop.to_continuous()
+    with pytest.raises(UnsuitableSystemError, match="already continuous"):
+        P1.to_continuous()
 
 
 @pytest.mark.parametrize("order", [4, 8])

@@ -85,8 +85,8 @@ def to_matlab(
         text = _process(system, identifier(name or "plant", "plant", CALLED))
     elif isinstance(system, ContinuousModel):
         variable = identifier(name or str(system.core.name), "plant", CALLED)
-        delays = [system.dead_time] * system.core.ninputs
-        text = _state_space(system.core, str(system.core.name), variable, "0", delays, [])
+        delays = list(system.input_delays), list(system.output_delays)
+        text = _state_space(system.core, str(system.core.name), variable, "0", *delays)
     elif isinstance(system, DelayedStateSpace):
         variable = identifier(name or str(system.name), "plant", CALLED)
         text = _state_space(

@@ -13,9 +13,9 @@ from ...errors import DelayRangeError, ModelWarning, OptionError, UnsuitableSyst
 from ...numerics.arrays import FloatArray
 from ...numerics.internal_delays import form as forms
 from ...numerics.internal_delays.form import DelayForm
-from ...numerics.internal_delays.merging import ends_apart
+from ...numerics.internal_delays.merging import ends_apart, paths_apart
 from ...numerics.state_space.fractional_delay import pade_ladder
-from ...numerics.state_space.sampling import sample_with_dead_time, split_dead_time
+from ...numerics.state_space.sampling import continuous_ends, sample_ends, split_dead_time
 from ..operands import plain
 from ..operators import DelayOperators
 
@@ -72,10 +72,11 @@ class InsideConversions(DelayOperators):
     def to_discrete(self, dt: float) -> Any:
         """Zero-order-hold equivalent.
 
-        Exact for delays at the inputs, as in a plant with dead time, or at the outputs. The delay
-        of a system with one input and one output need not be a whole number of samples. A loop
-        with dead time has no exact sampled model of finite order: the signals at the inputs of its
-        delays are interpolated linearly between samples, and a warning states the error.
+        Exact for delays at the inputs, as in a plant with dead time, at the outputs, or in parallel
+        paths, each of its own and not necessarily of whole samples; fractions of a sample may be
+        left at inputs or at outputs. A loop with dead time has no exact sampled model of finite
+        order: the signals at the inputs of its delays are interpolated linearly between samples,
+        and a warning states the error.
 
         Parameters
         ----------
@@ -89,7 +90,8 @@ class InsideConversions(DelayOperators):
         Raises
         ------
         DelayRangeError
-            Delays in a loop or of several channels that are not whole samples.
+            Delays in a loop that are not whole samples, or different fractions of a sample at
+            several inputs as well as several outputs.
         UnsuitableSystemError
             A discrete system, or a fractional delay with direct feedthrough.
 
@@ -109,10 +111,10 @@ class InsideConversions(DelayOperators):
         if self.dt:
             raise UnsuitableSystemError(f"{self.name!r} is already discrete")
         step = positive(dt, "dt", "sample time in s")
-        before, behind, rest = ends_apart(self._form())
         names = self.input_labels, self.output_labels
-        if rest.inputs == rest.outputs == 1 and not rest.delays:
-            return self._sampled_single(rest, before[0] + behind[0], step)
+        if (paths := paths_apart(self._form())) is not None:
+            return self._joined(_paths_sampled(*paths, step), step, *names)
+        before, behind, rest = ends_apart(self._form())
         rest = _held_apart(rest)
         whole_ones = [_samples(tau, step) for tau in (*before, *behind, *rest.delays)]
         inputs = rest.inputs
@@ -129,6 +131,48 @@ class InsideConversions(DelayOperators):
         if not all(held):
             self._state_error(made, step)
         return made
+
+    def to_continuous(self) -> Any:
+        """Invert `to_discrete`, for a discrete system without delays in loops.
+
+        Each delay in a path of its own is converted with the core, see `design.to_continuous`,
+        which is for systems with delays at inputs and outputs alone.
+
+        Returns
+        -------
+        DelaySystem
+            Continuous; sampled with its hold it is this system.
+
+        Raises
+        ------
+        UnsuitableSystemError
+            A continuous system, or one with a delay in a loop: what is between the samples of a
+            loop that is closed in discrete time no continuous system has. A pole at z = 0 or on the
+            negative real axis.
+
+        Examples
+        --------
+        >>> import control as ct
+        >>> import ctrl_realize as cr
+        >>> plant = ct.tf([1], [0.08, 1]) * cr.delay(0.02) + ct.tf([2], [0.3, 1]) * cr.delay(0.055)
+        >>> plant.to_discrete(0.01).to_continuous()
+        <DelaySystem: u -> y, order 2, internal delays 0.02, 0.055 s, continuous>
+        """
+        if not self.dt:
+            raise UnsuitableSystemError(f"{self.name!r} is already continuous")
+        if (paths := paths_apart(self._form())) is None:
+            raise UnsuitableSystemError(
+                f"{self.name!r} has delays in a loop that is closed in discrete time, which no "
+                "continuous system has; convert the plant, cr.design.to_continuous(plant).system, "
+                "and close the loop around it"
+            )
+        core, before, behind, left, right = paths
+        check_logarithm(core.A)
+        whole = [[int(tau) for tau in end] for end in (before, behind)]
+        matrices = core.A, core.B, core.C, core.D
+        found, entry, exit_ = continuous_ends(matrices, float(self.dt), *whole)
+        made = forms.through(forms.delayed_ends(*found, entry, exit_), left, right)
+        return self._joined(made, 0, self.input_labels, self.output_labels)
 
     def sample(
         self, Ts: float, method: str = "zoh", *, name: str | None = None, **settings: Any
@@ -148,17 +192,6 @@ class InsideConversions(DelayOperators):
         made.update_names(name=name or f"{self.name}$sampled")
         return made
 
-    def _sampled_single(self, core: DelayForm, tau: float, step: float) -> Any:
-        fraction = split_dead_time(tau, step)[1]
-        if fraction and np.any(core.D):
-            raise UnsuitableSystemError(
-                f"with direct feedthrough, the output jumps between two samples: the delay is "
-                f"{tau / step:.6g} samples of {step:g} s; choose dt so that it is a whole number"
-            )
-        A, B, C, D, samples = sample_with_dead_time(core.A, core.B, core.C, core.D, step, tau)
-        form = forms.delayed_ends(A, B, C, D, (float(samples),), (0.0,))
-        return self._joined(form, step, self.input_labels, self.output_labels)
-
     def _state_error(self, made: Any, step: float) -> None:
         omega = np.linspace(0, IN_BAND * np.pi / step, 60)[1:]
         ours = self.horner(1j * omega, warn_infinite=False)
@@ -173,6 +206,62 @@ class InsideConversions(DelayOperators):
             "for a discrete controller, sample the plant and close the loop in discrete time",
             ModelWarning,
         )
+
+
+def check_logarithm(A: FloatArray) -> None:
+    """Refuse a sampled core whose poles no continuous one has.
+
+    Raises
+    ------
+    UnsuitableSystemError
+    """
+    poles = np.linalg.eigvals(A)
+    # Rounding may move a negative real pole slightly off the axis.
+    bad = poles[(np.abs(poles) < 1e-12) | ((np.abs(poles.imag) < 1e-9) & (poles.real < 0))]
+    if bad.size:
+        raise UnsuitableSystemError(
+            f"the core has a pole at z = {complex(bad[0]):.6g}, which no continuous system of "
+            "this order has with a zero-order hold. A lower order often has none "
+            "(design.reduce), and so has a fit of dead time and lags (design.reduce_fopdt "
+            "with method='optimal')"
+        )
+
+
+def _paths_sampled(
+    core: DelayForm,
+    before: FloatArray,
+    behind: FloatArray,
+    left: FloatArray,
+    right: FloatArray,
+    step: float,
+) -> DelayForm:
+    """Sample a core with a delay at each end, between gains."""
+    shares = [np.array([split_dead_time(tau, step)[1] for tau in end]) for end in (before, behind)]
+    if behind.size == 1 or (shares[0].any() and shares[1].any()):
+        # what all outputs, or inputs, have in common may stand at the other end
+        common = shares[1][0] * step if np.allclose(shares[1], shares[1][0]) else 0.0
+        common = float(behind[0]) if behind.size == 1 else common
+        if not common and np.allclose(shares[0], shares[0][0]):
+            common = -shares[0][0] * step
+        before, behind = before + common, behind - common
+    shares = [np.array([split_dead_time(tau, step)[1] for tau in end]) for end in (before, behind)]
+    if shares[0].any() and shares[1].any():
+        raise DelayRangeError(
+            f"delays of {before} s at the inputs and {behind} s at the outputs are different "
+            f"fractions of a sample of {step:g} s at both ends; choose dt so that it divides "
+            "those of one end"
+        )
+    jumps = (core.D != 0) & ((shares[0] > 0) | (shares[1] > 0)[:, None])
+    if jumps.any():
+        i, j = np.argwhere(jumps)[0]
+        raise UnsuitableSystemError(
+            f"with direct feedthrough, the output jumps between two samples: the delay is "
+            f"{(before[j] + behind[i]) / step:.6g} samples of {step:g} s; choose dt so that it is "
+            "a whole number"
+        )
+    sampled, *whole = sample_ends((core.A, core.B, core.C, core.D), step, before, behind)
+    ends = (tuple(map(float, end)) for end in whole)
+    return forms.through(forms.delayed_ends(*sampled, *ends), left, right)
 
 
 def _samples(tau: float, step: float) -> int:

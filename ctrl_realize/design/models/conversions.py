@@ -11,15 +11,18 @@ import numpy as np
 
 from ..._checks import positive
 from ..._wording import in_time
-from ...delayed import DelayedStateSpace, DelaySystem, delay, delayed_ss
-from ...delayed.parts import check_single
+from ...delayed import DelayedStateSpace, DelaySystem, delayed_ss
+from ...delayed.inside.conversions import check_logarithm
 from ...errors import OptionError, UnsuitableSystemError
 from ...numerics.arrays import FloatArray
 from ...numerics.blas_threads import single_threaded
-from ...numerics.state_space.sampling import inverse_zero_order_hold, split_fraction
+from ...numerics.internal_delays.form import delayed_ends
+from ...numerics.state_space.sampling import continuous_ends
 from ...results import Result
 from ..siso import delayed_system, proper_ss
-from .approximations import pade_ss
+
+_ROUNDING = 1e-9
+"""Part of a sample by which delays differ that are the same."""
 
 
 def to_tf(system: Any) -> ct.TransferFunction:
@@ -80,14 +83,14 @@ def _numerator(den: FloatArray, pulses: FloatArray) -> FloatArray:
 class ContinuousModel(Result):
     """Continuous core and its dead time; unpacks as ``core, dead_time = model``.
 
-    Sampled with a zero-order hold at `dt`, ``to_discrete(core, dead_time, dt)``, it is the original
-    discrete system.
+    Sampled with a zero-order hold at `dt`, ``to_discrete(model)``, it is the original discrete
+    system.
 
     Attributes
     ----------
     core : control.StateSpace
         Continuous.
-    dead_time : float
+    input_delays, output_delays : tuple of float
         In s; not necessarily whole samples.
     dt : float
         Sample time in s of the discrete system.
@@ -105,8 +108,15 @@ class ContinuousModel(Result):
     """
 
     core: ct.StateSpace
-    dead_time: float
+    input_delays: tuple[float, ...]
+    output_delays: tuple[float, ...]
     dt: float
+
+    @property
+    def dead_time(self) -> Any:
+        """Dead time in s: a float, or an array (outputs, inputs) if channels differ."""
+        total = np.add.outer(self.output_delays, self.input_delays)
+        return float(total[0, 0]) if np.ptp(total) <= _ROUNDING * self.dt else total
 
     def __iter__(self) -> Iterator[Any]:
         return iter((self.core, self.dead_time))
@@ -115,29 +125,25 @@ class ContinuousModel(Result):
         # python-control's systems cannot be pickled.
         core = self.core
         names = {"name": core.name, "inputs": core.input_labels, "outputs": core.output_labels}
-        return _rebuild_model, ((core.A, core.B, core.C, core.D), names, self.dead_time, self.dt)
+        ends = self.input_delays, self.output_delays
+        return _rebuild_model, ((core.A, core.B, core.C, core.D), names, *ends, self.dt)
 
     @property
     def system(self) -> DelaySystem:
         """Core and dead time as one continuous system, exact in loops; see `DelaySystem`."""
         core = self.core
-        late = DelaySystem(core)
-        if self.dead_time:
-            late = late * (np.eye(core.ninputs) * delay(self.dead_time))
+        form = delayed_ends(core.A, core.B, core.C, core.D, self.input_delays, self.output_delays)
         return DelaySystem(
-            late.core,
-            late.internal_delays,
+            ct.StateSpace(form.A, form.B, form.C, form.D, 0, remove_useless_states=False),
+            form.delays,
             name=core.name,
             inputs=core.input_labels,
             outputs=core.output_labels,
         )
 
     def pade(self, order: int = 5) -> ct.StateSpace:
-        """Continuous system with the dead time as a Pade approximant, see `pade_ss`."""
-        if self.dead_time == 0:
-            return self.core
-        check_single(self.core, "pade")
-        return self.core * pade_ss(self.dead_time, order)
+        """Continuous system with each dead time as a Pade approximant, see `pade_ss`."""
+        return self.system.pade(order) if np.any(self.dead_time) else self.core
 
     def _title(self) -> str:
         generic = self.core.name.startswith("sys[")
@@ -149,19 +155,24 @@ class ContinuousModel(Result):
             for p in self.core.poles()
             if p.imag >= 0
         )
+        delays = ", ".join(
+            f"{in_time(tau, 5)} ({tau / self.dt:.4g} samples)"
+            for tau in dict.fromkeys(np.ravel(self.dead_time).tolist())
+        )
         return [
-            ("dead time", f"{in_time(self.dead_time, 5)} ({self.dead_time / self.dt:.4g} samples)"),
+            ("dead time", delays),
             ("poles", f"{poles} rad/s" if poles else "none"),
         ]
 
     def __repr__(self) -> str:
-        return f"<ContinuousModel order {self.core.nstates}, dead time {self.dead_time:.6g} s>"
+        delays = ", ".join(f"{tau:.6g}" for tau in dict.fromkeys(np.ravel(self.dead_time).tolist()))
+        return f"<ContinuousModel order {self.core.nstates}, dead time {delays} s>"
 
 
 def _rebuild_model(
-    matrices: tuple[FloatArray, ...], names: dict[str, Any], dead_time: float, dt: float
+    matrices: tuple[FloatArray, ...], names: dict[str, Any], *settings: Any
 ) -> ContinuousModel:
-    return ContinuousModel(ct.StateSpace(*matrices, 0, **names), dead_time, dt)
+    return ContinuousModel(ct.StateSpace(*matrices, 0, **names), *settings)
 
 
 @single_threaded
@@ -169,13 +180,14 @@ def to_continuous(system: DelayedStateSpace) -> ContinuousModel:
     """Convert the core to continuous time (inverse zero-order hold), with a separate dead time.
 
     Exact if it exists: every pole of the core needs a logarithm. Of the many continuous models with
-    the same samples, the one with all poles below the Nyquist frequency is given. A feedthrough
-    after a delay is converted to a fraction of a sample if that explains it (see `delayed_ss`).
+    the same samples, the one with all poles below the Nyquist frequency is given. The feedthrough
+    of an input or output with a delay is converted to a fraction of a sample if that explains it
+    (see `delayed_ss`).
 
     Parameters
     ----------
     system : DelayedStateSpace
-        Channels must share one delay.
+        Inputs and outputs may have delays of their own.
 
     Returns
     -------
@@ -186,7 +198,8 @@ def to_continuous(system: DelayedStateSpace) -> ContinuousModel:
     ------
     UnsuitableSystemError
         A pole at z = 0 or on the negative real axis: no continuous system of the same order has
-        these samples. Channels with different delays. A system that is already continuous.
+        these samples. A system that is already continuous, or has delays in parallel paths
+        (`DelaySystem.to_continuous` converts it) or in loops.
 
     Notes
     -----
@@ -210,47 +223,19 @@ def to_continuous(system: DelayedStateSpace) -> ContinuousModel:
     [-12.5] 2.0 0.0289
     """
     plant = delayed_system(system, "to_continuous", siso=False)
-    if not isinstance(plant.delay, int):
-        raise UnsuitableSystemError(
-            f"the channels have different delays ({plant.input_delays} at the inputs, "
-            f"{plant.output_delays} at the outputs); convert one channel at a time"
-        )
     core, dt = plant.delay_free, float(plant.dt)
-    _check_logarithm(np.asarray(core.poles()))
-    A, B, C, D = (np.asarray(M, dtype=np.float64) for M in (core.A, core.B, core.C, core.D))
-    dead_time = plant.delay * dt
-    found = None
-    if plant.issiso() and D[0, 0] != 0 and plant.delay > 0 and core.nstates:
-        found = split_fraction(A, B, C, float(D[0, 0]), dt)
-    if found is None:
-        F, G = inverse_zero_order_hold(A, B, dt)
-    else:
-        F, G, fraction = found
-        D, dead_time = np.zeros((1, 1)), dead_time - (1 - fraction) * dt
+    check_logarithm(core.A)
+    ends = plant.input_delays, plant.output_delays
+    matrices, before, behind = continuous_ends((core.A, core.B, core.C, core.D), dt, *ends)
     continuous = ct.StateSpace(
-        F,
-        G,
-        C,
-        D,
+        *matrices,
         0,
         name=f"{plant.name}_continuous",
         inputs=plant.input_labels,
         outputs=plant.output_labels,
         remove_useless_states=False,
     )
-    return ContinuousModel(continuous, float(dead_time), dt)
-
-
-def _check_logarithm(poles: FloatArray) -> None:
-    # Rounding may move a negative real pole slightly off the axis.
-    bad = poles[(np.abs(poles) < 1e-12) | ((np.abs(poles.imag) < 1e-9) & (poles.real < 0))]
-    if bad.size:
-        raise UnsuitableSystemError(
-            f"the core has a pole at z = {complex(bad[0]):.6g}, which no continuous system of "
-            "this order has with a zero-order hold. A lower order often has none "
-            "(design.reduce), and so has a fit of dead time and lags (design.reduce_fopdt "
-            "with method='optimal')"
-        )
+    return ContinuousModel(continuous, before, behind, dt)
 
 
 def to_discrete(
@@ -297,9 +282,10 @@ def to_discrete(
                 f"the model already has a dead time, {core.dead_time:.6g} s; give dt=... for "
                 "another sample time, or dead_time= and dt= to replace both"
             )
-        dead_time = core.dead_time if dead_time is None else dead_time
         dt = core.dt if dt is None else dt
-        core = core.core
+        several = dead_time is None and not isinstance(core.dead_time, float)
+        dead_time = core.dead_time if dead_time is None and not several else dead_time
+        core = core.system if several else core.core
     if isinstance(core, DelaySystem):
         if dead_time:
             raise OptionError(

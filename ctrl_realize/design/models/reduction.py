@@ -126,7 +126,7 @@ def _reduce(system: Any, method: str, dead_time: float | None, order: int) -> Pr
     method = one_of(method, "method", METHODS)
     if isinstance(system, ProcessModel):
         core = ct.ss(system.transfer_function())
-        system = ContinuousModel(core, system.dead_time, _resolution(system))
+        system = ContinuousModel(core, (system.dead_time,), (0.0,), _resolution(system))
     continuous, plant = both_forms(system, dead_time)
     time, step, integrating, gain = _step_record(plant)
     if method == "half_rule":
@@ -161,11 +161,11 @@ def both_forms(
         span = float(np.sum(1 / speeds)) + total
         if span == 0:
             raise UnsuitableSystemError(f"{core.name!r} has no lag and no dead time to reduce")
-        model = ContinuousModel(core, total, span / 1000)
+        model = ContinuousModel(core, (total,), (0.0,), span / 1000)
         if np.any(core.D):
             # A feedthrough causes a jump; with whole samples it stays in place.
             step = total / max(1, round(total / model.dt)) if total else model.dt
-            model = ContinuousModel(core, total, step)
+            model = ContinuousModel(core, (total,), (0.0,), step)
         return model, to_discrete(model)
     warn_unresolved(system)
     return None, delayed_system(system, "a reduction")

@@ -154,6 +154,52 @@ def ends_apart(
     return tuple(before), tuple(behind), rest
 
 
+def paths_apart(
+    form: DelayForm,
+) -> tuple[DelayForm, FloatArray, FloatArray, FloatArray, FloatArray] | None:
+    """Take all delays out of a form without loops through them: left, delays, core, delays, right.
+
+    A delay that reads one input and no state is one before a further input of the core, which has
+    the same signal; one that drives one output and no state is behind a further output.
+
+    Returns
+    -------
+    core : DelayForm
+        Without delays.
+    before, behind : ndarray
+        Delays of its inputs and outputs.
+    left, right : ndarray
+        Gains from its outputs to those of the form, and from the form's inputs to its own.
+    None
+        A delay is in a loop, or reads and drives more.
+    """
+    before, behind, rest = ends_apart(form)
+    n, m, p = rest.states, rest.inputs, rest.outputs
+    reads, drives = _out_of(rest), _into(rest).T
+    heads, tails = [], []
+    for i in range(len(rest.delays)):
+        (read,), (driven,) = np.nonzero(reads[i]), np.nonzero(drives[i])
+        if read.size == 1 and n <= read[0] < n + m:
+            heads.append((i, int(read[0]) - n))
+        elif driven.size == 1 and n <= driven[0] < n + p:
+            tails.append((i, int(driven[0]) - n))
+        else:
+            return None
+    columns = [*range(m), *(m + i for i, _ in heads)]
+    rows = [*range(p), *(p + i for i, _ in tails)]
+    late = [m + i for i, _ in tails]
+    if np.any(rest.D[np.ix_([p + i for i, _ in tails], late)]):
+        return None
+    core = DelayForm(rest.A, rest.B[:, columns], rest.C[rows], rest.D[np.ix_(rows, columns)])
+    return (
+        core,
+        np.array([*before, *(before[j] + rest.delays[i] for i, j in heads)]),
+        np.array([*behind, *(behind[k] + rest.delays[i] for i, k in tails)]),
+        np.hstack([np.eye(p), rest.D[:p, late]]),
+        np.vstack([np.eye(m), rest.D[[p + i for i, _ in heads], :m]]),
+    )
+
+
 def _passes_once(form: DelayForm) -> bool:
     """Whether all of a single input goes through the single delay, and never twice."""
     return not (_reaches(form, 0, 0) or _reaches(form, 1, 1))

@@ -16,8 +16,9 @@ References
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from itertools import pairwise
+from typing import Any, TypeAlias
 
 import numpy as np
 from scipy.linalg import expm
@@ -25,6 +26,10 @@ from scipy.optimize import brentq, minimize_scalar
 
 from ..arrays import FloatArray
 from .matrix_logarithm import principal_logarithm
+
+Core: TypeAlias = tuple[FloatArray, FloatArray, FloatArray, FloatArray]
+_EXPLAINED = 1e-9
+"""Relative rounding of a feedthrough that a fraction of a sample explains."""
 
 
 def zero_order_hold(A: FloatArray, B: FloatArray, dt: float) -> tuple[FloatArray, FloatArray]:
@@ -111,76 +116,128 @@ def sample_with_dead_time(
     return Phi, Phi @ Gamma0 + Gamma1, C, C @ Gamma0, whole + 1
 
 
-def inverse_zero_order_hold(
-    A: FloatArray, B: FloatArray, dt: float
-) -> tuple[FloatArray, FloatArray]:
-    """Find F, G with x' = F x + G u, held over `dt`, giving x[k+1] = A x[k] + B u[k].
+def sample_ends(
+    core: Core, dt: float, before: FloatArray, behind: FloatArray
+) -> tuple[Core, tuple[int, ...], tuple[int, ...]]:
+    """Sample a continuous model with a hold and a delay at every input and output.
+
+    A fraction of a sample at an input is as in `sample_with_dead_time`. At an output, what is seen
+    at a sample is the state (1-f) dt after the one d + 1 samples before.
+
+    Parameters
+    ----------
+    core : tuple of ndarray, shapes (n, n), (n, m), (p, n), (p, m)
+        Continuous.
+    dt : float
+    before, behind : ndarray
+        Delays of inputs and outputs in s, with fractions of a sample at one of the ends only.
+
+    Returns
+    -------
+    core : tuple of ndarray
+        Sampled.
+    before, behind : tuple of int
+        Whole samples of delay.
+    """
+    A, B, C, D = core
+    Phi, Gamma = zero_order_hold(A, B, dt)
+    C_sampled, D_sampled = C.copy(), D.copy()
+    splits = [split_dead_time(tau, dt) for tau in behind.tolist()]
+    for i, (_, f) in enumerate(splits):
+        if f:
+            early, Gamma0 = zero_order_hold(A, B, (1 - f) * dt)
+            C_sampled[i], D_sampled[i] = C[i] @ early, C[i] @ Gamma0
+    entry = []
+    for j, tau in enumerate(before.tolist()):
+        one = slice(j, j + 1)
+        part = sample_with_dead_time(A, B[:, one], C, D[:, one], dt, tau)
+        Gamma[:, one] = part[1]
+        if split_dead_time(tau, dt)[1]:
+            D_sampled[:, one] = part[3]
+        entry.append(part[4])
+    sampled = Phi, Gamma, C_sampled, D_sampled
+    return sampled, tuple(entry), tuple(d + (f > 0) for d, f in splits)
+
+
+def continuous_ends(
+    core: Core, dt: float, before: Sequence[int], behind: Sequence[int]
+) -> tuple[Core, tuple[float, ...], tuple[float, ...]]:
+    """Invert `sample_ends`: find the continuous core, and delays in s, of a sampled one.
 
     The principal logarithm is taken: of all models with the same samples, the one whose poles are
     below the Nyquist frequency. No eigenvalue of A may be zero or real and negative.
 
+    A strictly proper model with a delay of (d + f) samples at an input has, when sampled, the delay
+    d + 1 and, in the column of that input, the feedthrough C Gamma0, with Gamma0 the integral of
+    exp(F s) G over the last (1 - f) dt of a sample. This determines f in 0...1; so it does for the
+    row of an output. A feedthrough that no fraction explains stays one.
+
     Parameters
     ----------
-    A, B : ndarray, shapes (n, n), (n, m)
+    core : tuple of ndarray, shapes (n, n), (n, m), (p, n), (p, m)
+        Sampled.
     dt : float
+    before, behind : sequence of int
+        Delays of inputs and outputs in samples.
+
+    Returns
+    -------
+    core : tuple of ndarray
+        Continuous.
+    before, behind : tuple of float
         In s.
-
-    Returns
-    -------
-    F, G : ndarray, shapes (n, n), (n, m)
     """
-    n = A.shape[0]
-    if n == 0:
-        return A.copy(), B.copy()
+    A, B, C, D = core
+    late = np.array(before, dtype=np.float64), np.array(behind, dtype=np.float64)
+    if D.shape == (1, 1):
+        late = (late[0] + late[1], np.zeros(1))
+    if not A.size:
+        return core, tuple((late[0] * dt).tolist()), tuple((late[1] * dt).tolist())
     F = principal_logarithm(A) / dt
-    _, spread = zero_order_hold(F, np.eye(n), dt)
-    return F, np.asarray(np.linalg.solve(spread, B), dtype=np.float64)
-
-
-def split_fraction(
-    A: FloatArray, B: FloatArray, C: FloatArray, direct: float, dt: float
-) -> tuple[FloatArray, FloatArray, float] | None:
-    """Determine a fraction of a sample from the feedthrough of a sampled model.
-
-    A strictly proper model with a dead time of (d + f) samples has, when sampled, the delay d + 1
-    and the feedthrough C Gamma0, with Gamma0 the integral of exp(F s) G over the last (1 - f) dt of
-    a sample. This determines f in 0...1.
-
-    Parameters
-    ----------
-    A, B, C : ndarray, shapes (n, n), (n, 1), (1, n)
-    direct : float
-    dt : float
-
-    Returns
-    -------
-    F, G, f
-        None if no fraction explains the feedthrough.
-    """
     n = A.shape[0]
-    F = principal_logarithm(A) / dt
 
     def held(seconds: float) -> FloatArray:
         return zero_order_hold(F, np.eye(n), seconds)[1]
 
-    def inputs(f: float) -> FloatArray:
-        # B = exp(F (1-f) dt) (integral over dt) G
-        moved = expm(F * (1 - f) * dt) @ held(dt)
-        return np.asarray(np.linalg.solve(moved, B), dtype=np.float64)
+    def moved(f: float) -> FloatArray:
+        # B = exp(F (1-f) dt) (integral over dt) G, and the same for C
+        return np.asarray(expm(F * (1 - f) * dt), dtype=np.float64)
 
-    def misfit(f: float) -> float:
-        return float((C @ held((1 - f) * dt) @ inputs(f))[0, 0]) - direct
+    whole = held(dt)
+    G = np.asarray(np.linalg.solve(whole, B), dtype=np.float64)
 
-    roots = _roots_in_unit_interval(misfit, abs(direct))
-    if not roots:
-        return None
+    def inputs(f: float, columns: Any) -> FloatArray:
+        return np.asarray(np.linalg.solve(moved(f) @ whole, B[:, columns]), dtype=np.float64)
 
-    def direct_slope(f: float) -> float:
+    def fraction(rows: Any, columns: Any) -> float | None:
+        """Fraction that explains a column or row of the feedthrough."""
+        wanted = D[rows, columns].ravel()
+        at = int(np.argmax(np.abs(wanted)))
+
+        def jumps(f: float) -> FloatArray:
+            return np.asarray(C[rows] @ held((1 - f) * dt) @ inputs(f, columns)).ravel()
+
+        size = abs(float(wanted[at]))
+        roots = _roots_in_unit_interval(lambda f: float(jumps(f)[at] - wanted[at]), size)
+        roots = [f for f in roots if np.all(np.abs(jumps(f) - wanted) <= _EXPLAINED * size)]
         # Of several exact solutions the one whose response starts most smoothly is chosen.
-        return abs(float((C @ inputs(f))[0, 0]))
+        return min(
+            roots, key=lambda f: float(np.abs(C[rows] @ inputs(f, columns)).max()), default=None
+        )
 
-    best = min(roots, key=direct_slope)
-    return F, inputs(best), best
+    direct = np.flatnonzero(np.any(D, axis=0) & (late[0] > 0)).tolist()
+    columns = {j: f for j in direct if (f := fraction(slice(None), [j])) is not None}
+    G, C, D = G.copy(), C.copy(), D.copy()
+    for j, f in columns.items():
+        G[:, [j]], D[:, j] = inputs(f, [j]), 0.0
+        late[0][j] -= 1 - f
+    direct = np.flatnonzero(np.any(D, axis=1) & (late[1] > 0)).tolist()
+    rows = {} if columns else {i: fraction([i], slice(None)) for i in direct}
+    for i, f in rows.items():
+        if f is not None:
+            C[i], D[i] = np.linalg.solve(moved(f).T, C[i]), 0.0
+            late[1][i] -= 1 - f
+    return (F, G, C, D), tuple((late[0] * dt).tolist()), tuple((late[1] * dt).tolist())
 
 
 def _roots_in_unit_interval(function: Callable[[float], float], scale: float) -> list[float]:
