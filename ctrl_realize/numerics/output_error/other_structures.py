@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from functools import partial
 
 from ..constants import VERY_STRONG
 from ..engine.compared_fits import SLACK, converged, on_new_data, settled
@@ -72,7 +73,22 @@ class Requested:
     loop: bool = False
 
 
-def other_structures(fits: WindowFit, refit: Callable[[], WindowFit]) -> OtherStructures:
+@dataclass(frozen=True, eq=False)
+class Compared:
+    """A structure that rules out the requested ones, and a function for what is open beside them.
+
+    That takes as long as a fit, and is of no use beside what is ruled out.
+    """
+
+    better: StructureFit | None = None
+    not_ruled_out: Callable[[], tuple[StructureFit, ...]] = tuple
+
+    def told(self, better: StructureFit | None) -> OtherStructures:
+        """What they say of a model, where `better` rules it out."""
+        return OtherStructures(better, () if better is not None else self.not_ruled_out())
+
+
+def other_structures(fits: WindowFit, refit: Callable[[], WindowFit]) -> Compared:
     """Find structures that rule out the requested ones, or are not ruled out beside them.
 
     One more pole is tried first, starting from the given optimum, which is cheap; only if it fits
@@ -89,7 +105,7 @@ def other_structures(fits: WindowFit, refit: Callable[[], WindowFit]) -> OtherSt
     n, r = given.structure.order, given.structure.relative_degree
     # Beside an exact fit no other structure tells anything.
     if n >= _MOST_ORDER or not fits.variance > 0:
-        return OtherStructures()
+        return Compared()
     # Without Huber's clipping towards the given model, which may hide its errors.
     problem = fits.window.problem
     start = on_new_data(problem, {given.structure: given})
@@ -100,7 +116,7 @@ def other_structures(fits: WindowFit, refit: Callable[[], WindowFit]) -> OtherSt
     # correlated.
     variance = least / max(problem.data.size - 2 * n - 4, 1)
     better = better_than(given, refit()) if cost - least > VERY_STRONG * variance else None
-    return OtherStructures(better, () if better is not None else _not_ruled_out(fits, richer))
+    return Compared(better, partial(_not_ruled_out, fits, richer))
 
 
 def better_than(given: Candidate, free: WindowFit) -> StructureFit | None:

@@ -27,7 +27,7 @@ from ..families.slow_lags import fit_slow_lags
 from ..signals.noise import correlation_time
 from .interval import likelihood_fit
 from .margins import CloseDecision
-from .other_structures import better_than, line_of
+from .other_structures import Compared, better_than, line_of
 from .result import OtherStructures, OutputErrorEstimate, ProcessEstimate, StructureFit
 from .selection import chains_of
 
@@ -43,7 +43,7 @@ def process_fit(
     forms: Sequence[ProcessForm],
     *,
     is_noise: IsNoise,
-    others: OtherStructures,
+    others: Compared,
     near: tuple[CloseDecision, ...] = (),
 ) -> OutputErrorEstimate:
     """Determine model, dead time and interval among process models of prescribed forms.
@@ -54,7 +54,7 @@ def process_fit(
         Fit of the structures of the forms, without their prescriptions.
     forms : sequence of ProcessForm
     is_noise : callable
-    others : OtherStructures
+    others : Compared
         Beside those of `fits`.
     near
         As for `likelihood_fit`.
@@ -65,7 +65,7 @@ def process_fit(
         form = next(form for form in forms if form.structure == found.structure)
         if np.count_nonzero(found.poles.imag > 0) == int(form.pair):
             process = _with_profiles(fits, ProcessEstimate(found.process.parameters, form))
-            return replace(found, process=process, others=others)
+            return replace(found, process=process, others=others.told(others.better))
     like = list(fits.candidates.values())
     fitted = [fit_form(fits.problem, form, fits.scales, like) for form in forms]
     models = {model.structure: model for model in fitted}
@@ -88,7 +88,7 @@ def process_fit(
         adequate=is_noise(rms, correlation),
         residual=found.residual._replace(std=std, normalized_rms=rms, correlation=correlation),
         process=_with_profiles(given, found.process),
-        others=others._replace(better=_better(fits, chosen, others.better)),
+        others=others.told(_better(fits, chosen, others.better)),
     )
 
 
@@ -150,5 +150,4 @@ def _better(fits: WindowFit, chosen: Candidate, better: StructureFit | None) -> 
         return replace(better, delta_bic=-both) if both > VERY_STRONG else None
     if excess <= VERY_STRONG:
         return None
-    found = likelihood_fit(fits, adequate=True)
-    return line_of(fits, fits.candidates[found.structure], -excess, (found.low, found.high))
+    return line_of(fits, host, -excess)

@@ -86,12 +86,11 @@ from .flat_likelihood import closer, later, moved, pinned, with_close_decision
 from .interval import likelihood_fit
 from .load import load_of
 from .margins import CloseDecision, close_to
-from .other_structures import Requested, other_structures
+from .other_structures import Compared, Requested, other_structures
 from .process_models import fit_without_fast_lags, process_fit
 from .profiles import profile_of
 from .result import (
     DelayInterval,
-    OtherStructures,
     OutputErrorEstimate,
     RobustKey,
     assembled,
@@ -161,7 +160,7 @@ def _given_structures(
     near, noisy = _close_to_noise(data, fits), _at_noise_level(data, fits)
     adequate, fits = noisy is not None, noisy or fits
     limited = requested.fastest is not None
-    others = OtherStructures() if limited else other_structures(fits, free)
+    others = Compared() if limited else other_structures(fits, free)
     if adequate and requested.whiten:
         fits = in_coloured_noise(fits, data)
     if adequate and others.better is None:
@@ -175,7 +174,8 @@ def _given_structures(
         return process_fit(
             fits, requested.forms, is_noise=lambda rms, _: rms <= level, others=others, near=near
         )
-    given = replace(likelihood_fit(fits, adequate=adequate, near=near), others=others)
+    given = likelihood_fit(fits, adequate=adequate, near=near)
+    given = replace(given, others=others.told(others.better))
     return in_rounded_data(given, fits, data.quantum) if adequate and data.coarse else given
 
 

@@ -59,14 +59,15 @@ def unstable_chance(output: FloatArray, drive: FloatArray, past: int) -> float:
     columns = np.stack([*own, *earlier, np.ones(rows), here / rows], axis=1)
     size = np.linalg.norm(columns, axis=0)
     size[size == 0] = 1.0
-    left, singular, right = np.linalg.svd(columns / size, full_matrices=False)
-    rank = int(np.count_nonzero(singular > _RANK * singular[0]))
-    left, singular, right = left[:, :rank], singular[:rank], right[:rank]
     target = output[here]
-    inside = left.T @ target
-    residual = target - left @ inside
+    # The triangle has the same right singular vectors, and far fewer rows.
+    triangle = np.asarray(np.linalg.qr(np.column_stack([columns / size, target]), mode="r"))
+    left, singular, right = np.linalg.svd(triangle[:-1, :-1])
+    rank = int(np.count_nonzero(singular > _RANK * singular[0]))
+    inside, outside = np.split(left.T @ triangle[:-1, -1], [rank])
+    singular, right = singular[:rank], right[:rank]
     freedom = rows - rank
-    spread = float(np.sqrt(residual @ residual / freedom))
+    spread = float(np.hypot(triangle[-1, -1], np.linalg.norm(outside)) / np.sqrt(freedom))
     if spread <= _PREDICTED * float(output.std()):
         return 1.0
     asked = np.zeros(columns.shape[1])

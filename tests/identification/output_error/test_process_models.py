@@ -97,6 +97,7 @@ def test_a_form_that_the_data_rule_out_is_told_as_an_apparent_dead_time():
         low, high = fit.better.interval
         assert fit.dead_time > high
         assert low <= DEAD_TIME <= high
+        assert "not ruled out" not in fit.report()  # what else is open is of no use beside that
     assert fit.parameter_table().loc["lag_2", "value"] == pytest.approx(1.0, abs=1e-3)
     assert "parameter_at_bound" in {flag.code for flag in fit.flags}
 

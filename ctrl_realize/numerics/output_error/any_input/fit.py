@@ -177,7 +177,9 @@ def fit_sampled(
         )
     else:
         chains = chains_of(fits) if structures is None else []
-        fit = replace(likelihood_fit(fits, adequate=white, chains=chains), others=others)
+        fit = likelihood_fit(fits, adequate=white, chains=chains)
+        if others is not None:
+            fit = replace(fit, others=others.told(others.better))
     if sums is not None:
         fit = _of_measured(part, fit, 0)
     elif part.noise.size > 1:
