@@ -52,16 +52,11 @@ def _panels(
     begin = first if edge is None else edge.time
     seen, before = raw.output[there], raw.output[there & (raw.time < begin)]
     rest = row["rest"][1] if row["rest"] else float(np.median(before if before.size else seen[:1]))
-    layers = [
-        *(line(factor * one.time, one.output, "plausible") for one in behind),
-        *[
-            layer("span", "out", said, low=factor * a, high=factor * b)
-            for a, b, said in out
-            if a < b
-        ],
-        line(time, raw.output, "measured", raw.output_labels[0]),
-        layer("level", "input", "level at rest", y=rest),
-    ]  # fmt: skip
+    layers = [line(factor * one.time, one.output, "plausible") for one in behind]
+    layers += [layer("span", "out", said, low=factor * a, high=factor * b)
+               for a, b, said in out if a < b]  # fmt: skip
+    layers.append(line(time, raw.output, "measured", raw.output_labels[0]))
+    layers.append(layer("level", "input", "level at rest", y=rest))
     step, reach = max(raw.dt, (last - first) / 400), 0.5 * float(np.ptp(seen) or 1.0)
     ends, whole = (float(seen.min()) - reach, float(seen.max()) + reach), (first, last)
     place: JSON = {"per_unit": factor}

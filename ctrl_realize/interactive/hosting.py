@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import functools
 import threading
+import time
 from collections.abc import Mapping
+from concurrent.futures import Future
 from importlib import resources
 from typing import Any
 
@@ -18,6 +20,7 @@ from .session import Session, Task, after, done
 
 PAGE = facts("interactive/page.toml")
 """Parts of the page, and headers."""
+_TURN = 5e-4  # s in which another thread has its turn
 
 
 @functools.cache
@@ -73,7 +76,18 @@ class Host:
     def _start(self) -> None:
         self._pool = ProcessPoolExecutor(max_workers=1, timeout=None)
         # What it needs is loaded before there is something to do.
-        self._doing = self._pool.submit(done, Task("loading", "", dict, ()))
+        self._submit(Task("loading", "", dict, ()))
+
+    def _submit(self, task: Task) -> Future[Any]:
+        """Give the process a task.
+
+        The thread of the pool raises a KeyError if the pool is shut down before it took the task.
+        """
+        doing: Future[Any] = self._pool.submit(done, task)
+        while not (doing.running() or doing.done()):
+            time.sleep(_TURN)
+        self._doing = doing
+        return doing
 
     def _cancel(self) -> None:
         with self._changing:
@@ -83,9 +97,9 @@ class Host:
 
     def _result(self, task: Task) -> Any:
         """Result of a task, or the error that it ended with."""
-        with self._changing:
-            doing = self._doing = self._pool.submit(done, task)
         try:
+            with self._changing:
+                doing = self._submit(task)
             return doing.result()
         except ShutdownExecutorError as error:
             raise CancelledError("cancelled; nothing was changed") from error

@@ -183,8 +183,7 @@ def _margins(loop: TunedLoop, unstable: BoolArray) -> list[tuple[str, str]]:
         found["delay margin"] = in_time(sizes.delay_margin, 3)
     if unstable.size:
         worst = float(np.sort(others)[-2])  # of forty, one is worse
-        said = f"at most {worst:.3g}" if np.isfinite(worst) else "unstable"
-        found["Ms on plausible plants"] = said
+        found["Ms on plausible plants"] = f"at most {worst:.3g}" if worst < np.inf else "unstable"
         found["unstable plants"] = f"{unstable.sum()} of {unstable.size}"
     return [*found.items()]
 

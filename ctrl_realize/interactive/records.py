@@ -25,8 +25,6 @@ from ..numerics.arrays import FloatArray
 from .drawing import JSON
 
 SHOWN_ROWS, MOST_COLUMNS = 6, 60
-ATTEMPTS: tuple[JSON, ...] = ({}, {"resample": True})
-"""Ways to read a file, of which the first that succeeds is the first guess."""
 _ARRAYS = ("time", "input", "output")
 
 
@@ -74,16 +72,13 @@ def read(content: bytes, row: Mapping[str, Any]) -> tuple[Record, list[str]]:
     return record, said
 
 
-def first_reading(content: bytes, name: str) -> tuple[JSON, str]:
-    """Options with which a file can be read, and why it cannot if there are none."""
-    reasons = []
-    for options in ATTEMPTS:
-        try:
-            read(content, {"name": name, "options": options, "given": None})
-            return dict(options), ""
-        except CtrlRealizeError as error:
-            reasons.append(str(error))
-    return {}, reasons[0]
+def why_unreadable(content: bytes, name: str) -> str:
+    """Why a file is no record as it stands; empty if it is one."""
+    try:
+        read(content, {"name": name, "options": {}, "given": None})
+    except CtrlRealizeError as error:
+        return str(error)
+    return ""
 
 
 def read_response(content: bytes, name: str) -> MeasuredFRF:

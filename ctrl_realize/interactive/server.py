@@ -73,10 +73,9 @@ class _Handler(BaseHTTPRequestHandler):
             return None
         if place != "command" or not 0 <= length <= MOST_BYTES:
             return self._send(404, "text/html", "there is no such page")
-        try:
+        command = None
+        with suppress(ValueError, RecursionError):
             command = json.loads(self.rfile.read(length))
-        except (ValueError, RecursionError):
-            command = None
         if not isinstance(command, dict):
             return self._send(400, "text/html", "expected a command, a JSON object")
         return self._send(200, "application/json", json.dumps(self.server.host.answer(command)))
@@ -130,9 +129,8 @@ def serve(
     """
     session = Session()
     for path in files:
-        answer = session.add_file(path)
-        if "error" in answer:
-            say(answer["error"])
+        if said := session.add_file(path).get("error"):
+            say(said)
     with closing(Host(session)) as host, AppServer(host, port) as server:
         opened = browser and webbrowser.open(server.address)
         say(f"{'opened' if opened else 'open in a browser'}: {server.address}")

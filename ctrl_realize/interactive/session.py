@@ -202,16 +202,16 @@ class Session:
             state, files = saving.opened(content.decode("utf-8"))
             self.files |= files
             return self._go_on(state)
-        options, reason = records.first_reading(content, name)
-        given = {"file": self._stored(content), "name": name, "path": command.get("path")}
-        if reason:
+        key, path = self._stored(content), command.get("path")
+        given: JSON = {"options": {}, "file": key, "name": name, "path": path}
+        if reason := records.why_unreadable(content, name):
             with suppress(CtrlRealizeError):
                 records.read_response(content, name)
                 return self._change({"do": "add_response", **given})
             # The page asks for the columns of a table whose names do not tell them.
             if not records.preview(content, {"name": name, "options": {}})["columns"]:
                 raise FileFormatError(reason)
-        return self._change({"do": "add", "options": options, **given})
+        return self._change({"do": "add", **given})
 
     def _drag(self, command: Mapping[str, Any]) -> JSON:
         values = {str(key): float(value) for key, value in command["values"].items()}
