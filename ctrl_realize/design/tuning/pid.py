@@ -31,8 +31,6 @@ ADJUSTED = ("simc", "lambda", "imc")
 """Rules with a closed-loop time."""
 LONGER = (1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0, 12.0, 16.0, 24.0)
 """Closed-loop times that are tried for a robust loop, in dead times."""
-SLOWER = (2.0, 4.0, 8.0)
-"""Closed-loop times of simc, in dead times of its model, that are suggested after those."""
 
 
 @single_threaded
@@ -252,7 +250,7 @@ def _robust(system: Any, rule: str, kind: str, options: TuningOptions) -> Tuning
     shortest = made.model.dead_time or 0.1 * made.model.lag
     tried = []
     for share in LONGER:
-        time = None if share == 1 else float(f"{share * shortest:.4g}")
+        time = None if share == 1 else float(f"{share * shortest:.3g}")  # as it is suggested
         changed = replace(options, closed_loop_time=time)
         made, plant = tuned(system, rule, kind, changed)
         check = loop_check(plant, made)
@@ -301,14 +299,11 @@ def _one_that_works(system: Any, rule: str, kind: str, options: TuningOptions) -
 
 
 def _slower(system: Any, options: TuningOptions) -> list[tuple[str, str, TuningOptions]]:
-    """Closed-loop times of simc, rounded as they are printed."""
+    """A closed-loop time of simc that is robust, or comes closest to it."""
     try:
-        made, _ = tuned(system, "simc", "PI", options)
+        return [("simc", "PI", _robust(system, "simc", "PI", options))]
     except ValueError:
         return []
-    assert made.model is not None
-    times = [float(f"{share * made.model.dead_time:.3g}") for share in SLOWER]
-    return [("simc", "PI", replace(options, closed_loop_time=time)) for time in times if time]
 
 
 def _call(rule: str, kind: str, options: TuningOptions) -> str:
