@@ -184,12 +184,23 @@ def test_the_lines_of_python_give_the_same_numbers(tmp_path, capsys):
     with pytest.warns(cr.errors.DataWarning, match="3 samples have missing values"):
         exec(view["script"], names)
     fit = names["system"].fit
+    assert (names["record"].reference == 55).all()
     assert names["record"].input_units + names["record"].output_units == ("%", "K")
     shown = {one["name"]: one["value"] for one in view["model"]["parameters"]}
     assert {one.name: one.value for one in fit.parameters} == shown
     form = names["pid"].as_form("siemens_pid_compact")
     assert [list(row) for row in form._rows()] == [list(r) for r in view["loop"]["numbers"]["rows"]]
     assert form.title in capsys.readouterr().out
+
+
+def test_a_set_point_is_kept_and_drawn():
+    bare = step_record()
+    wanted = np.where(bare.time < 3, np.nan, 56.0)
+    session = Session()
+    session.add_record(bare.__replace__(reference=wanted))
+    panel = session.apply(put("record", 0, range=[1.0, 29.0]))["view"]["data"]["panels"][0]
+    drawn = next(one for one in panel["layers"] if one["name"] == "set point")
+    assert drawn["y"] == [None if np.isnan(one) else one for one in wanted]
 
 
 def test_saved_work_opens_as_it_was():

@@ -161,12 +161,18 @@ class Record(RecordConversions):
         )
 
     def __reduce__(self) -> tuple[Any, ...]:
-        labels = self._labels() | {"reference": self.reference}
-        return _rebuild, (self.time, self.input, self.output, labels)
+        return _rebuild, (self._arguments(),)
 
-    def _labels(self) -> dict[str, Any]:
-        """Arguments of a record besides its samples."""
+    def __replace__(self, **changes: Any) -> Record:
+        """Return a record with some arguments changed (`copy.replace`, from Python 3.13 on)."""
+        return Record(**self._arguments() | changes)
+
+    def _arguments(self) -> dict[str, Any]:
         return {
+            "time": self.time,
+            "input": self.input,
+            "output": self.output,
+            "reference": self.reference,
             "name": self.name,
             "input_labels": self.input_labels,
             "output_labels": self.output_labels,
@@ -290,12 +296,11 @@ class Record(RecordConversions):
                 f"samples of the record, which covers {self.time[0]:g} s to {self.time[-1]:g} "
                 f"s; at least {MIN_SAMPLES} are needed"
             )
-        return Record(
-            self.time[inside],
-            self.input[..., inside],
-            self.output[..., inside],
+        return self.__replace__(
+            time=self.time[inside],
+            input=self.input[..., inside],
+            output=self.output[..., inside],
             reference=None if self.reference is None else self.reference[..., inside],
-            **self._labels(),
         )
 
     def with_baseline(self, input: ArrayLike, output: ArrayLike) -> Record:
@@ -331,21 +336,18 @@ class Record(RecordConversions):
                     f"of the {np.atleast_2d(signal).shape[0]} signals"
                 )
             levels.append(level.reshape(signal[..., :1].shape))
-        return Record(
-            np.r_[self.time[0] - self.dt, self.time],
-            np.concatenate([levels[0], self.input], axis=-1),
-            np.concatenate([levels[1], self.output], axis=-1),
+        return self.__replace__(
+            time=np.r_[self.time[0] - self.dt, self.time],
+            input=np.concatenate([levels[0], self.input], axis=-1),
+            output=np.concatenate([levels[1], self.output], axis=-1),
             reference=None
             if self.reference is None
             else np.concatenate([self.reference[..., :1], self.reference], axis=-1),
-            **self._labels(),
         )
 
 
-def _rebuild(
-    time: FloatArray, input: FloatArray, output: FloatArray, labels: dict[str, Any]
-) -> Record:
-    return Record(time, input, output, **labels)
+def _rebuild(arguments: dict[str, Any]) -> Record:
+    return Record(**arguments)
 
 
 def _count(number: int, noun: str) -> str:

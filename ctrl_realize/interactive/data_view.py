@@ -56,6 +56,8 @@ def _panels(
     layers += [layer("span", "out", said, low=factor * a, high=factor * b)
                for a, b, said in out if a < b]  # fmt: skip
     layers.append(line(time, raw.output, "measured", raw.output_labels[0]))
+    if raw.reference is not None:
+        layers.append(line(time, raw.reference, "input", "set point"))
     layers.append(layer("level", "input", "level at rest", y=rest))
     step, reach = max(raw.dt, (last - first) / 400), 0.5 * float(np.ptp(seen) or 1.0)
     ends, whole = (float(seen.min()) - reach, float(seen.max()) + reach), (first, last)

@@ -26,6 +26,7 @@ from .drawing import JSON
 
 SHOWN_ROWS, MOST_COLUMNS = 6, 60
 _ARRAYS = ("time", "input", "output")
+_SAMPLES = (*_ARRAYS, "reference")
 
 
 @contextmanager
@@ -42,11 +43,13 @@ def _file(content: bytes, name: str) -> Iterator[Path]:
 
 def given_content(record: Record) -> bytes:
     """Store a record that was given from Python like the content of a file, exactly."""
-    arrays = {
-        key: [None if np.isnan(one) else one for one in getattr(record, key).tolist()]
-        for key in _ARRAYS
-    }
-    return json.dumps(arrays | record._labels()).encode()
+
+    def listed(values: Any) -> Any:
+        return [None if np.isnan(one) else one for one in values.tolist()]
+
+    given = record._arguments()
+    arrays = {key: one for key, one in given.items() if isinstance(one, np.ndarray)}
+    return json.dumps(given | {key: listed(one) for key, one in arrays.items()}).encode()
 
 
 def read(content: bytes, row: Mapping[str, Any]) -> tuple[Record, list[str]]:
@@ -61,8 +64,9 @@ def read(content: bytes, row: Mapping[str, Any]) -> tuple[Record, list[str]]:
         warnings.simplefilter("always")
         if row["given"]:
             stored = json.loads(content)
-            arrays = [np.array(stored.pop(key), dtype=np.float64) for key in _ARRAYS]
-            record = Record(*arrays, **stored)
+            samples = {key: one for key, one in stored.items() if key in _SAMPLES and one}
+            arrays = {key: np.array(one, dtype=np.float64) for key, one in samples.items()}
+            record = Record(**stored | arrays)
         else:
             record = read_record(path, **row["options"])
         said = [str(one.message).replace(f"{path.parent}{os.sep}", "") for one in told]
@@ -112,14 +116,14 @@ def preview(content: bytes, row: Mapping[str, Any]) -> JSON:
 
 def edited(record: Record, row: Mapping[str, Any]) -> Record:
     """Make the changes that were asked for: units, shift of the input, range, gaps, rest."""
-    labels, output = record._labels(), record.output.copy()
+    output = record.output.copy()
     named = {"input": record.input_labels[0], "output": record.output_labels[0]}
-    labels["units"] |= {named[key]: unit for key, unit in row["units"].items()}
+    units = dict(record.units) | {named[key]: unit for key, unit in row["units"].items()}
     for start, stop in row["struck"]:
         output[(record.time >= start) & (record.time <= stop)] = np.nan
-        labels["missing"] = "keep"
+    missing = "keep" if row["struck"] else record.missing
     signal = shifted(record, row["shift"]) if row["shift"] else record.input
-    found = Record(record.time, signal, output, **labels)
+    found = record.__replace__(input=signal, output=output, units=units, missing=missing)
     if row["range"]:
         found = found[slice(*row["range"])]
     if row["rest"]:
@@ -163,7 +167,7 @@ def python_lines(row: Mapping[str, Any], name: str) -> list[str]:
         lines += [
             f"{name} = cr.Record(",
             f"    {name}.time, signal, output, units={{**{name}.units, **units}},",
-            f"    name={name}.name, missing={missing},",
+            f"    name={name}.name, missing={missing}, reference={name}.reference,",
             f"    input_labels={name}.input_labels, output_labels={name}.output_labels,",
             ")",
         ]

@@ -140,6 +140,7 @@ def _record(record: Record) -> dict[str, Any]:
         "time_unit_assumed": record.units.get("time") == ASSUMED,
         "inputs": signals(record.input_labels, record.input_units),
         "outputs": signals(record.output_labels, record.output_units),
+        "set_point": record.reference is not None,
     }
 
 

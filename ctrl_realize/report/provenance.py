@@ -23,9 +23,9 @@ def versions() -> list[tuple[str, str]]:
 
 
 def record_sha256(record: Record) -> str:
-    """Return the SHA-256 of a record's time, input and output as little-endian float64."""
-    digest = hashlib.sha256()
-    for values in (record.time, record.input, record.output):
+    """Return the SHA-256 of time, input, output and set point as little-endian float64."""
+    digest, wanted = hashlib.sha256(), record.reference
+    for values in (record.time, record.input, record.output, [] if wanted is None else wanted):
         digest.update(np.ascontiguousarray(values, dtype="<f8").tobytes())
     return digest.hexdigest()
 

@@ -126,7 +126,7 @@ def data_table(records: Sequence[Record], files: Paths) -> Table:
             Row((record.name or "record", *_extent(record), record_sha256(record)))
             for record in records
         ]
-        sums = "time, input and output as little-endian float64"
+        sums = "time, input, output and set point as little-endian float64"
     return headed("data", rows, sums=sums)
 
 

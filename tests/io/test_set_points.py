@@ -45,6 +45,7 @@ def read(tmp_path, text, **options):
 def test_a_set_point_goes_wherever_a_record_goes():
     assert_array_equal(RECORD[1:3].reference, WANTED[1:4])
     assert_array_equal(RECORD.with_baseline(0, 0).reference, [np.nan, *WANTED])
+    assert_array_equal(RECORD.__replace__(output=TIME, missing="keep").reference, WANTED)
     assert_array_equal(pickle.loads(pickle.dumps(RECORD)).reference, WANTED)
     frame = RECORD.to_frame()
     again = cr.Record.from_frame(frame, input="u", output="y", reference="reference")

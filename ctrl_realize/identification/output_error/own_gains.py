@@ -113,7 +113,7 @@ def at_model_gain(fit: OutputErrorFit) -> tuple[Record, ...]:
     if gains is None:
         return fit.records
     return tuple(
-        Record(record.time, ratio * record.input, record.output, name=record.name)
+        record.__replace__(input=ratio * record.input)
         for record, kept, ratio in zip(fit.records, gains.kept, gains.ratios, strict=True)
         if kept
     )

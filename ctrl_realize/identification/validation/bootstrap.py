@@ -327,4 +327,4 @@ def _redrawn(
     n = residual.size
     starts = rng.integers(n, size=-(-n // length))
     index = (starts[:, None] + np.arange(length)).ravel()[:n] % n
-    return Record(record.time, record.input, model + residual[index], name=record.name)
+    return record.__replace__(output=model + residual[index])

@@ -123,14 +123,4 @@ def _levels(output: FloatArray, held: BoolArray) -> str:
 
 def _without(record: Record, samples: BoolArray) -> Record:
     """Mark samples as missing."""
-    return Record(
-        record.time,
-        record.input,
-        np.where(samples, np.nan, record.output),
-        name=record.name,
-        input_labels=record.input_labels,
-        units=record.units,
-        output_labels=record.output_labels,
-        missing="keep",
-        reference=record.reference,
-    )
+    return record.__replace__(output=np.where(samples, np.nan, record.output), missing="keep")
