@@ -24,8 +24,9 @@ def versions() -> list[tuple[str, str]]:
 
 def record_sha256(record: Record) -> str:
     """Return the SHA-256 of time, input, output and set point as little-endian float64."""
-    digest, wanted = hashlib.sha256(), record.reference
-    for values in (record.time, record.input, record.output, [] if wanted is None else wanted):
+    digest = hashlib.sha256()
+    known = (record.time, record.input, record.output, record.reference)
+    for values in (one for one in known if one is not None):
         digest.update(np.ascontiguousarray(values, dtype="<f8").tobytes())
     return digest.hexdigest()
 
