@@ -54,6 +54,7 @@ DOCUMENTED = {
         v["PGain (Kp)"] + v["IGain (Ki)"] / 60 / s + 60 * v["DGain (Kd)"] * s / (0.6 * s + 1)
     ),
     "siemens_pid_compact": lambda v: ideal(v["Gain"], v["Ti"], v["Td"], v["TdFiltRatio"] * v["Td"]),
+    "yokogawa_utadvanced": lambda v: ideal(100 / v["P"], v["I"], v["D"], 0.6),
 }
 IN_PERCENT = (UPPER - LOWER) / 20  # %/% of 1
 SCALE = {"siemens_pid_compact": 100 / 20}  # the output only
@@ -86,7 +87,9 @@ def test_the_step_response_of_each_form_is_that_of_the_ideal_one(form):
 
 def test_every_form_is_compared_with_its_equation_and_names_its_document():
     listed = cr.design.pid_forms()
-    bands = {"omron_pidat": "Tik", "abb_commander_1900": "Integral Action Time"}
+    bands = {
+        "omron_pidat": "Tik", "abb_commander_1900": "Integral Action Time", "eurotherm_3116": "TI"
+    }  # fmt: skip
     assert set(listed["form"]) == {*DOCUMENTED, "honeywell_hc900", *bands}
     assert listed["source"].str.len().min() > 20
     # of which only P and PI are documented: 100 / PB, repeats per minute
