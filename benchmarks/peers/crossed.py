@@ -18,6 +18,7 @@ WAYS = (
     "nfoursid: N4SID, order 3",
     "SIPPY: N4SID, order 3",
     "SRIVC (a prototype of ours), order 3",
+    "regularised FIR (TC, of ours), dead time by likelihood",
 )
 Ask = Callable[[str, Measured], Answer | None]
 

@@ -13,6 +13,7 @@ from scipy.signal import lfilter
 import ctrl_realize as cr
 
 from .answers import Answer, of_matrices, of_polynomials, of_step
+from .regularised import from_regularised
 from .srivc import from_srivc
 from .starts import STARTS, from_many_starts
 from .tasks import ORDER, Task
@@ -178,6 +179,11 @@ def scipy_many_starts(task: Task) -> Answer:
 @runner("SRIVC (a prototype of ours), order 3", "scipy", "order")
 def srivc(task: Task) -> Answer:
     return from_srivc(task)
+
+
+@runner("regularised FIR (TC, of ours), dead time by likelihood", "scipy", "nothing")
+def regularised_fir(task: Task) -> Answer:
+    return from_regularised(task)
 
 
 def best_delay(
