@@ -221,6 +221,8 @@ def fit_flows(
         bounds = Bounds(low, high, smooth=True)
         family = FlowFamily(int(lagging), int(lagging), bounds, (-np.inf, np.inf))
         starts = np.array(list(_starts(family, like.dead_time, mean, float(np.sqrt(square)))))
+        if not starts.size:  # responses that begin the other way have a short mean, or none
+            break
         promising = starts[np.argsort(eliminate(problem, family, starts).cost)[:_FOLLOWED]]
         charge = (family.bounds.low.size + 1) * penalty + _CHARGE
         fit = lowest(problem, family, promising, scales.dt, (level + _REACH - charge) * variance)

@@ -1,5 +1,6 @@
 """Output-error fits of many lags, dispersing flows and coloured noise. Simulated."""
 
+import control as ct
 import numpy as np
 import pytest
 from scipy.linalg import toeplitz
@@ -225,3 +226,15 @@ def test_noise_that_only_the_response_has_is_not_made_white_with_the_colour_of_t
     fit = cr.fit_output_error(step(37, noise), **LAGS).fit
     assert ("generalised" in fit.report()) == like
     assert covers(fit, 37)
+
+
+def test_a_response_with_a_short_mean_and_a_long_end_is_no_flow():
+    """Two zeros: the mean of the pulse response is shorter than a twentieth of its spread."""
+    time = 0.1 * np.arange(300)
+    drive = (time >= 3).astype(float)
+    plant = ct.sample_system(ct.tf([50, 4.4, 1], np.polymul([2, 3, 1], [1, 1])), 0.1)
+    output = np.r_[np.zeros(5), ct.forced_response(plant, time, drive).outputs[:-5]]
+    output += 0.02 * np.random.default_rng(0).standard_normal(300)
+    fit = cr.identify(cr.Record(time, drive, output)).fit
+    assert fit.interval[0] <= 0.5 <= fit.interval[1]
+    assert fit.gain == pytest.approx(1, rel=0.01)
