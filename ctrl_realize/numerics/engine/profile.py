@@ -77,20 +77,34 @@ def dead_time_profile(
     return profile_curve(points, candidate, variance, scales)
 
 
-def profile_points(
+def profile_grid(
     problem: Problem, candidate: Candidate, variance: float, scales: Scales
-) -> Points:
-    """Best models for a grid of dead times that brackets the ends of the interval."""
+) -> FloatArray:
+    """Dead times (G,) that bracket the ends of the interval of a structure."""
     half = _EDGE * dead_time_error(problem, candidate, variance)
-    structure, bounds = candidate.structure, parameter_bounds(candidate.structure, scales)
+    bounds = parameter_bounds(candidate.structure, scales)
     low, high = float(bounds.low[0]), float(bounds.high[0])
     grid = np.linspace(low, high, _FAR)
     if np.isfinite(half):
         grid = np.concatenate([candidate.dead_time + half * _NEAR, grid])
     grid = np.concatenate([within_a_sample(candidate, scales), grid])
-    grid = np.unique(np.clip(grid, low, high))
-    starts = np.tile(candidate.parameters, (grid.size, 1))
-    starts[:, 0] = grid
+    return np.unique(np.clip(grid, low, high))
+
+
+def profile_points(
+    problem: Problem,
+    candidate: Candidate,
+    variance: float,
+    scales: Scales,
+    starts: FloatArray | None = None,
+) -> Points:
+    """Best models for the dead times of starts (G, k), by default those of `profile_grid`."""
+    if starts is None:
+        grid = profile_grid(problem, candidate, variance, scales)
+        starts = np.tile(candidate.parameters, (grid.size, 1))
+        starts[:, 0] = grid
+    grid = starts[:, 0].copy()
+    structure, bounds = candidate.structure, parameter_bounds(candidate.structure, scales)
     level = candidate.cost + CHI2_95 * variance
 
     def followed(starts: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -12,9 +12,9 @@ TOTAL = PLANT.dead_time + sum(PLANT.lags)
 TIME = np.arange(900.0)
 
 
-def loop(case, moves="three", seed=7):
-    """Record of a loop with the plant above."""
-    wanted, bare = record(PLANT, CASES[case], moves, seed)
+def loop(case, moves="three", seed=7, plant=PLANT):
+    """Record of a loop, by default with the plant above."""
+    wanted, bare = record(plant, CASES[case], moves, seed)
     return cr.Record(bare.time, bare.input, bare.output, reference=wanted)
 
 
@@ -78,6 +78,18 @@ def test_in_white_noise_the_dead_time_is_known_to_half_a_sample():
     assert abs(fit.dead_time - PLANT.dead_time) < 0.5
     assert fit.interval[0] <= PLANT.dead_time <= fit.interval[1]
     assert "small_set_point" not in {one.code for one in fit.flags}
+
+
+@pytest.mark.parametrize(
+    ("case", "moves"),
+    [("white", "three"), ("quantised", "one")],
+    ids=["no lag seen", "begins early"],
+)
+def test_a_long_dead_time_is_within_the_interval(case, moves):
+    """Where a second lag does not show, and where the first lag alone seems to begin at once."""
+    plant = PLANTS["3"]
+    low, high = cr.identify(loop(case, moves, 500, plant)).fit.interval
+    assert low <= plant.dead_time <= high
 
 
 def test_stretches_in_manual_are_told():

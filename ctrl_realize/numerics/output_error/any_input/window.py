@@ -35,7 +35,7 @@ from ...signals.noise import correlation_time, quantisation_step, winsorised_sig
 from ...signals.noise_model import noise_lags, whitening_filter
 from ...signals.onset import correlation_onset
 from ..result import UnweightedModel
-from .data import SampledData
+from .data import BEYOND, SampledData
 
 ORDERS = tuple(Structure(n, r) for n in range(1, 4) for r in range(n, 0, -1))
 """Every sample counts here, so that orders 4 and 5 would take most of the time."""
@@ -84,10 +84,12 @@ def fit_windows(
     huber: bool,
     noise: FloatArray,
     residual: tuple[FloatArray, ...] = (),
+    longest: float = 0.0,
 ) -> SampledWindow:
     """Fit structures to filtered records, every record weighted by its noise.
 
-    Dead times are sought `within` these, in s; `residual` as for `SampledData.whitened`.
+    Dead times are sought `within` these, in s; `residual` as for `SampledData.whitened`. What
+    depends on the input before the records for a dead time of `longest` is left out in any case.
     """
     dt, n, usual = data.step, max(y.size for y in data.outputs), data.spacing * data.dt
     order = noise.size - 1
@@ -96,7 +98,7 @@ def fit_windows(
     filtered = data.whitened(noise, residual)
     rough = _first_order(filtered.problem, n, dt, usual, within, _seen(filtered, within[1]))
     lag = float(-1.0 / rough.poles[0].real)
-    data = data.after(rough.dead_time)
+    data = data.after(max(rough.dead_time, longest / BEYOND))
     length = (max(data.lengths) - order) * dt
     onset, rise = max(rough.dead_time, 0.5 * usual), max(lag, 2 * usual)
     scales = Scales(onset, rise, length, dt, within[1], within[0])
