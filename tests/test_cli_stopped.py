@@ -93,7 +93,8 @@ def test_a_stopped_campaign_goes_on_where_it_was_with_the_same_files(
         stop_after(patched, (rows, "identify"), 2)
         assert main(command) == 130
     assert "2 finished records are kept" in capsys.readouterr().err
-    assert len(list((out / "rows").iterdir())) == 2
+    assert len(cr.io.CampaignStore(out / "rows.sqlite")) == 2
+    assert {path.name for path in out.iterdir()} == {"rows.sqlite"}
     assert {path.name for path in tmp_path.iterdir()} == {"out"}
     with monkeypatch.context() as patched:
         calls = stop_after(patched, (rows, "identify"), COUNT)
@@ -107,14 +108,20 @@ def full(*_, **__):
 
 
 def test_a_disk_that_is_full_loses_no_result(files, tmp_path, capsys, monkeypatch):
-    with monkeypatch.context() as patched:
-        patched.setattr("ctrl_realize.io.store.write_text", full)
-        records = [cr.read_record(file) for file in files]
-        store = cr.io.CampaignStore(tmp_path / "store")
+    resource = pytest.importorskip("resource", reason="the system limits no files")
+    records = [cr.read_record(file) for file in files]
+    store = cr.io.CampaignStore(tmp_path / "rows.sqlite")
+    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+    try:  # no file may grow: the system says "full" to whoever writes
+        resource.setrlimit(resource.RLIMIT_FSIZE, (store.path.stat().st_size, limits[1]))
         kept = cr.identify_campaign(records, store=store, **OPTIONS)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
     assert len(kept.good) == COUNT
-    assert all("No space left" in row.warnings[-1] for row in kept.rows)
+    assert all("not saved in the store: " in row.warnings[-1] for row in kept.rows)
     assert len(store) == 0
+    cr.identify_campaign(records, store=store, **OPTIONS)
+    assert len(store) == COUNT
     monkeypatch.setattr("ctrl_realize.cli.results.report.write_campaign", full)
     main(["identify", *files, "-o", str(tmp_path / "out"), *QUICK])
     assert "the report could not be written (OSError" in capsys.readouterr().err
@@ -124,21 +131,15 @@ def test_a_disk_that_is_full_loses_no_result(files, tmp_path, capsys, monkeypatc
 def test_a_disk_that_is_full_at_the_end_keeps_the_rows_and_says_how_to_go_on(
     files, tmp_path, capsys, monkeypatch
 ):
-    out, real = tmp_path / "out", os.fsync
+    out = tmp_path / "out"
     command = ["identify", *files, "-o", str(out), "--no-report", *QUICK]
-
-    def filling(descriptor):
-        if len(list(out.glob("rows/row-*.json"))) == COUNT:
-            full()
-        real(descriptor)
-
     with monkeypatch.context() as patched:
-        patched.setattr(os, "fsync", filling)
+        patched.setattr(os, "fsync", full)  # what SQLite calls is another one
         assert main(command) == 2
     kept, why = capsys.readouterr().err.splitlines()[-2:]
     assert kept == (
-        f"ctrl-realize: {COUNT} finished records are kept in {out / 'rows'}; run the same command "
-        "again to continue"
+        f"ctrl-realize: {COUNT} finished records are kept in {out / 'rows.sqlite'}; run the same "
+        "command again to continue"
     )
     assert why.startswith(f"ctrl-realize: {out}")  # the system names no file
     assert why.endswith("model.json: No space left on device")
@@ -204,7 +205,7 @@ def test_a_termination_leaves_finished_rows_and_neither_workers_nor_folders(file
     environment = {**os.environ, "TMPDIR": str(temporary)}
     words = ["identify", *files * 8, "-o", str(out), "--jobs", "2", *QUICK]
     process = started(*words, env=environment)
-    while not list(out.glob("rows/row-*.json")):
+    while not (out / "rows.sqlite").exists() or not len(cr.io.CampaignStore(out / "rows.sqlite")):
         assert process.poll() is None, process.communicate()
         time.sleep(0.02)
     process.terminate()
@@ -213,9 +214,7 @@ def test_a_termination_leaves_finished_rows_and_neither_workers_nor_folders(file
     assert complained.splitlines()[-1] == (
         "ctrl-realize: terminated; unfinished results were not written"
     )
-    assert {path.name for path in out.iterdir()} == {"rows"}
-    assert all(path.name.startswith("row-") for path in (out / "rows").iterdir())
-    assert not list(temporary.glob("ctrl_realize-*"))
+    assert {path.name for path in out.iterdir()} == {"rows.sqlite"}
     deadline = time.monotonic() + 20
     while left_in_session(process) and time.monotonic() < deadline:
         time.sleep(0.1)
@@ -312,31 +311,28 @@ def test_the_manifest_names_command_versions_inputs_and_files(files, tmp_path, c
     assert not {name for name in files_in(out) if name.startswith(("models/", "records"))}
 
 
-def test_a_record_over_which_the_process_died_twice_is_not_tried_for_ever(tmp_path):
-    store = cr.io.CampaignStore(tmp_path)
-    dying = (
-        "import os, signal, sys\n"
-        "import ctrl_realize as cr\n"
-        "store = cr.io.CampaignStore(sys.argv[1])\n"
-        "if os.fork():\n"  # one process that dies in a record, and then the other one
-        "    os.wait()\n"
-        "from ctrl_realize.io.atomic import replaced_when_complete\n"
-        "row = store.folder / 'row-key.json'\n"
-        "with store.attempt(sys.argv[2]), replaced_when_complete(row):\n"
-        "    os.kill(os.getpid(), signal.SIGKILL)\n"
-    )
-    died = subprocess.run([sys.executable, "-c", dying, str(tmp_path), "key"], check=False)
-    assert died.returncode == -signal.SIGKILL
-    with pytest.raises(cr.errors.DataError, match="killed 2 times"), store.attempt("key"):
-        pass
-    with store.attempt("another"):
-        pass
-    partial_rows = [path for path in tmp_path.iterdir() if path.name != "tried-key.txt"]
-    assert [path.suffix for path in partial_rows] == [".tmp"] * 2
-    store.forget_attempts()
-    with store.attempt("key"):  # a new start
-        assert len(store) == 0
-    assert list(tmp_path.iterdir()) == []
+def killed_here(killers: str, folder: str) -> list[str | None]:
+    """Identify four records in this process, some of which kill it; return the errors."""
+    sources = [partial(killed if str(k) in killers else record, k) for k in range(COUNT)]
+    store = cr.io.CampaignStore(Path(folder) / "rows.sqlite")
+    return [row.error for row in cr.identify_campaign(sources, store=store, **OPTIONS).rows]
+
+
+@pytest.mark.slow
+def test_records_over_which_the_process_itself_was_killed_are_rows_when_it_is_resumed(tmp_path):
+    call = "import sys; from tests.test_cli_stopped import killed_here; killed_here(*sys.argv[1:])"
+    died = [
+        subprocess.run([sys.executable, "-c", call, "13", str(tmp_path)], check=False).returncode
+        for _ in range(2)
+    ]
+    assert died == [-signal.SIGKILL] * 2  # over record 1, and over record 3
+    errors = killed_here("13", str(tmp_path))
+    assert [error is None for error in errors] == [True, False, True, False]
+    assert "was killed by the system (SIGKILL(-9)" in errors[1]
+    mark = tmp_path / "rows.sqlite-running"
+    assert sorted(mark.read_text().split()) == ["1", "3"]  # also in the next run
+    assert killed_here("", str(tmp_path)) == [None] * COUNT
+    assert [path.name for path in tmp_path.iterdir()] == ["rows.sqlite"]
 
 
 def test_a_reader_that_goes_away_costs_no_result(files, tmp_path):

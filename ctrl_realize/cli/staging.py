@@ -16,8 +16,8 @@ from .manifest import NAME as MANIFEST
 from .manifest import Run, refuse_other_results, result_files, write_manifest
 from .terminal import complain, printable
 
-ROWS = "rows"
-"""Folder of finished records within that of the results, while a campaign runs."""
+ROWS = "rows.sqlite"
+"""File of finished records in the folder of the results, while a campaign runs."""
 
 
 @contextmanager
@@ -93,10 +93,9 @@ def kept_rows(output: Path) -> Iterator[CampaignStore]:
         _remove_rows(store, made)
         raise
     except (KeyboardInterrupt, OSError):
-        store.forget_attempts()
         if len(store):
             complain(
-                f"{len(store)} finished records are kept in {printable(str(store.folder))}; "
+                f"{len(store)} finished records are kept in {printable(str(store.path))}; "
                 "run the same command again to continue"
             )
         else:
@@ -112,11 +111,10 @@ def refuse_a_file(output: Path) -> None:
 
 
 def _remove_rows(store: CampaignStore, made: Sequence[Path]) -> None:
-    """Remove the rows of a store, and the folders created for it if they are empty."""
-    store.forget_attempts()
-    for path in store.folder.glob("row-*.json"):
+    """Remove a store with what is beside it, and the folders created for it if they are empty."""
+    for path in store.path.parent.glob(f"{store.path.name}*"):
         path.unlink(missing_ok=True)
-    for folder in (store.folder, *made):
+    for folder in made:
         _remove_if_empty(folder)
 
 

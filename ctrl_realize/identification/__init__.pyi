@@ -3,6 +3,7 @@
 from .campaign.campaign import Campaign as Campaign
 from .campaign.rows import CampaignRow as CampaignRow
 from .campaign.run import identify_campaign as identify_campaign
+from .campaign.run import identify_each as identify_each
 from .impulse.from_io import impulse_from_io as impulse_from_io
 from .joint.fit import fit_joint as fit_joint
 from .joint.result import JointFit as JointFit

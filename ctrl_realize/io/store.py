@@ -1,186 +1,216 @@
-"""Folder with the finished rows of a campaign, so that an interrupted run can be resumed."""
+"""File with the finished rows of a campaign, so that an interrupted run can be resumed."""
 
 from __future__ import annotations
 
 import json
 import os
-from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+import sqlite3
+import zlib
+from collections.abc import Iterator, Sequence
+from contextlib import closing, contextmanager, nullcontext
+from dataclasses import replace
+from functools import partial
+from math import isnan, nan
 from pathlib import Path
 from typing import Any
 
 from ..delayed import DelayedStateSpace
-from ..errors import DataError, FileFormatError, OptionError
-from ..identification.campaign.rows import CampaignRow, versions
+from ..errors import FileFormatError, OptionError
+from ..identification.campaign.rows import CampaignRow, unsaved
 from ..results import Flag
-from .atomic import write_text
-from .checks import usable_file
-from .json_content import field
-from .models import MAX_MODEL_BYTES, checksum, model_from_text, model_to_text
+from .models import MAX_MODEL_BYTES, model_from_text, model_to_text
 
-FORMAT = "ctrl_realize campaign row"
-SCHEMA = 4
-_INTERVALS = ("interval", "total_delay_interval")
-_NUMBERS = ("amplitude", "delay", "dead_time", "residual", "gain", "gain_std", "total_delay")
-
-MOST_TRIES = 2
-"""Number of times that a process may be killed over a record."""
+SCHEMA = 5
+"""Number of this format in the file; up to 4 it was a folder."""
+_APPLICATION = 0x63726361
+"""Mark of the file for SQLite, "crca"."""
+_NUMBERS = (
+    "amplitude", "delay", "dead_time", "residual", "gain", "gain_std", "total_delay", "dt",
+)  # fmt: skip
+_COLUMNS = (
+    "key", "name", *_NUMBERS, "low", "high", "total_low", "total_high", "order", "flags",
+    "warnings", "settings", "model",
+)  # fmt: skip
+_QUOTED = ", ".join(f'"{name}"' for name in _COLUMNS)
+_CREATE = (
+    f"BEGIN IMMEDIATE; CREATE TABLE IF NOT EXISTS rows ({_QUOTED}, crc32, PRIMARY KEY (key)); "
+    f"PRAGMA application_id = {_APPLICATION}; PRAGMA user_version = {SCHEMA}; COMMIT"
+)
+_LOAD = f"SELECT {_QUOTED}, crc32 FROM rows WHERE key = ?"
+_SAVE = f"INSERT OR REPLACE INTO rows VALUES ({', '.join('?' * (len(_COLUMNS) + 1))})"
+_WAIT = 60
+"""Time in s during which another process may write."""
 
 
 class CampaignStore:
-    """Folder in which the result of each record of a campaign is stored as soon as it is finished.
+    """File in which the result of each record of a campaign is stored as soon as it is finished.
 
-    Each row is a JSON file, written atomically, named by the SHA-256 of the record's samples, the
-    settings and the versions of this package, NumPy and SciPy, with a checksum of its content;
-    processes and machines that share the folder can write to it at the same time. Rows of other
-    versions and damaged files are not used: the record is identified again. Only files of this
-    package are read, and no row is deleted. A record over which the process was killed twice is not
-    tried again: its row has that error.
+    An SQLite database with one table, ``rows``: ``pandas.read_sql("SELECT * FROM rows",
+    sqlite3.connect(path))`` reads it. A row is written in a transaction, by the process that calls
+    `identify_campaign`, so that there are whole rows only, whenever that process is killed. Its key
+    is the SHA-256 of the record's samples and labels, the settings and the versions of this
+    package, NumPy and SciPy; of a file that ``functools.partial(cr.read_record, path)`` reads, its
+    path, size and time of change stand for the samples. A row whose CRC-32 does not match is not
+    used: the record is identified again. No row is deleted. Several runs, also of other settings,
+    may use one file at the same time. A record over which the process was killed is identified in a
+    process of its own when the run is resumed.
 
     Parameters
     ----------
-    folder : path-like
-        Created if it does not exist.
+    path : path-like
+        Created, with its folder, if it does not exist.
+
+    Attributes
+    ----------
+    path : pathlib.Path
 
     Raises
     ------
     OptionError
-        The path is a file.
+        The path is a folder, as of earlier versions, or a device.
+    FileFormatError
+        The file is no campaign store, or one of another version.
+    OSError
+        It cannot be written.
 
     Examples
     --------
     >>> import tempfile
+    >>> from pathlib import Path
     >>> import ctrl_realize as cr
     >>> records = [cr.bench.valve().step_record(16.0, seed) for seed in range(2)]
     >>> with tempfile.TemporaryDirectory() as folder:
-    ...     store = cr.io.CampaignStore(folder)
+    ...     store = cr.io.CampaignStore(Path(folder) / "finished.sqlite")
     ...     first = cr.identify_campaign(records, method="paper", store=store)
     ...     again = cr.identify_campaign(records, method="paper", store=store)
     ...     print(len(store), bool((first.delays == again.delays).all()))
     2 True
     """
 
-    def __init__(self, folder: str | os.PathLike[str]) -> None:
-        self.folder = Path(folder)
-        if self.folder.exists() and not self.folder.is_dir():
-            raise OptionError(f"{self.folder} is a file; a campaign store needs a folder")
-        self.folder.mkdir(parents=True, exist_ok=True)
+    def __init__(self, path: str | os.PathLike[str]) -> None:
+        self.path = Path(path)
+        self._database: sqlite3.Connection | None = None
+        if self.path.exists() and not self.path.is_file():
+            raise OptionError(
+                f"{self.path} is a folder or a device; a campaign store is one file, such as "
+                f"{self.path.name}.sqlite. Rows that an earlier version kept in a folder are not "
+                "used: with the name of a new file the records are identified again"
+            )
+        self.path.parent.mkdir(parents=True, exist_ok=True)
+        new = not self.path.exists() or not self.path.stat().st_size
+        with self._connected("rwc") as database:
+            if new:  # another process may create it at the same time
+                database.executescript(_CREATE)
+            found = database.execute("SELECT * FROM pragma_application_id, pragma_user_version")
+            kind, schema = found.fetchone()
+        if (kind, schema) != (_APPLICATION, SCHEMA):
+            got = f"schema {schema}" if kind == _APPLICATION else "another SQLite database"
+            raise FileFormatError(
+                f"{self.path}: expected a campaign store of schema {SCHEMA}, got {got}; give the "
+                "name of a new file"
+            )
 
     def __len__(self) -> int:
-        return sum(1 for _ in self.folder.glob("row-*.json"))
+        with self._connected() as database:
+            return int(database.execute("SELECT count(*) FROM rows").fetchone()[0])
 
     def __repr__(self) -> str:
-        return f"<CampaignStore {str(self.folder)!r}: {len(self)} rows>"
+        return f"<CampaignStore {str(self.path)!r}>"
 
-    def _path(self, key: str) -> Path:
-        return self.folder / f"row-{key}.json"
+    def __getstate__(self) -> dict[str, Any]:
+        return {"path": self.path, "_database": None}
+
+    @contextmanager
+    def opened(self) -> Iterator[None]:
+        """Keep the file open for the duration of the block, which is faster."""
+        with self._connected() as self._database:
+            try:
+                yield
+            finally:
+                self._database = None
 
     def load(self, key: str) -> CampaignRow | None:
-        """Return the row stored under `key`; None if there is none, or its file is damaged."""
-        path = self._path(key)
+        """Return the row stored under `key`; None if there is none, or it is damaged."""
         try:
-            # the content may come from others: a pipe would never end
-            file = usable_file(path, 2 * MAX_MODEL_BYTES)
-            return _row_from(json.loads(file.read_text(encoding="utf-8")), key)
-        except (OSError, ValueError, TypeError, RecursionError):
+            with self._connected() as database:
+                *values, stored = database.execute(_LOAD, (key,)).fetchone() or (None,)
+            # a damaged index leads to the row of another key
+            good = values[:1] == [key] and stored == _checksum(values)
+            return _row_from(values) if good else None
+        except (OSError, ValueError, TypeError):
             # FileFormatError is a ValueError: for any error the record is identified again
             return None
 
-    def save(self, key: str, row: CampaignRow) -> CampaignRow:
-        """Store a row with a model; return it as `load` would, with a summary of its fit."""
-        system = row.system
-        assert system is not None
-        content = {
-            "format": FORMAT,
-            "schema": SCHEMA,
-            "key": key,
-            "versions": versions(),
-            "name": row.name,
-            # JSON has no infinity or NaN; they are stored as text
-            "numbers": {name: repr(float(getattr(row, name))) for name in _NUMBERS},
-            **{name: [repr(float(end)) for end in getattr(row, name)] for name in _INTERVALS},
-            "flags": [[flag.code, flag.message] for flag in row.flags],
-            "warnings": list(row.warnings),
-            "model": json.loads(model_to_text(system)),
-        }
-        content["sha256"] = checksum(content)
-        write_text(self._path(key), json.dumps(content, indent=1, allow_nan=False) + "\n")
-        return _row_from(content, key)
+    def packed(self, row: CampaignRow) -> CampaignRow:
+        """Reduce the model of a row to what is stored, with a summary of its fit."""
+        assert row.system is not None
+        text = model_to_text(row.system).encode()
+        return replace(row, _model=partial(_unpacked, zlib.compress(text)))
+
+    def save(self, rows: Sequence[tuple[str, CampaignRow]], settings: str) -> list[CampaignRow]:
+        """Store packed rows under their keys, all or none; return them, with a warning if none."""
+        written = [_values(key, row, settings) for key, row in rows]
+        try:
+            with self._connected() as database, database:
+                database.executemany(_SAVE, [[*one, _checksum(one)] for one in written])
+        except (OSError, FileFormatError) as error:  # a full disk: the results stay in memory
+            return [unsaved(row, error) for _, row in rows]
+        return [row for _, row in rows]
 
     @contextmanager
-    def attempt(self, key: str) -> Iterator[None]:
-        """Mark the record with this key as being identified, for the duration of the block.
-
-        If the process is killed within the block the mark remains, so that a record that exhausts
-        the memory is not tried endlessly.
-
-        Raises
-        ------
-        DataError
-            The process was killed twice over this record.
-        """
-        path = self.folder / f"tried-{key}.txt"
-        count = _count(path)
-        if count >= MOST_TRIES:
-            raise DataError(
-                f"the process was killed {count} times while it identified this record "
-                f"(usually lack of memory); remove {path} to try again"
-            )
-        with suppress(OSError):  # a full disk prevents the mark, not the result
-            write_text(path, f"{count + 1}\n")
+    def _connected(self, mode: str = "rw") -> Iterator[sqlite3.Connection]:
+        address = f"{self.path.absolute().as_uri()}?mode={mode}"
         try:
-            yield
-        finally:
-            with suppress(OSError):
-                path.unlink()
-
-    def forget_attempts(self) -> None:
-        """Remove the marks of running records, when the caller stops the run.
-
-        So are files that a process was killed over while it wrote them.
-        """
-        for left in ("tried-*.txt", ".tried-*.tmp", ".row-*.tmp"):
-            for path in self.folder.glob(left):
-                path.unlink(missing_ok=True)
-
-
-def _count(path: Path) -> int:
-    """Number in a mark; zero if it is damaged or does not exist."""
-    try:
-        return int(usable_file(path, 100).read_text(encoding="ascii"))
-    except (OSError, ValueError):
-        return 0
+            # rows may be taken by other threads, one at a time
+            database = self._database or sqlite3.connect(
+                address, _WAIT, uri=True, isolation_level="IMMEDIATE", check_same_thread=False
+            )
+            with nullcontext() if self._database else closing(database):
+                yield database
+        except sqlite3.OperationalError as error:
+            raise OSError(f"{self.path}: {error}") from error
+        except (sqlite3.DatabaseError, UnicodeError) as error:
+            raise FileFormatError(
+                f"{self.path}: no campaign store, or damaged ({error}); give the name of a new file"
+            ) from error
 
 
-def _row_from(content: Any, key: str) -> CampaignRow:
-    if not isinstance(content, dict) or content.get("format") != FORMAT:
-        raise FileFormatError("not a row of a campaign")
-    if content.get("schema") != SCHEMA or content.get("key") != key:
-        raise FileFormatError("a row of another format, or under another name")
-    if content.get("versions") != versions():
-        raise FileFormatError("a row made by another version")
-    if content.get("sha256") != checksum(content):
-        raise FileFormatError("the checksum does not match the content")
-    numbers: dict[str, Any] = {
-        name: float(text)
-        for name, text in field(content, "numbers", dict).items()
-        if name in _NUMBERS
-    }
-    intervals: dict[str, Any] = {}
-    for name in _INTERVALS:
-        low, high = (float(text) for text in field(content, name, list))
-        intervals[name] = (low, high)
-    system = model_from_text(json.dumps(field(content, "model", dict)))
+def _unpacked(content: bytes) -> DelayedStateSpace:
+    """Model of a row, made when it is asked for."""
+    text = zlib.decompressobj().decompress(content, MAX_MODEL_BYTES)
+    system = model_from_text(text.decode())
     if not isinstance(system, DelayedStateSpace):
         raise FileFormatError("a row with a model that no record gives")
-    flags = tuple(Flag(str(code), str(text)) for code, text in field(content, "flags", list))
-    if system.fit is not None and system.fit.flags == flags:
-        flags = system.fit.flags  # once in memory
+    return system
+
+
+def _values(key: str, row: CampaignRow, settings: str) -> list[Any]:
+    """Row of the table; SQLite has no NaN."""
+    numbers = [*(getattr(row, name) for name in _NUMBERS), *row.interval, *row.total_delay_interval]
+    flags = json.dumps([[flag.code, flag.message] for flag in row.flags])
+    assert isinstance(row._model, partial)
+    return [
+        key, row.name, *(None if isnan(one) else float(one) for one in numbers), row.order, flags,
+        json.dumps(row.warnings), settings, row._model.args[0],
+    ]  # fmt: skip
+
+
+def _row_from(values: Sequence[Any]) -> CampaignRow:
+    _, name, *stored, order, flags, warnings, _, model = values
+    numbers = [nan if one is None else float(one) for one in stored]
+    *scalars, low, high, total_low, total_high = numbers
+    known: dict[str, Any] = dict(zip(_NUMBERS, scalars, strict=True))
     return CampaignRow(
-        name=field(content, "name", str),
-        **numbers,
-        **intervals,
-        system=system,
-        flags=flags,
-        warnings=tuple(str(text) for text in field(content, "warnings", list)),
+        name,
+        **known,
+        interval=(low, high),
+        total_delay_interval=(total_low, total_high),
+        order=order,
+        flags=tuple(Flag(code, message) for code, message in json.loads(flags)),
+        warnings=tuple(json.loads(warnings)),
+        _model=partial(_unpacked, model),
     )
+
+
+def _checksum(values: Sequence[Any]) -> int:
+    return zlib.crc32(repr(list(values)).encode())

@@ -224,5 +224,5 @@ def _records_of(campaign: Campaign, most: int) -> list[Record]:
     """Return records of a campaign that were identified, evenly spaced if there are many."""
     every = max(1, -(-len(campaign.good) // most))
     pairs = zip(campaign.rows, campaign.sources, strict=True)
-    sources = [source for row, source in pairs if row.system is not None][::every]
+    sources = [source for row, source in pairs if row.error is None][::every]
     return [one if isinstance(one, Record) else one() for one in sources]

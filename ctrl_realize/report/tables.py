@@ -144,8 +144,8 @@ def campaign_table(campaign: Campaign) -> Table:
     best = campaign.best.name
     rows = []
     for row in campaign.rows:
-        if row.system is None:
-            cells = [row.name, in_digits(row.amplitude), "", "", "", "", "", row.error or "failed"]
+        if row.error is not None:
+            cells = [row.name, in_digits(row.amplitude), "", "", "", "", "", row.error]
             rows.append(Row(tuple(cells), "failed"))
             continue
         low, dead_time, high = _dead_time_cells(row, scale)

@@ -17,6 +17,7 @@ PAGES: dict[str, tuple[str, ...]] = {
     "identify": ("tutorial", "howto/trust_delay", "howto/choose_order"),
     "app": ("howto/app",),
     "identify_campaign": ("howto/several_records", "howto/cluster"),
+    "identification.identify_each": ("howto/several_records", "howto/cluster"),
     "Campaign": ("howto/several_records",),
     "identification.CampaignRow": ("howto/several_records",),
     "identification.RecordGains": ("howto/several_records",),

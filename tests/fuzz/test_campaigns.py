@@ -3,6 +3,7 @@
 import contextlib
 import pickle
 import shutil
+import sqlite3
 import warnings
 from dataclasses import dataclass
 from unittest.mock import patch
@@ -12,7 +13,7 @@ import pytest
 from numpy.testing import assert_array_equal
 
 import ctrl_realize as cr
-from ctrl_realize.errors import DataError
+from ctrl_realize.errors import DataError, FileFormatError
 from ctrl_realize.identification.campaign import rows
 from tests.fuzz.draws import any_bytes, any_text, sometimes
 from tests.fuzz.lane import fuzz, good_end
@@ -133,38 +134,52 @@ class StopsAt:
 class CutStore(cr.io.CampaignStore):
     """A store whose process ends before, or just after, a row is written."""
 
-    def __init__(self, folder, rng):
-        super().__init__(folder)
+    def __init__(self, path, rng):
+        super().__init__(path)
         self.left, self.after = rng.randint(0, 4), rng.randrange(2)
 
-    def save(self, key, row):
+    def save(self, rows, settings):
         self.left -= 1
         if self.left == 0 and not self.after:
             raise Stopped
-        kept = super().save(key, row)
+        kept = super().save(rows, settings)
         if self.left == 0:
             raise Stopped
         return kept
 
 
-def spoil(rng, folder) -> None:
-    """Damage, empty, exchange, remove and add files of a store."""
-    for path in sorted(folder.glob("row-*.json")):
-        kind, content = rng.randrange(8), path.read_bytes()
-        if kind == 0 and content:
-            path.write_bytes(damaged(rng, content))
-        elif kind == 1:
-            path.write_bytes(any_bytes(rng, 40))
-        elif kind == 2:
-            path.write_bytes(content.replace(b'"delay": "', b'"delay": "9'))
-        elif kind == 3:
-            path.unlink()
-        elif kind == 4:
-            path.write_bytes(rng.choice(sorted(folder.glob("row-*.json"))).read_bytes())
+def opened(path, kind=cr.io.CampaignStore, *more):
+    """A store; a file so damaged that it is refused, before anything is identified, is removed."""
+    try:
+        return kind(path, *more)
+    except (FileFormatError, OSError):
+        path.unlink()
+        return kind(path, *more)
+
+
+def spoil(rng, path) -> None:
+    """Damage, empty, exchange and remove rows of a store, or the file."""
+    with (
+        contextlib.suppress(sqlite3.Error),  # it is damaged already
+        contextlib.closing(sqlite3.connect(path)) as database,
+        database,
+    ):
+        keys = [key for (key,) in database.execute("SELECT key FROM rows ORDER BY rowid")]
+        for key in keys:
+            change = rng.choice([
+                "model = ?1", "flags = ?1", "delay = delay + 1", "name = NULL", "crc32 = NULL",
+                "(delay, model, crc32) = (SELECT delay, model, crc32 FROM rows WHERE key = ?1)",
+                *["key = key"] * 3,
+            ])  # fmt: skip
+            value = rng.choice(keys) if "SELECT" in change else any_bytes(rng, 40)
+            known = (value, key) if "?1" in change else (None, key)
+            database.execute(f"UPDATE rows SET {change} WHERE key = ?2", known)
+            if sometimes(rng, 8):
+                database.execute("DELETE FROM rows WHERE key = ?", (key,))
     if sometimes(rng, 3):
-        (folder / rng.choice(["row-.json", "row-x.json", ".tmp", "notes.txt"])).write_bytes(
-            any_bytes(rng, 20)
-        )
+        path.write_bytes(damaged(rng, path.read_bytes()))
+    if sometimes(rng, 3):
+        path.with_name(f"{path.name}-running").write_bytes(rng.choice([b"", b"\xff\0", b"99 12"]))
 
 
 def same(one: cr.Campaign, other: cr.Campaign) -> None:
@@ -215,6 +230,7 @@ def stopped_campaign(rng, tmp_path_factory):
         sources.append(rng.choice(sources))
     settings = rng.choice(SETTINGS)
     folder = tmp_path_factory.mktemp("store")
+    path = folder / "rows.sqlite"
     with good_end() as campaigns:
         campaigns.append(cr.identify_campaign(sources, **settings))
     (whole,) = campaigns
@@ -227,15 +243,14 @@ def stopped_campaign(rng, tmp_path_factory):
         try:
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore")
-                cr.identify_campaign(stopping, store=CutStore(folder, rng), **settings)
+                cr.identify_campaign(stopping, store=opened(path, CutStore, rng), **settings)
         except Stopped:
             pass
         if rng.randrange(2):
-            spoil(rng, folder)
+            spoil(rng, path)
     for _ in range(2):  # the second time all rows come from the store
-        store = cr.io.CampaignStore(folder)
         with good_end() as campaigns:
-            campaigns.append(cr.identify_campaign(sources, store=store, **settings))
+            campaigns.append(cr.identify_campaign(sources, store=opened(path), **settings))
         same(campaigns[0], whole)
     shutil.rmtree(folder)
 

@@ -277,7 +277,7 @@ def test_a_file_name_that_is_no_utf8_does_not_lose_a_campaign(tmp_path):
     except OSError:
         pytest.skip("this file system takes no such names")
     sources = [functools.partial(cr.read_record, path) for path in paths]
-    store = cr.io.CampaignStore(tmp_path / "rows")
+    store = cr.io.CampaignStore(tmp_path / "rows.sqlite")
     campaign = cr.identify_campaign(sources, method="scan", order=1, max_delay=9, store=store)
     assert (len(campaign.good), len(store)) == (1, 1)
     assert "udcff" in campaign.table().index[0]

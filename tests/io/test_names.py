@@ -71,17 +71,18 @@ def test_model_file_and_table_give_every_printable_character_back(tmp_path):
 
 def test_a_store_gives_a_name_of_every_printable_character_back(tmp_path):
     record = cr.Record(*step_samples(), name=r"a\1 {b} $c$", input_labels=["FIC101.OP"])
-    store = cr.io.CampaignStore(tmp_path)
+    store = cr.io.CampaignStore(tmp_path / "rows.sqlite")
     campaign = cr.identify_campaign([record], store=store, method="scan", order=1, max_delay=40)
     (row,) = campaign.rows
     assert (row.name, row.error, row.warnings) == (r"a\1 {b} $c$", None, ())
     assert row.system.input_labels == ["FIC101_OP"]
-    for start in range(0, len(PRINTABLE), 1000):
-        name = PRINTABLE[start : start + 1000]
-        assert store.save("key", dataclasses.replace(row, name=name)).name == name
-        kept = store.load("key")
-        assert kept is not None
-        assert kept.name == name
+    with store.opened():
+        for start in range(0, len(PRINTABLE), 1000):
+            name = PRINTABLE[start : start + 1000]
+            store.save([("key", dataclasses.replace(row, name=name))], "settings")
+            kept = store.load("key")
+            assert kept is not None
+            assert kept.name == name
 
 
 def test_a_report_shows_names_and_units_as_they_are_written(tmp_path, fitted):

@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 class Campaign(Result):
     """Models of many records, with their statistics.
 
-    ``statistics(trim)`` is over ``[row.delay for row in rows if row.system]``; `best` is the row
+    ``statistics(trim)`` is over ``[row.delay for row in good]``; `best` is the row
     with the smallest residual; `system` is the final model.
 
     Attributes
@@ -67,12 +67,12 @@ class Campaign(Result):
     @cached_property
     def good(self) -> tuple[CampaignRow, ...]:
         """The rows with a model."""
-        return tuple(row for row in self.rows if row.system is not None)
+        return tuple(row for row in self.rows if row.error is None)
 
     @property
     def failed(self) -> tuple[CampaignRow, ...]:
         """The rows with an error."""
-        return tuple(row for row in self.rows if row.system is None)
+        return tuple(row for row in self.rows if row.error is not None)
 
     @property
     def dt(self) -> float:
@@ -140,7 +140,7 @@ class Campaign(Result):
         _ = self.dt
         if self.method == "output_error":
             pairs = zip(self.rows, self.sources, strict=True)
-            good = [read_source(source) for row, source in pairs if row.system is not None]
+            good = [read_source(source) for row, source in pairs if row.error is None]
             return fit_records(good, **self.options)
         chosen = self._identified(self.best)
         scan = fit_of(chosen, DelayScan)

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import functools
 import hashlib
+import os
 import warnings
-from collections.abc import Callable, Mapping
-from contextlib import AbstractContextManager, nullcontext
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import AbstractContextManager
+from dataclasses import dataclass, replace
+from pathlib import Path
+from types import FunctionType
 from typing import Any, Protocol
 
 import control as ct
@@ -25,7 +28,8 @@ from ..step.steps import detect_step
 
 RecordSource = Record | Callable[[], Record]
 
-_LONGEST_ERROR = 1000  # characters; a longer text would fill table and report
+_PACKAGE = "ctrl_realize."
+LONGEST_ERROR = 1000  # characters; a longer text would fill table and report
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,13 +58,17 @@ class CampaignRow:
         Dead time plus lags in s; NaN if the method gives none.
     total_delay_interval : tuple of float
         95 % interval of the total delay, in s.
-    system : DelayedStateSpace or None
-        The model; None if the record failed.
+    order : int or None
+        Order of the model without its delay.
+    dt : float
+        Sample time of the model in s.
     error : str or None
         The error that stopped this record, in one line.
     flags : tuple of Flag
     warnings : tuple of str
         Warnings raised while it was identified.
+    position : int
+        Place of the record in the order given, from 0.
 
     Examples
     --------
@@ -84,20 +92,19 @@ class CampaignRow:
     gain_std: float = float("nan")
     total_delay: float = float("nan")
     total_delay_interval: tuple[float, float] = (float("nan"), float("nan"))
-    system: DelayedStateSpace | None = field(default=None, repr=False)
+    order: int | None = None
+    dt: float = float("nan")
     error: str | None = None
     flags: tuple[Flag, ...] = ()
     warnings: tuple[str, ...] = ()
+    position: int = 0
+    _model: DelayedStateSpace | Callable[[], DelayedStateSpace] | None = None
 
     @property
-    def order(self) -> int | None:
-        """Order of the model without its delay."""
-        return None if self.system is None else int(self.system.delay_free.nstates)
-
-    @property
-    def dt(self) -> float:
-        """Sample time of the model in s; NaN without one."""
-        return float("nan") if self.system is None else float(self.system.dt)
+    def system(self) -> DelayedStateSpace | None:
+        """The model; None if the record failed. One of a store is made when it is asked for."""
+        model = self._model
+        return model if model is None or isinstance(model, DelayedStateSpace) else model()
 
     @property
     def delay_interval(self) -> tuple[float, float]:
@@ -105,41 +112,46 @@ class CampaignRow:
         return self.interval[0] / self.dt, self.interval[1] / self.dt
 
     def __repr__(self) -> str:
-        what = self.error if self.system is None else f"delay {self.delay:.4g} samples"
+        what = self.error if self.error is not None else f"delay {self.delay:.4g} samples"
         return f"<CampaignRow {self.name!r}: {what}>"
 
 
 class RowStore(Protocol):
     """Keeps finished rows, so that an interrupted run can be resumed (see `CampaignStore`)."""
 
+    path: Path
+
+    def opened(self) -> AbstractContextManager[None]:
+        """Keep the file open for the duration of a block, which is faster."""
+        ...
+
     def load(self, key: str) -> CampaignRow | None:
         """Return the row stored under `key`; None if there is none."""
         ...
 
-    def save(self, key: str, row: CampaignRow) -> CampaignRow:
-        """Store a row; return it as `load` would."""
+    def packed(self, row: CampaignRow) -> CampaignRow:
+        """Reduce the model of a row to what is stored."""
         ...
 
-    def attempt(self, key: str) -> AbstractContextManager[None]:
-        """Mark a record as being identified for the duration of the block.
-
-        Raises
-        ------
-        DataError
-            The process was killed over it too often before.
-        """
+    def save(self, rows: Sequence[tuple[str, CampaignRow]], settings: str) -> list[CampaignRow]:
+        """Store packed rows under their keys, all or none; return them, with a warning if none."""
         ...
 
 
 def identify_row(
     source: RecordSource,
     position: int,
+    key: str | None,
+    *,
     method: Method,
     options: Mapping[str, Any],
     store: RowStore | None,
-) -> CampaignRow:
-    """Identify one record; an error becomes the row's error."""
-    row = CampaignRow(source_name(source, position))
+) -> tuple[str | None, CampaignRow]:
+    """Identify one record; an error becomes the row's error. With it its key, if it is to be saved.
+
+    `key` is that of a record that the store does not have; None if it is known from its content.
+    """
+    row = CampaignRow(source_name(source, position), position=position)
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         try:
@@ -150,43 +162,31 @@ def identify_row(
                     "several channels see fit_state_space, which takes several records too"
                 )
             row = replace(row, name=record.name or row.name, amplitude=_amplitude(record))
-            key = fingerprint(record, method, options)
-            kept = store.load(key) if store is not None else None
-            if kept is not None:
-                return replace(kept, name=row.name)
-            with store.attempt(key) if store is not None else nullcontext():
-                row = _with_model(row, identify(record, method=method, **options))
+            if store is not None and key is None:
+                key = fingerprint(record, settings_of(method, options))
+                kept = store.load(key)
+                if kept is not None:
+                    return None, replace(kept, name=row.name, position=position)
+            row = _with_model(row, identify(record, method=method, **options))
         except Exception as error:
             # Whatever the error is, also in a function of the caller that reads files, the other
             # records are still identified. It is tried again when the run is resumed.
-            text = spelled_out(" ".join(str(error).split())[:_LONGEST_ERROR])
+            text = spelled_out(" ".join(str(error).split())[:LONGEST_ERROR])
             row = replace(row, error=f"{type(error).__name__}: {text}")
     row = replace(row, warnings=tuple(dict.fromkeys(str(entry.message) for entry in caught)))
-    if store is None or row.system is None:
-        return row
+    if store is None or row.error is not None:
+        return None, row
     try:
-        return store.save(key, row)
-    except (CtrlRealizeError, OSError) as error:
-        # A full disk, or labels that cannot be written: the result is kept in memory, and computed
-        # again.
-        text = spelled_out(f"not saved in the store: {error}"[:_LONGEST_ERROR])
-        return replace(row, warnings=(*row.warnings, text))
+        return key, store.packed(row)
+    except CtrlRealizeError as error:
+        # Labels that cannot be written: the result is kept in memory, and computed again.
+        return None, unsaved(row, error)
 
 
-def failed_row(source: RecordSource, position: int, error: str) -> CampaignRow:
-    """Row of a record that could not be identified where it was sent."""
-    text = spelled_out(" ".join(error.split())[:_LONGEST_ERROR])
-    return CampaignRow(source_name(source, position), error=text)
-
-
-def killed_row(source: RecordSource, position: int, how: str = "") -> CampaignRow:
-    """Row of a record whose process was killed repeatedly."""
-    return failed_row(
-        source,
-        position,
-        f"the process that identified this record was killed by the system{how}, even when run "
-        "alone; the usual cause is lack of memory",
-    )
+def unsaved(row: CampaignRow, error: Exception) -> CampaignRow:
+    """Add to a row why it is not in the store."""
+    text = spelled_out(f"not saved in the store: {error}"[:LONGEST_ERROR])
+    return replace(row, warnings=(*row.warnings, text))
 
 
 def read_source(source: RecordSource) -> Record:
@@ -197,20 +197,40 @@ def read_source(source: RecordSource) -> Record:
     return record
 
 
-def fingerprint(record: Record, method: str, options: Mapping[str, Any]) -> str:
-    """SHA-256 of a record's samples, the settings and the versions."""
-    digest = hashlib.sha256(repr(sorted(versions().items())).encode())
+def settings_of(method: str, options: Mapping[str, Any]) -> str:
+    """Write the settings and the versions that a result depends on, with all digits."""
+    written = {name: _exact(value) for name, value in sorted(options.items())}
+    versions = {name: version_of(name) for name in ("ctrl-realize", "numpy", "scipy")}
+    return repr((method, written, versions))
+
+
+def fingerprint(record: Record, settings: str) -> str:
+    """SHA-256 of a record's samples and labels, the settings and the versions."""
+    digest = hashlib.sha256(settings.encode())
     for values in (record.time, record.input, record.output):
         digest.update(str(values.shape).encode())
         digest.update(np.ascontiguousarray(values).tobytes())
-    settings = sorted((name, _exact(value)) for name, value in options.items())
-    digest.update(repr((method, settings, record.input_labels, record.output_labels)).encode())
+    digest.update(repr((record.input_labels, record.output_labels)).encode())
     return digest.hexdigest()
 
 
-def versions() -> dict[str, str]:
-    """Versions of the packages that the results depend on."""
-    return {package: version_of(package) for package in ("ctrl-realize", "numpy", "scipy")}
+def known_key(source: RecordSource, settings: str) -> str | None:
+    """Key of a record that need not be read for it; None for others.
+
+    A file that a function of this package reads is known by its path, size and time of change. Of
+    a function of others it is unknown whether it is still the same.
+    """
+    if isinstance(source, Record):
+        return fingerprint(source, settings)
+    match source:
+        case functools.partial(
+            func=FunctionType(__module__=module, __qualname__=read),
+            args=(str() | os.PathLike() as file, *others),
+        ) if module.startswith(_PACKAGE) and os.path.isfile(file):
+            known = (os.path.abspath(file), os.path.getsize(file), os.stat(file).st_mtime_ns)
+            told = repr((settings, read, known, others, source.keywords))
+            return hashlib.sha256(told.encode()).hexdigest()
+    return None
 
 
 def _exact(value: Any) -> str:
@@ -237,8 +257,10 @@ def _with_model(row: CampaignRow, system: DelayedStateSpace) -> CampaignRow:
         gain_std=_or_nan(fit.gain_std_given_structure),
         total_delay=_or_nan(fit.total_delay),
         total_delay_interval=fit.total_delay_interval or (np.nan, np.nan),
-        system=system,
+        order=int(system.delay_free.nstates),
+        dt=float(system.dt),
         flags=fit.flags,
+        _model=system,
     )
 
 

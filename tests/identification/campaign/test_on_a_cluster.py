@@ -2,6 +2,7 @@
 
 import contextlib
 import functools
+import itertools
 import os
 import signal
 import subprocess
@@ -56,7 +57,7 @@ def connected(n_workers):
 def test_a_cluster_gives_the_same_bits_even_when_a_worker_dies(tmp_path):
     # the arrays of the valve are sent, and must be as usable there as here
     sources = [functools.partial(slowly, cr.bench.valve(), seed) for seed in range(8)]
-    store = cr.io.CampaignStore(tmp_path)
+    store = cr.io.CampaignStore(tmp_path / "rows.sqlite")
     with connected(2) as client:
         pids = list(client.run(os.getpid).values())
 
@@ -90,6 +91,26 @@ def test_a_record_that_always_kills_its_worker_is_a_row_and_the_others_go_on():
     assert [row.error is None for row in campaign.rows] == [s != 1 for s in range(6)]
     assert "was killed by the system, even when run alone" in campaign.rows[1].error
     assert campaign.rows[1].name == "1"
+
+
+def test_a_cluster_takes_a_bounded_number_of_records_ahead_and_needs_no_shared_store(tmp_path):
+    taken = []
+
+    def endless():
+        for seed in itertools.count():
+            taken.append(seed)
+            yield functools.partial(quick, seed % 7)
+
+    store = cr.io.CampaignStore(tmp_path / "rows.sqlite")
+    with connected(1) as client:
+        # workers do not write: where they are, the file may be out of reach
+        options = {"method": "paper", "client": client, "store": store}
+        rows = cr.identification.identify_each(endless(), **options)
+        seen = [row.position for row in itertools.islice(rows, 20)]
+        rows.close()
+    assert len(set(seen)) == 20
+    assert max(seen) < len(taken) <= 20 + 100 + 2
+    assert len(store) == 7
 
 
 def test_without_any_worker_the_records_are_rows_with_that_error():
