@@ -1,4 +1,4 @@
 """Ten thousand simulated records, one in a hundred of them corrupt, through one campaign.
 
-python -m benchmarks.campaign --records 10000 --jobs 2 --output docs/tables/campaign.md
+python -m benchmarks.campaign --output docs/tables/campaign_table.md
 """
