@@ -131,6 +131,8 @@ def test_the_report_of_identify_has_the_controller_if_it_is_wanted(folder, tmp_p
         assert f'<td class="text">{name}</td><td class="number">{value}</td>' in page
     assert "It would be unstable if" in page
     assert "pid = cr.design.pid(sys, closed_loop_time='robust')" in html.unescape(page)
+    assert main([*words, "--tune", "--overwrite"]) == 2
+    assert "expected a form, such as ideal" in capsys.readouterr().err
     assert main([*words, "--overwrite", "--tune", "abacus"]) == 2
     assert "--form abacus; choose one of 'ideal'" in capsys.readouterr().err
 

@@ -54,10 +54,19 @@ NoReport = Annotated[
     bool, _OPTION("--no-report", help="Write models and tables alone, without report and figures.")
 ]
 
+
+def _form(name: str | None) -> str | None:
+    if name is not None and name.startswith("-"):  # the name was left out, and this is an option
+        raise typer.BadParameter(
+            f"expected a form, such as ideal or siemens_pid_compact; got {name}"
+        )
+    return name
+
+
 Tune = Annotated[
     str | None,
-    _OPTION(metavar="FORM", help="Tune a PI, too, and tell what to enter in this form, such as "
-            "siemens_pid_compact; see the command tune."),
+    _OPTION(metavar="FORM", callback=_form, help="Tune a PI, too, and tell what to enter in "
+            "this form, such as siemens_pid_compact; see the command tune."),
 ]  # fmt: skip
 
 Json = Annotated[

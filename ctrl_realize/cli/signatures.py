@@ -57,10 +57,10 @@ def identify(
     One record gives model.json, report.html and figures/. Several records of one plant are a
     campaign: the output also contains a table of their delays (records.csv), a model for each
     (models/) and a final model. A record that fails becomes a row of the table with its error. If a
-    campaign is interrupted, the finished records are kept in rows/, and the same command resumes
-    from there. With --joint, or --gains own, one model is fitted to all records together. With
-    --tune, the report also has a controller, see the command tune. With --json -, a program reads
-    the model, its verdicts and what may be done with it from stdout.
+    campaign is interrupted, the finished records are kept in rows.sqlite, and the same command
+    resumes from there. With --joint, or --gains own, one model is fitted to all records together.
+    With --tune, the report also has a controller, see the command tune. With --json -, a program
+    reads the model, its verdicts and what may be done with it from stdout.
 
     \b
     Examples:
