@@ -20,7 +20,7 @@ import numpy as np
 from scipy.ndimage import uniform_filter1d
 
 from ..arrays import BoolArray, FloatArray, IntArray
-from ..constants import VERY_STRONG
+from ..constants import STRONG, VERY_STRONG
 from ..signals.noise import (
     correlation_time,
     is_coarse,
@@ -51,7 +51,6 @@ _RISE = 6  # samples that are left of it, at least
 _BEHIND = 4  # times a rise that are looked at behind it
 _EARLY = 2  # samples that are left out before and after a plateau
 _RATES = np.geomspace(0.25, 32, 15)  # of lags, over the length of what they explain
-_CLEARLY = 3.0  # by which a kink lowers a likelihood criterion to be looked at more closely
 _BEYOND = 0.02  # part of the range by which a plant passes its limit, on average, to be told
 _OUTLIER = 4.0  # standard deviations at which residuals are cut
 
@@ -152,7 +151,7 @@ def _plateaus(values: FloatArray, edges: list[int], slow: float) -> list[tuple[i
             away = max(away, slope * (stop - before - end) / 2)
             start = before + end
         kinks.append((max(start - _EARLY, 0), min(stop + _EARLY, values.size)))
-    return kinks if gain > _CLEARLY and away > _BEYOND * np.ptp(values) else []
+    return kinks if gain > STRONG and away > _BEYOND * np.ptp(values) else []
 
 
 def _kink(values: FloatArray) -> tuple[float, int, float]:
