@@ -16,7 +16,7 @@ References
 from __future__ import annotations
 
 import warnings
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -32,7 +32,7 @@ from ..numerics.arrays import FloatArray
 from ..numerics.blas_threads import single_threaded
 from ..numerics.engine.poles import parameters_from_poles, poles_from_parameters
 from .impulse.from_io import impulse_from_io
-from .output_error.fit import fit_output_error
+from .output_error.fit import fit_output_error, model_alone
 from .output_error.result import OutputErrorFit
 from .plausible import continuous_core
 from .several_inputs_result import SeveralInputsFit
@@ -100,7 +100,8 @@ def fit_several_inputs(
         # the last turn, once settled, chooses structures again and finds the intervals
         for i in range(len(inputs)):
             left = output - (responses.sum(axis=0) - responses[i])
-            system = _one(record, i, left, structures if settled else asked[i], options)
+            fit_one = fit_output_error if settled or cycle == MOST_CYCLES else model_alone
+            system = _one(record, i, left, fit_one, structures if settled else asked[i], options)
             response = system.simulate(inputs[i] - inputs[i, 0])
             fit = fit_of(system, OutputErrorFit)
             moved = max(moved, float(np.std(response - responses[i])) / fit.residual_std)
@@ -139,8 +140,9 @@ def _starting(record: Record) -> FloatArray:
 
 
 def _one(
-    record: Record, i: int, left: FloatArray, structures: Any, options: dict[str, Any]
-) -> DelayedStateSpace:
+    record: Record, i: int, left: FloatArray, fit_one: Callable[..., DelayedStateSpace],
+    structures: Any, options: dict[str, Any],
+) -> DelayedStateSpace:  # fmt: skip
     name = record.input_labels[i]
     units = {label: unit for label, unit in record.units.items() if label in (name, "time")}
     units |= {k: record.units[k] for k in record.output_labels if k in record.units}
@@ -149,7 +151,7 @@ def _one(
         units=units, input_labels=[name], output_labels=list(record.output_labels), missing="keep",
     )  # fmt: skip
     try:
-        return fit_output_error(one, structures=structures, **options)
+        return fit_one(one, structures=structures, **options)
     except DataError as error:
         raise DataError(f"{error}. Or leave the input {name!r} out of the record") from None
 

@@ -238,7 +238,6 @@ def fit_output_error(
     ((1, 1), 0.125, 3.0)
     """
     loss = one_of(loss, "loss", ("huber", "least_squares"))
-    noise = one_of(noise, "noise", ("auto", "white"))
     focus = one_of(focus, "focus", ("simulation", "prediction"))
     gains = one_of(gains, "gains", ("common", "own"))
     if actuator is not None:
@@ -247,16 +246,12 @@ def fit_output_error(
             raise OptionError(
                 f"actuator={actuator!r} with known dynamics or gains='own': expected one of them"
             )
-    tried = requested(structures)
-    limit = None if max_delay is None else positive(max_delay, "max_delay", "number of samples")
     factor = known_factor(known)
     several = checked_records(records)
     tried = replace(
-        tried,
-        latest=None if limit is None else limit * several[0].dt,
+        _requested(several, structures, max_delay, noise),
         known=factor,
         huber=loss == "huber",
-        whiten=noise == "auto",
         simulates=focus == "simulation",
         loop=all(in_automatic(record) for record in several),
     )
@@ -287,6 +282,25 @@ def fit_output_error(
     if include_known and known is not None:
         core = ct.ss(known) * core
     return fitted_model(core, result)
+
+
+def model_alone(
+    record: Record, *, structures: Structures | None, max_delay: float | None, noise: str
+) -> DelayedStateSpace:
+    """Fit a record without checks, and without structures that were not requested."""
+    tried = replace(_requested((record,), structures, max_delay, noise), compared=False)
+    result = _linear((record,), tried, own_gains=False, may_clip=True)
+    return fitted_model(continuous_core(result.estimate.numerator, result.poles), result)
+
+
+def _requested(
+    records: tuple[Record, ...], structures: Structures | None, max_delay: float | None, noise: str
+) -> Requested:
+    noise = one_of(noise, "noise", ("auto", "white"))
+    tried = requested(structures)
+    limit = None if max_delay is None else positive(max_delay, "max_delay", "number of samples")
+    latest = None if limit is None else limit * records[0].dt
+    return replace(tried, latest=latest, whiten=noise == "auto")
 
 
 def _linear(

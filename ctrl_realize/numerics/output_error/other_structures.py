@@ -59,6 +59,8 @@ class Requested:
         But not if the model then simulates them worse than coloured noise explains.
     loop : bool
         The input is that of a controller whose set point moved: see `any_input.lags`.
+    compared : bool
+        Look for structures that were not requested and fit better, or as well.
     """
 
     structures: tuple[Structure, ...] | None = None
@@ -71,6 +73,7 @@ class Requested:
     whiten: bool = True
     simulates: bool = True
     loop: bool = False
+    compared: bool = True
 
 
 @dataclass(frozen=True, eq=False)

@@ -159,8 +159,8 @@ def _given_structures(
     """Estimate the dead time by the likelihood of the best of given structures, adequate or not."""
     near, noisy = _close_to_noise(data, fits), _at_noise_level(data, fits)
     adequate, fits = noisy is not None, noisy or fits
-    limited = requested.fastest is not None
-    others = Compared() if limited else other_structures(fits, free)
+    compared = requested.fastest is None and requested.compared
+    others = other_structures(fits, free) if compared else Compared()
     if adequate and requested.whiten:
         fits = in_coloured_noise(fits, data)
     if adequate and others.better is None:

@@ -37,7 +37,7 @@ from ...signals.noise import correlation_time, winsorised_sigma
 from ...validation.own_response import OwnResponse, matched, response_slopes
 from ..interval import likelihood_fit
 from ..margins import close_to
-from ..other_structures import Requested, other_structures
+from ..other_structures import Compared, Requested, other_structures
 from ..process_models import fit_without_fast_lags, process_fit
 from ..result import OutputErrorEstimate, followed_by
 from ..selection import chains_of
@@ -162,7 +162,8 @@ def fit_sampled(
     if structures is not None:
         # On the part also if all samples were fitted: what is ruled out there is ruled out in any
         # case.
-        others = other_structures(stretch, partial(part.fit_of, ORDERS))
+        compared = requested.fastest is None and requested.compared
+        others = other_structures(stretch, partial(part.fit_of, ORDERS)) if compared else Compared()
     white = fits.correlation <= WHITE
     if requested.fastest is not None:
         fit = fit_without_fast_lags(
