@@ -20,7 +20,7 @@ import numpy as np
 from scipy.ndimage import uniform_filter1d
 
 from ..arrays import BoolArray, FloatArray, IntArray
-from ..constants import STRONG, VERY_STRONG
+from ..constants import VERY_STRONG
 from ..signals.noise import (
     correlation_time,
     is_coarse,
@@ -51,6 +51,7 @@ _RISE = 6  # samples that are left of it, at least
 _BEHIND = 4  # times a rise that are looked at behind it
 _EARLY = 2  # samples that are left out before and after a plateau
 _RATES = np.geomspace(0.25, 32, 15)  # of lags, over the length of what they explain
+_TOLD = 3.0  # by which a kink lowers a likelihood criterion to be told
 _BEYOND = 0.02  # part of the range by which a plant passes its limit, on average, to be told
 _OUTLIER = 4.0  # standard deviations at which residuals are cut
 
@@ -104,26 +105,31 @@ def _noise(third: FloatArray) -> float:
     return mad_sigma(third) / float(np.sqrt(20))
 
 
-def plateaus(output: FloatArray, edges: Sequence[int]) -> BoolArray:
+def plateaus(output: FloatArray, edges: Sequence[int]) -> tuple[BoolArray, float]:
     """Samples (N,) at a level that the output reaches with a kink, or keeps, and never passes.
 
-    It keeps a level if that is its response to a whole step. `edges` are those of steps, or 0 for
-    another input; what is before the first is not looked at. A later test has to decide (`clips`).
+    It keeps a level if that is its response to a whole step. With them goes the decrease of a
+    likelihood criterion by the kinks. `edges` are those of steps, or 0 for another input; what is
+    before the first is not looked at. A later test has to decide (`clips`).
     """
-    found = np.zeros(output.size, dtype=bool)
+    found, evidence = np.zeros(output.size, dtype=bool), 0.0
     first = edges[0]
     rows = first + np.flatnonzero(~np.isnan(output[first:]))
     if rows.size < 3 * _LONG:
-        return found
+        return found, evidence
     rest = output[:first][~np.isnan(output[:first])]
     slow = np.std(uniform_filter1d(rest, _WIDTH)) if rest.size > _LONG else 0.0
     for values in (output[rows], -output[rows]):
-        for start, stop in _plateaus(values, list(np.searchsorted(rows, edges)), float(slow)):
+        kinks, gain = _plateaus(values, list(np.searchsorted(rows, edges)), float(slow))
+        for start, stop in kinks:
             found[rows[start] : rows[stop - 1] + 1] = True
-    return found
+            evidence = max(evidence, gain)
+    return found, evidence
 
 
-def _plateaus(values: FloatArray, edges: list[int], slow: float) -> list[tuple[int, int]]:
+def _plateaus(
+    values: FloatArray, edges: list[int], slow: float
+) -> tuple[list[tuple[int, int]], float]:
     """First samples of the plateaus at the upper limit, and those after them; none without a kink.
 
     `slow` is the standard deviation of means of the noise, where it is known.
@@ -151,7 +157,7 @@ def _plateaus(values: FloatArray, edges: list[int], slow: float) -> list[tuple[i
             away = max(away, slope * (stop - before - end) / 2)
             start = before + end
         kinks.append((max(start - _EARLY, 0), min(stop + _EARLY, values.size)))
-    return kinks if gain > STRONG and away > _BEYOND * np.ptp(values) else []
+    return kinks if gain > _TOLD and away > _BEYOND * np.ptp(values) else [], gain
 
 
 def _kink(values: FloatArray) -> tuple[float, int, float]:

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from ctrl_realize.numerics.constants import VERY_STRONG
 from ctrl_realize.numerics.validation.limits import at_limit, clips, plateaus
 
 TIME = np.arange(300)
@@ -47,7 +48,8 @@ def test_a_code_for_missing_samples_is_no_limit():
 @pytest.mark.parametrize("sign", [1, -1])
 @pytest.mark.parametrize("noise", [0, 0.1, 1])
 def test_a_plateau_is_found_where_the_response_ends_with_a_kink(noise, sign):
-    found = plateaus(sign * (np.minimum(RISE, 0.6) + noise * NOISE), [90])
+    found, evidence = plateaus(sign * (np.minimum(RISE, 0.6) + noise * NOISE), [90])
+    assert evidence > VERY_STRONG
     # some samples at the kink are left out as well
     assert np.all(found[RISE > 0.63])
     assert not found[RISE < 0.5].any()
@@ -56,16 +58,17 @@ def test_a_plateau_is_found_where_the_response_ends_with_a_kink(noise, sign):
 def test_a_step_without_a_response_at_the_highest_level_is_a_plateau():
     settled = 1 - np.exp(-2 * AFTER)
     output = np.minimum(settled, 0.99) + NOISE  # no kink that noise would show
-    assert not plateaus(output, [90]).any()
-    found = plateaus(output, [90, 220])
+    assert not plateaus(output, [90])[0].any()
+    found, evidence = plateaus(output, [90, 220])
+    assert evidence == np.inf
     assert found[220:].all()
     assert not found[settled < 0.9].any()
 
 
 @pytest.mark.parametrize("noise", [0, 0.1, 1])
 def test_a_response_that_settles_has_no_such_plateau(noise):
-    assert not plateaus(RISE + noise * NOISE, [90]).any()
-    assert not plateaus(-np.expm1(-AFTER) + noise * NOISE, [90]).any()
+    assert not plateaus(RISE + noise * NOISE, [90])[0].any()
+    assert not plateaus(-np.expm1(-AFTER) + noise * NOISE, [90])[0].any()
 
 
 def test_an_output_clips_if_a_limit_explains_it_and_a_model_passes_that():

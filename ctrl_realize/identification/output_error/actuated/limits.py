@@ -16,6 +16,7 @@ from ....data import Record
 from ....delayed.simulation import simulate_record
 from ....errors import DataError, UnsuitableSystemError
 from ....numerics.arrays import BoolArray, FloatArray
+from ....numerics.constants import STRONG
 from ....numerics.validation.limits import at_limit, clips, ends, passed, plateaus
 from ...plausible import continuous_core
 from ..arguments import FEWEST_SAMPLES, step_data_of
@@ -82,14 +83,14 @@ def _without_plateaus(record: Record, linear: OutputErrorFit, fit: Fit) -> Outpu
     one that settles.
     """
     output = np.ravel(record.output)
-    held = plateaus(output, [edge for edge, _ in linear.data.edges])
+    held, evidence = plateaus(output, [edge for edge, _ in linear.data.edges])
     if not held.any():
         return linear
     if np.isfinite(linear.onset):  # any other input may leave the output where it is
         when = in_time(record.time[np.argmax(held)])
         doubt = flagged("may_be_at_limit", limits=_levels(output, held), when=when)
         linear = replace(linear, flags=(*linear.flags, doubt))
-    if np.count_nonzero(record.seen & ~held) < FEWEST_SAMPLES:
+    if evidence < STRONG or np.count_nonzero(record.seen & ~held) < FEWEST_SAMPLES:
         return linear
     rows = np.round((linear.time - record.time[0]) / record.dt).astype(np.int64)
     try:
