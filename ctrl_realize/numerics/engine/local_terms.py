@@ -28,6 +28,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 
@@ -153,7 +154,9 @@ class LocalTerms:
         out = np.empty((*rest.shape, dpoles.shape[2]))
         for i, rows in enumerate(self._rows):
             amplitudes = self._amplitudes(self._weights(i, rest)[:, self._known :])
-            out[:, rows] = (self._slope[:, rows] @ (amplitudes[:, :, None] * dpoles)).real
+            turned = amplitudes[:, :, None] * dpoles
+            slope = self._slope[:, rows]
+            out[:, rows] = (slope @ (turned if np.iscomplexobj(slope) else turned.real)).real
         return out * self._weight[:, None]
 
     def fitted(self, rest: FloatArray, where: Segments) -> FloatArray:
@@ -192,25 +195,27 @@ def local_columns(segments: Segments, poles: ComplexArray) -> FloatArray:
     return _columns(segments, _decay(segments, poles)[0], poles)
 
 
-def _decay(segments: Segments, poles: ComplexArray) -> tuple[ComplexArray, ComplexArray]:
-    """Exponentials (B, m, n) of the poles, and their derivatives."""
-    decay = np.exp(segments.clock[:, None] * poles[:, None, :])
+def _decay(segments: Segments, poles: ComplexArray) -> tuple[Any, Any]:
+    """Exponentials (B, m, n) of the poles, and their derivatives; real if all poles are."""
+    # Real exponentials take a fifth of the time of complex ones.
+    rates = poles if poles.imag.any() else poles.real
+    decay = np.exp(segments.clock[:, None] * rates[:, None, :])
     slope = segments.clock[:, None] * decay
     if segments.bins is not None:
-        mean, turn, kind = segments.bins.bin_means(poles)
+        mean, turn, kind = segments.bins.bin_means(rates)
         mean, turn = mean.take(kind, axis=1), turn.take(kind, axis=1)
         rows = slice(kind.size)
         slope[:, rows] = slope[:, rows] * mean + decay[:, rows] * turn
         decay[:, rows] *= mean
-    return np.asarray(decay), np.asarray(slope, dtype=np.complex128)
+    return decay, slope
 
 
-def _columns(segments: Segments, decay: ComplexArray, poles: ComplexArray) -> FloatArray:
+def _columns(segments: Segments, decay: Any, poles: ComplexArray) -> FloatArray:
     fixed = np.broadcast_to(segments.regressors, (len(poles), *segments.regressors.shape))
     return np.concatenate([fixed, _free_columns(decay, poles)], axis=2)
 
 
-def _free_columns(decay: ComplexArray, poles: ComplexArray) -> FloatArray:
+def _free_columns(decay: Any, poles: ComplexArray) -> FloatArray:
     """Free responses, zero those of poles that are over before the first row.
 
     Beside the other pole of its pair such a pole would be a direction of rounding errors.

@@ -19,7 +19,7 @@ import numpy as np
 from ..arrays import ComplexArray, FloatArray
 from ..engine.eliminate import eliminate, evaluate
 from ..engine.modal import respond
-from ..engine.plausible_models import PlausibleModel, plausible_models
+from ..engine.plausible_models import PlausibleDraw, PlausibleModel
 from ..engine.poles import lag_sum
 from ..engine.problem import Structure
 from ..engine.profile import Points, profile_limits
@@ -215,9 +215,9 @@ class OutputErrorEstimate:
     each with its evidence over the model's. `others` is None if no structures were requested;
     `close` are decisions that rounding errors may reverse. `unweighted` is the model of
     plain least squares, if the residual was whitened. `load` is a step of a load; it is part
-    of the model unless it is early. `plausible` are models that the data do not rule out, all
-    equally likely. `points` are the profiles of structures that are not ruled out. `averaged`: the
-    dead time is the mean over them, and the interval holds 95 % of their weight.
+    of the model unless it is early. `drawn` has the structures of which plausible models are drawn.
+    `points` are the profiles of structures that are not ruled out. `averaged`: the dead time is the
+    mean over them, and the interval holds 95 % of their weight.
     """
 
     dead_time: float
@@ -244,9 +244,14 @@ class OutputErrorEstimate:
     close: tuple[CloseDecision, ...] = ()
     unweighted: UnweightedModel | None = None
     load: LoadStep | None = None
-    plausible: tuple[PlausibleModel, ...] = ()
+    drawn: PlausibleDraw | None = None
     points: Mapping[Structure, Points] = field(default_factory=dict)
     averaged: bool = False
+
+    @property
+    def plausible(self) -> tuple[PlausibleModel, ...]:
+        """Models that the data do not rule out, all equally likely; none beside an actuator."""
+        return () if self.drawn is None else self.drawn.models
 
     @property
     def robust(self) -> bool:
@@ -383,5 +388,5 @@ def assembled(
         static=static,
         alike=tuple((other, weight) for other, weight in alike if other.resolved),
         process=process,
-        plausible=plausible_models(fits, evidence, fits.candidates | {chosen.structure: chosen}),
+        drawn=PlausibleDraw(fits, evidence, fits.candidates | {chosen.structure: chosen}),
     )

@@ -31,7 +31,7 @@ from scipy.interpolate import PchipInterpolator
 from ...arrays import FloatArray
 from ...constants import SMALLEST
 from ...engine.eliminate import evaluate
-from ...engine.plausible_models import plausible_models
+from ...engine.plausible_models import PlausibleDraw
 from ...engine.problem import Structure
 from ...engine.profile import Points, profile_curve, profile_grid, profile_points
 from ...engine.structures import Candidate
@@ -137,7 +137,7 @@ def fit_lags(data: SampledData, requested: Requested) -> tuple[SampledWindow, Ou
     }
     others = OtherStructures(better)
     found = replace(found, process=process, points=points, others=others, averaged=True)
-    return part, replace(found, plausible=plausible_models(plainly, evidence, plain))
+    return part, replace(found, drawn=PlausibleDraw(plainly, evidence, plain))
 
 
 def _fitted(
