@@ -22,7 +22,7 @@ from ...numerics.engine.poles import lag_sum
 from ...numerics.engine.profile import profile_limits
 from ...numerics.engine.static_gain import INTEGRATOR
 from ...numerics.output_error.margins import CLOSE, DecisionKey
-from ...numerics.output_error.result import OutputErrorEstimate, StructureFit
+from ...numerics.output_error.result import OtherStructures, OutputErrorEstimate, StructureFit
 from ...numerics.output_error.step_data import StepData
 from ...numerics.signals.filters import moving_mean
 from ...numerics.signals.noise import largest_excess
@@ -153,9 +153,10 @@ def dead_time_of(line: StructureFit) -> str:
 
 def _contradicting(fit: OutputErrorEstimate) -> StructureFit | None:
     """Structure that was not requested and fits as well, with another dead time."""
-    for other in fit.others.not_ruled_out if fit.others is not None else ():
+    others = fit.others or OtherStructures()
+    for other in others.alike:
         if other.delta_bic <= _AS_GOOD and not fit.low <= other.dead_time <= fit.high:
-            return other
+            return others.with_interval(other)
     return None
 
 

@@ -84,11 +84,11 @@ class Compared:
     """
 
     better: StructureFit | None = None
-    not_ruled_out: Callable[[], tuple[StructureFit, ...]] = tuple
+    not_ruled_out: Callable[[], OtherStructures] = OtherStructures
 
     def told(self, better: StructureFit | None) -> OtherStructures:
         """What they say of a model, where `better` rules it out."""
-        return OtherStructures(better, () if better is not None else self.not_ruled_out())
+        return self.not_ruled_out() if better is None else OtherStructures(better)
 
 
 def other_structures(fits: WindowFit, refit: Callable[[], WindowFit]) -> Compared:
@@ -136,7 +136,7 @@ def better_than(given: Candidate, free: WindowFit) -> StructureFit | None:
     return line_of(free, best, -excess)
 
 
-def _not_ruled_out(fits: WindowFit, richer: dict[Structure, Candidate]) -> tuple[StructureFit, ...]:
+def _not_ruled_out(fits: WindowFit, richer: dict[Structure, Candidate]) -> OtherStructures:
     """List structures of one pole more that the data do not rule out, the best first."""
     given, problem, scales = fits.best, fits.problem, fits.scales
     order = given.structure.order + 1
@@ -150,11 +150,16 @@ def _not_ruled_out(fits: WindowFit, richer: dict[Structure, Candidate]) -> tuple
     free = replace(fits, candidates=found, criterion=fits.criteria(found))
     level = _charged(fits.criterion, given.structure)
     lines = [
-        line_of(free, found[s], _charged(free.criterion, s) - level)
+        _without_interval(free, found[s], _charged(free.criterion, s) - level)
         for s in _kept(fits, found, 0.0)
         if s in more
     ]
-    return tuple(sorted(lines, key=lambda line: line.delta_bic))
+
+    def ends(structure: Structure) -> tuple[float, float]:
+        return profile_limits(*profile_of(free, found[structure]))
+
+    lines.sort(key=lambda line: line.delta_bic)
+    return OtherStructures(alike=tuple(lines), ends=ends)
 
 
 def _kept(fits: WindowFit, found: dict[Structure, Candidate], slack: float) -> list[Structure]:
@@ -169,14 +174,13 @@ def _charged(criterion: dict[Structure, float], structure: Structure) -> float:
     return criterion[structure] + needless_parameters(structure)
 
 
-def line_of(
-    fits: WindowFit,
-    candidate: Candidate,
-    excess: float,
-    interval: tuple[float, float] | None = None,
-) -> StructureFit:
-    """Line of a table of structures; the interval in s is that of its profile by default."""
-    interval = interval or profile_limits(*profile_of(fits, candidate))
+def line_of(fits: WindowFit, candidate: Candidate, excess: float) -> StructureFit:
+    """Line of a table of structures, with the interval in s of its profile."""
+    line = _without_interval(fits, candidate, excess)
+    return replace(line, interval=profile_limits(*profile_of(fits, candidate)))
+
+
+def _without_interval(fits: WindowFit, candidate: Candidate, excess: float) -> StructureFit:
     static, dead_time = fits.static(candidate), candidate.dead_time
-    values = dead_time, static.total, float(excess), interval, candidate.poles, static.gain
+    values = dead_time, static.total, float(excess), None, candidate.poles, static.gain
     return StructureFit(candidate.structure, *values)

@@ -10,13 +10,15 @@ References
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Literal, NamedTuple, TypeAlias
 
 import numpy as np
 
 from ..arrays import ComplexArray, FloatArray
+from ..blas_threads import one_blas_thread
 from ..engine.eliminate import eliminate, evaluate
 from ..engine.modal import respond
 from ..engine.plausible_models import PlausibleDraw, PlausibleModel
@@ -115,15 +117,29 @@ class StructureFit:
         return self.structure.relative_degree
 
 
-class OtherStructures(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class OtherStructures:
     """What structures say that were not requested; their `delta_bic` is relative to the requested.
 
-    `better` rules out what was requested. `not_ruled_out` have one pole more than the best of the
-    requested ones; the criterion includes the charges with which structures are chosen.
+    `better` rules out what was requested. `alike` have one pole more than the best of the requested
+    ones, and are not ruled out; the criterion includes the charges with which structures are
+    chosen. `ends` finds the interval of one of them, in half the time of a fit.
     """
 
     better: StructureFit | None = None
-    not_ruled_out: tuple[StructureFit, ...] = ()
+    alike: tuple[StructureFit, ...] = ()
+    ends: Callable[[Structure], tuple[float, float]] | None = None
+
+    def with_interval(self, line: StructureFit) -> StructureFit:
+        """One that is not ruled out, with the 95 % profile-likelihood interval of its dead time."""
+        assert self.ends is not None
+        with one_blas_thread():
+            return replace(line, interval=self.ends(line.structure))
+
+    @cached_property
+    def not_ruled_out(self) -> tuple[StructureFit, ...]:
+        """All that are not ruled out, with their intervals."""
+        return tuple(self.with_interval(line) for line in self.alike)
 
 
 class DelayInterval(NamedTuple):
