@@ -29,7 +29,7 @@ from ..process_structures import Structures, requested
 from .actuated.alternatives import ASKED, Asked
 from .actuated.fit import with_actuator
 from .actuated.limits import fit_within_limits, without_cut_noise
-from .any_input import UnrelatedError, fit_any_input
+from .any_input import fit_any_input
 from .arguments import checked_records, edges_of, known_factor, step_data_of
 from .averaging import (
     aligned_steps,
@@ -264,20 +264,19 @@ def fit_output_error(
         beside = {"actuator": actuator, "max_delay": dead_time and max_delay}
         stated = checked_statements(fastest_lag, dead_time, **beside)
         linear = partial(_linear, several, bounded(tried, stated), **setting)
-    try:
-        result = checked(linear(), alone=known is None)
-        if stated is not None:
-            result = told(result, stated, free)
-        if actuator is not None:
-            result = with_actuator(result, actuator, tried.structures)
-    except UnrelatedError:
-        if actuator is None:
-            raise
-        # Beside what an actuator does, no linear model need follow the output.
-        result = checked(linear(refuses=False), alone=known is None)
-        result = with_actuator(result, actuator, tried.structures)
-        if result.actuator is None:
-            raise
+
+    def without_actuator() -> OutputErrorFit:
+        return checked(linear(), alone=known is None)
+
+    if actuator is None:
+        result = without_actuator()
+    else:
+        # What a valve does is no coloured noise, and need not follow a linear model.
+        start = replace(tried, compared=False, whiten=False)
+        plain = checked(_linear(several, start, **setting, refuses=False))
+        result = with_actuator(plain, without_actuator, actuator, tried.structures)
+    if stated is not None:
+        result = told(result, stated, free)
     core = continuous_core(result.estimate.numerator, result.poles)
     if include_known and known is not None:
         core = ct.ss(known) * core

@@ -209,6 +209,7 @@ def fit_window(
     scales: Scales,
     noise: tuple[float, float],
     huber: bool,
+    like: WindowFit | None = None,
 ) -> WindowFit:
     """Search all structures.
 
@@ -223,8 +224,12 @@ def fit_window(
         Huber's loss by pseudo-values: the data are moved towards the model, so that their
         least-squares fit is that of Huber's loss. Starting from least squares one pass suffices,
         two with outliers.
+    like : WindowFit, optional
+        Fit of these structures to data of the same plant that are weighted otherwise: the search
+        starts from there.
     """
     sigma, quantum = noise
+    known = None if like is None else {s: [c.parameters] for s, c in like.candidates.items()}
     problem = window.problem
     # Neither what rings nor what integrates matters to its search: it is made once.
     first = search(problem, [Structure(1, 1)], scales)
@@ -237,7 +242,8 @@ def fit_window(
         integrating=bool(np.abs(rough.poles[0]) * scales.length < _RAMP),
     )
     others = [s for s in structures if s not in first]
-    candidates = search(problem, others, scales, first if len(others) < len(structures) else None)
+    beside = first if len(others) < len(structures) else None
+    candidates = search(problem, others, scales, beside, starts=known)
     passes = _PASSES if huber else 0
     rivals: dict[Structure, float] = {}
     for iteration in range(passes + 1):

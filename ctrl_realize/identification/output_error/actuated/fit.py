@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -48,12 +49,16 @@ _WELL = 0.25  # relative half width of an interval up to which a parameter is re
 
 
 def with_actuator(
-    result: OutputErrorFit, asked: str, structures: tuple[Structure, ...] | None
+    result: OutputErrorFit,
+    linear: Callable[[], OutputErrorFit],
+    asked: str,
+    structures: tuple[Structure, ...] | None,
 ) -> OutputErrorFit:
-    """Replace a linear fit by one with an actuator, if the evidence for it is very strong.
+    """Fit an actuator beside a linear model, or a linear model if there is no strong evidence.
 
-    Where it is not, and an actuator is not ruled out either, the interval of the dead time covers
-    both. `structures` are those that were asked for.
+    Where an actuator is not ruled out either, the interval of the dead time covers both.
+    `structures` are those that were asked for; `result` is a linear fit as start, `linear` makes
+    the one that is reported where no actuator is needed.
 
     Raises
     ------
@@ -77,9 +82,10 @@ def with_actuator(
     scales = _scales(result)
     found = fit_actuated(parts, scales, kinds, structures)
     if found is None:
+        result = linear()
         return replace(result, choices=result.choices + skipped)
     if not found.chosen:
-        said = (*skipped, not_needed(identifiable, found.evidence))
+        result, said = linear(), (*skipped, not_needed(identifiable, found.evidence))
         return replace(_both(result, found), choices=result.choices + said)
     return _replaced(free, scales, found, skipped)
 

@@ -85,11 +85,13 @@ def fit_windows(
     noise: FloatArray,
     residual: tuple[FloatArray, ...] = (),
     longest: float = 0.0,
+    like: WindowFit | None = None,
 ) -> SampledWindow:
     """Fit structures to filtered records, every record weighted by its noise.
 
     Dead times are sought `within` these, in s; `residual` as for `SampledData.whitened`. What
     depends on the input before the records for a dead time of `longest` is left out in any case.
+    The search starts from a fit of the structures to records with almost the same filter, `like`.
     """
     dt, n, usual = data.step, max(y.size for y in data.outputs), data.spacing * data.dt
     order = noise.size - 1
@@ -102,12 +104,12 @@ def fit_windows(
     length = (max(data.lengths) - order) * dt
     onset, rise = max(rough.dead_time, 0.5 * usual), max(lag, 2 * usual)
     scales = Scales(onset, rise, length, dt, within[1], within[0])
-    fits = _fit(data.whitened(noise, residual), structures, scales, huber)
+    fits = _fit(data.whitened(noise, residual), structures, scales, huber, like)
     levels = _noise_levels(data.whitened(noise, residual), fits)
     if levels.max() > _UNLIKE * levels.min():
         mean = float(np.exp(np.mean(np.log(levels))))
         data = replace(data, scales=tuple(float(level) / mean for level in levels))
-        fits = _fit(data.whitened(noise, residual), structures, scales, huber)
+        fits = _fit(data.whitened(noise, residual), structures, scales, huber, fits)
     return SampledWindow(data, noise, scales, fits, huber)
 
 
@@ -119,19 +121,20 @@ def in_coloured_noise(plain: SampledWindow) -> SampledWindow:
     not settle within the record, or whose gain is not significant, are left out; if no other is
     left, as for an integrator, the previous fit remains too.
     """
-    found = plain
+    found, before = plain, None
     for _ in range(_NOISE_TURNS):
         parameters = found.fit.best.parameters
         model = modelled(found.data, parameters, found.model.numerator)
         error = found.data.problem.data - model
         noise = whitening_filter(error, noise_lags(min(found.data.counts)))
         within = plain.scales.earliest, plain.scales.latest
-        again = fit_windows(plain.data, ORDERS, within, plain.huber, noise)
+        again = fit_windows(plain.data, ORDERS, within, plain.huber, noise, like=before)
+        before = again.fit
         settling = [s for s, c in again.fit.candidates.items() if _settles(again.fit.static(c))]
         if not settling:
             break
         if len(settling) < len(ORDERS):
-            again = fit_windows(plain.data, settling, within, plain.huber, noise)
+            again = fit_windows(plain.data, settling, within, plain.huber, noise, like=before)
         if not again.fit.correlation < plain.fit.correlation:
             break
         found = again
@@ -173,7 +176,11 @@ def window_of(data: SampledData) -> Window:
 
 
 def _fit(
-    data: SampledData, structures: Sequence[Structure], scales: Scales, huber: bool
+    data: SampledData,
+    structures: Sequence[Structure],
+    scales: Scales,
+    huber: bool,
+    like: WindowFit | None = None,
 ) -> WindowFit:
     window = window_of(data)
     problem = window.problem
@@ -181,7 +188,7 @@ def _fit(
     fits = 1e-9 * max(float(np.ptp(y[~np.isnan(y)])) for y in data.outputs)
     sigma = _SMALLEST * max(float(np.ptp(problem.data)), fits)
     noise = sigma, max(quantisation_step(y[~np.isnan(y)]) for y in data.outputs)
-    return fit_window(window, structures, scales, noise, huber)
+    return fit_window(window, structures, scales, noise, huber, like)
 
 
 def modelled(data: SampledData, parameters: FloatArray, numerator: FloatArray) -> FloatArray:
