@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, Literal
 from ._flags import Flag
 from ._parameters import Parameter, checked_time_unit, formula, parameter_table
 from ._shown import html_card, text_card
-from ._wording import ASSUMED, shown_unit, times_in
+from ._wording import ASSUMED, chosen, in_time, shown_unit, times_in
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -322,7 +322,10 @@ class ModelFit(Result):
         return _common(self.records[0].output_units) if self.records else ""
 
     def _choices(self) -> list[str]:
-        return [*self.choices, *[_SAID] * (self._record_unit == ASSUMED)]
+        said = [_SAID] * (self._record_unit == ASSUMED)
+        if self.records and self.records[0].irregular:
+            said.append(chosen("sample_time.irregular", usual=in_time(self.records[0].sample_time)))
+        return [*self.choices, *said]
 
     def report(self, *, time_unit: str | None = None) -> str:
         """Return the result as plain text, choices and flags included.

@@ -217,3 +217,74 @@ def test_a_record_without_an_output_after_its_step_is_refused():
     y = np.where(time < 10, np.random.default_rng(0).standard_normal(200), np.nan)
     with pytest.raises(DataError, match="expected samples of the output after the step at 10 s"):
         cr.fit_output_error(cr.Record(time, 1.0 * (time >= 10), y, missing="keep"))
+
+
+def jittered(delay=5.3, lag=20.0, gain=0.8):
+    """Simulated log about once a second, of stamps that are exact, and a step of 10."""
+    rng = np.random.default_rng(5)
+    time = np.round(np.cumsum(1.004 + 0.1 * rng.uniform(-1, 1, 300)), 3)
+    u = 10.0 * (np.arange(300) >= 60)
+    y = gain * 10 * -np.expm1(-np.maximum(time - time[60] - delay, 0) / lag)
+    return time, u, y + 0.02 * rng.standard_normal(300)
+
+
+def test_models_and_controllers_have_the_sample_time_of_irregular_stamps():
+    record = cr.Record.from_samples(*jittered())
+    assert (record.sample_time, record.irregular) == (1.0, True)
+    assert record.dt < 0.03
+    assert "300 samples about 1 s apart" in repr(record)
+    sys = cr.identify(record, structures="FOPDT")
+    fit, pid = sys.fit, cr.design.pid(sys)
+    assert (sys.dt, fit.dt, pid.dt, fit.plausible_models.dt) == (1.0, 1.0, 1.0, 1.0)
+    # the stamps are exact in the fit: rounded to whole samples they were 0.2 to 0.5 s off
+    assert fit.interval[0] <= 5.3 <= fit.interval[1]
+    assert_allclose(fit.dead_time, 5.3, atol=0.1)
+    assert_allclose(fit.delay, fit.dead_time)
+    assert_allclose(sys.dcgain(), 0.8, rtol=0.01)
+    assert "sample time 1 s: the median distance of the stamps" in fit.report()
+    table = cr.validation.cross_validate({"model": sys}, [record])
+    assert table.to_numpy().min() > 99
+
+
+def test_the_sample_time_of_irregular_stamps_may_be_stated():
+    record = cr.Record.from_samples(*jittered(), sample_time=2.0)
+    assert cr.identify(record, structures="FOPDT").dt == 2.0
+    assert len(record[50:250]) < len(record)
+    assert record[50:250].sample_time == 2.0
+    with pytest.raises(OptionError, match="at least the step of the time axis"):
+        cr.Record.from_samples(*jittered(), sample_time=1e-4)
+    with pytest.raises(DataError, match="stamps of this record are irregular"):
+        cr.identify(record, method="scan")
+
+
+def test_gaps_and_slow_outputs_leave_the_sample_time_of_regular_stamps():
+    assert cr.Record.from_samples(10.0 * SOME, SOME, SOME).sample_time == 10.0
+    slow = cr.Record.from_samples(
+        10.0 * np.arange(20), np.arange(200), np.arange(20), input_time=np.arange(200.0)
+    )
+    assert (slow.dt, slow.sample_time, slow.irregular) == (1.0, 1.0, False)
+
+
+def test_several_channels_with_irregular_stamps_have_their_sample_time():
+    time, _, _ = jittered()
+    rng = np.random.default_rng(2)
+    held = np.repeat(rng.choice([-1.0, 1.0], (2, 30)), 10, axis=1)
+    held[:, :30] = 0  # at rest
+    fine = np.arange(0, time[-1] + 0.01, 0.01)
+    rows = np.clip(np.searchsorted(time, fine, side="right") - 1, 0, None)
+    a, b = np.exp(-0.01 / 8), np.exp(-0.01 / 5)
+    one = lfilter([0, 1 - a], [1, -a], np.r_[np.zeros(300), held[0][rows]])[: fine.size]
+    two = lfilter([0, 1 - b], [1, -b], np.r_[np.zeros(500), held[1][rows]])[: fine.size]
+    seen = np.round(time / 0.01).astype(int).clip(0, fine.size - 1)
+    output = (2 * one - two)[seen] + 0.005 * rng.standard_normal(time.size)
+    record = cr.Record.from_samples(time, held, output)
+    sys = cr.identify(record, structures="FOPDT")
+    assert sys.dt == 1.0
+    for fit, truth in zip(sys.fit.fits, (3.0, 5.0), strict=True):
+        assert_allclose(fit.dead_time, truth, atol=0.1)
+    even = record.at_equal_distances()
+    assert (even.dt, even.irregular) == (1.0, False)
+    whole = cr.fit_state_space(record, 2)
+    assert whole.dt == 1.0
+    assert_allclose(whole.dcgain().ravel(), [2, -1], rtol=0.05)
+    assert any("interpolates" in choice for choice in whole.fit.choices)

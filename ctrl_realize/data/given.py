@@ -71,6 +71,12 @@ def check_complete(record: Record, task: str) -> None:
         A value of input or output is NaN.
     """
     as_record(record)
+    if record.irregular:
+        raise DataError(
+            f"{task} needs samples at equal distances; the stamps of this record are irregular. "
+            "identify(record) and fit_output_error use them as they are; read_record(..., "
+            "resample=True) or Record.resampled(time, input, output) interpolates"
+        )
     if record.missing == "keep" and record.n_missing:
         raise DataError(
             f"{task} needs complete data; missing samples in this record: {record.n_missing}. "

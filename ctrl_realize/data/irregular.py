@@ -8,10 +8,13 @@ from numpy.typing import ArrayLike
 from .._checks import numbers, positive
 from ..errors import DataError, OptionError, TimeAxisError
 from ..numerics.arrays import FloatArray
-from ..numerics.signals.sample_grid import grid_rows, grid_step
+from ..numerics.signals.sample_grid import grid_rows, grid_step, regular_step, usual_step
 from ..numerics.signals.time_axis import axis_fault
 from .record_checks import axis_words, check_finite, check_shape, check_size
 from .resampling import MAX_DENSER, MIN_SAMPLES
+
+_AS_IT_IS = 1.5
+"""Steps of the time axis from which on the distance of samples is no step of it."""
 
 
 def on_one_axis(
@@ -20,8 +23,8 @@ def on_one_axis(
     output: ArrayLike,
     input_time: ArrayLike | None,
     dt: float | None,
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Time axis, held input, and output with NaN where there is no sample.
+) -> tuple[tuple[FloatArray, FloatArray, FloatArray], float]:
+    """Time axis, held input, output with NaN where there is no sample, and the sample time in s.
 
     See `Record.from_samples`.
     """
@@ -68,7 +71,10 @@ def on_one_axis(
         _held(moves[row], values[row], axis, step)
         for row, values in zip(known, np.atleast_2d(u), strict=True)
     ])  # fmt: skip
-    return axis, held[0] if u.ndim == 1 else held, spread
+    measured = stamps[seen & ~np.isnan(np.atleast_2d(y)).all(axis=0)]
+    usual = step if regular_step(every) else usual_step(measured)
+    signals = axis, held[0] if u.ndim == 1 else held, spread
+    return signals, usual if usual > _AS_IT_IS * step else step
 
 
 def _stamps(time: ArrayLike, what: str, least: int) -> FloatArray:

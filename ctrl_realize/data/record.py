@@ -9,12 +9,13 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .._checks import numbers, one_of, real, spelled_out
+from .._checks import numbers, one_of, positive, real, spelled_out
 from .._shown import html_card, text_card
 from .._wording import ASSUMED, in_time, shown_unit, times_in
 from ..errors import DataError, OptionError, TimeAxisError
 from ..numerics.arrays import BoolArray, FloatArray, read_only
-from ..numerics.signals.time_axis import axis_fault, sample_time
+from ..numerics.signals.time_axis import axis_fault
+from ..numerics.signals.time_axis import sample_time as mean_step
 from .record_checks import (
     axis_words,
     check_finite,
@@ -54,12 +55,18 @@ class Record(RecordConversions):
     reference : array_like, shape of the output, optional
         Set point of the controller, in the unit of the output; NaN where it is not in force,
         since the loop is in manual. Default: the record was not made in a loop, or nobody knows.
+    sample_time : float, optional
+        Time in s between two samples of the plant, where the time axis is finer than that, since
+        the stamps are irregular (see `from_samples`): models of the record have it as their `dt`.
+        Default: the step of the time axis.
 
     Attributes
     ----------
     dt : float
-        Sample time in s.
+        Step of the time axis in s.
     n_samples, ninputs, noutputs : int
+    irregular : bool
+        Whether `sample_time` is longer than `dt`.
     n_missing : int
         Number of values of `input` and `output` that are NaN.
 
@@ -94,6 +101,7 @@ class Record(RecordConversions):
         "output",
         "output_labels",
         "reference",
+        "sample_time",
         "time",
         "units",
     )
@@ -103,6 +111,7 @@ class Record(RecordConversions):
     output: FloatArray
     reference: FloatArray | None
     dt: float
+    sample_time: float
     name: str
     input_labels: tuple[str, ...]
     output_labels: tuple[str, ...]
@@ -121,6 +130,7 @@ class Record(RecordConversions):
         units: Mapping[str, str] | None = None,
         missing: Literal["refuse", "keep"] = "refuse",
         reference: ArrayLike | None = None,
+        sample_time: float | None = None,
     ) -> None:
         stamps = numbers(time, "time")
         if stamps.ndim != 1 or stamps.size < MIN_SAMPLES:
@@ -147,7 +157,8 @@ class Record(RecordConversions):
         fix(self, "input", read_only(signals["input"]))
         fix(self, "output", read_only(signals["output"]))
         fix(self, "reference", checked_reference(reference, signals["output"]))
-        fix(self, "dt", sample_time(stamps))
+        fix(self, "dt", mean_step(stamps))
+        fix(self, "sample_time", self._longer(sample_time))
         fix(self, "name", spelled_out(str(name)))
         fix(self, "missing", str(missing))
         fix(self, "input_labels", labelled(input_labels, self.ninputs, "u", "input_labels"))
@@ -178,16 +189,36 @@ class Record(RecordConversions):
             "output_labels": self.output_labels,
             "units": dict(self.units),
             "missing": self.missing,
+            "sample_time": self.sample_time if self.irregular else None,
         }
+
+    def _longer(self, given: float | None) -> float:
+        """Sample time that was given, which is not below a step of the time axis."""
+        if given is None:
+            return self.dt
+        wanted = positive(given, "sample_time", "time in s between two samples")
+        if wanted < (1 - 1e-6) * self.dt:
+            raise OptionError(
+                f"sample_time={wanted:g} s; expected at least the step of the time axis, "
+                f"{self.dt:g} s"
+            )
+        return self.dt if wanted <= (1 + 1e-6) * self.dt else wanted
 
     def __repr__(self) -> str:
         name = f" {self.name!r}" if self.name else ""
         unit = ASSUMED if self.units.get("time") == ASSUMED else "s"
+        on_axis = f"{self.n_samples} samples of {self.dt:g} {unit}"
+        if self.irregular:
+            on_axis = (
+                f"{np.count_nonzero(self.seen)} samples about {self.sample_time:g} {unit} apart "
+                f"(stamps to {self.dt:g} {unit})"
+            )
+        gaps = 0 if self.irregular else self.n_missing
         return (
-            f"<Record{name}: {self.n_samples} samples of {self.dt:g} {unit}, "
+            f"<Record{name}: {on_axis}, "
             f"{_count(self.ninputs, 'input')}, {_count(self.noutputs, 'output')}"
             + (", set point" if self.reference is not None else "")
-            + (f", {self.n_missing} missing values>" if self.n_missing else ">")
+            + (f", {gaps} missing values>" if gaps else ">")
         )
 
     def report(self) -> str:
@@ -214,6 +245,12 @@ class Record(RecordConversions):
         with times_in(shown_unit(told)):
             length = in_time(float(self.time[-1] - self.time[0]), 4)
         rows = [("samples", f"{self.n_samples} of {step}, {length} long")]
+        if self.irregular:
+            many, usual = np.count_nonzero(self.seen), in_time(self.sample_time, 6)
+            rows = [
+                ("samples", f"{many} about {usual} apart, {length} long"),
+                ("time axis", f"in steps of {step}, irregular stamps"),
+            ]
         for kind, labels, units, values in (
             ("input", self.input_labels, self.input_units, self.input),
             ("output", self.output_labels, self.output_units, self.output),
@@ -224,7 +261,7 @@ class Record(RecordConversions):
                 known = row[~np.isnan(row)]
                 ends = f"{known.min():.4g} to {known.max():.4g}" if known.size else "missing"
                 rows.append((f"{kind} {label}", f"{ends} {unit}".rstrip()))
-        if self.n_missing:
+        if self.n_missing and not self.irregular:
             rows.append(("missing", f"{self.n_missing} values"))
         return f"Record {self.name}".rstrip(), rows
 

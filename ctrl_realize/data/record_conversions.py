@@ -14,7 +14,7 @@ from ..numerics.arrays import FloatArray
 from ..results import Drawable
 from .frames import frame_of_signals, signals_of_frame
 from .irregular import on_one_axis
-from .resampling import held_at, resampled
+from .resampling import at_equal_distances, held_at, resampled
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -32,9 +32,19 @@ class RecordConversions(Drawable):
     name: str
     input_labels: tuple[str, ...]
     output_labels: tuple[str, ...]
+    dt: float
+    sample_time: float
+
+    def __replace__(self, **changes: Any) -> Self:
+        raise NotImplementedError
 
     def __init__(self, time: ArrayLike, input: ArrayLike, output: ArrayLike, **labels: Any) -> None:
         raise NotImplementedError
+
+    @property
+    def irregular(self) -> bool:
+        """Whether the time axis is finer than the sample time, for stamps that are irregular."""
+        return self.sample_time > self.dt
 
     @classmethod
     def from_frame(
@@ -188,7 +198,9 @@ class RecordConversions(Drawable):
         Returns
         -------
         Record
-            With ``missing="keep"``. It starts with the first sample of the input.
+            With ``missing="keep"``. It starts with the first sample of the input. Its `sample_time`
+            is `dt` for regular samples, otherwise the median distance of the outputs, as short a
+            number as their jitter allows (1 s for stamps about 1.001 s apart).
 
         Raises
         ------
@@ -202,9 +214,31 @@ class RecordConversions(Drawable):
         >>> record.dt, record.input.tolist(), record.output.tolist()
         (10.0, [0.0, 0.0, 0.0, 1.0, 1.0], [5.0, 5.0, nan, 5.0, 6.0])
         """
-        labels = {"missing": "keep", **labels}
-        signals = on_one_axis(time, input, output, input_time, dt)
+        signals, usual = on_one_axis(time, input, output, input_time, dt)
+        # one that is a step of the axis is left to `Record`, which knows it without rounding
+        labels = {"missing": "keep", "sample_time": usual, **labels}
         return cls(*signals, reference=held_at(time, reference, signals[0]), **labels)
+
+    def at_equal_distances(self) -> Self:
+        """Return a record of irregular samples at equal distances, `sample_time`, by interpolation.
+
+        The output is interpolated linearly and missing in gaps, the input is its mean over a sample
+        time. A record whose samples are regular is returned as it is.
+
+        Examples
+        --------
+        >>> import ctrl_realize as cr
+        >>> record = cr.Record.from_samples([0, 1.01, 2, 3.02, 4], [0, 0, 1, 1, 1], [5, 5, 5, 6, 7])
+        >>> print(record.at_equal_distances().output.round(2))
+        [5.   5.   5.   5.98 7.  ]
+        """
+        if not self.irregular:
+            return self
+        time, *signals = at_equal_distances(self.time, self.input, self.output, self.sample_time)
+        reference = held_at(self.time, self.reference, time)
+        return self.__replace__(
+            time=time, input=signals[0], output=signals[1], reference=reference, sample_time=None
+        )
 
     @classmethod
     def from_response(cls, response: ct.TimeResponseData, *, name: str | None = None) -> Self:

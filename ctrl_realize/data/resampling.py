@@ -13,6 +13,8 @@ from .record_checks import axis_words, check_finite, check_shape, check_size
 
 MIN_SAMPLES = 3
 MAX_DENSER = 100
+_GAP = 2.5
+"""Sample times between two samples from which on a value between them is not interpolated."""
 
 
 def resampled(
@@ -66,6 +68,27 @@ def held_at(time: ArrayLike, reference: ArrayLike | None, uniform: FloatArray) -
     slack = 1e-6 * (uniform[1] - uniform[0])
     last = np.searchsorted(stamps, uniform + slack, side="right") - 1
     return np.asarray(values[..., np.maximum(last, 0)])
+
+
+def at_equal_distances(
+    time: FloatArray, input: FloatArray, output: FloatArray, step: float
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Signals of a fine time axis at a coarser one: mean input of a step, interpolated output.
+
+    Outputs across a gap are missing.
+    """
+    axis = time[0] + step * np.arange(int((time[-1] - time[0]) / step * (1 + 1e-12)) + 1)
+    rows = np.searchsorted(time, axis - 1e-6 * step)
+    counts = np.diff(rows, append=time.size)
+    means = np.add.reduceat(np.atleast_2d(input), rows, axis=1) / counts
+    found = np.full((len(np.atleast_2d(output)), axis.size), np.nan)
+    for row, values in zip(found, np.atleast_2d(output), strict=True):
+        known = np.flatnonzero(~np.isnan(values))
+        after = np.clip(np.searchsorted(time[known], axis), 1, known.size - 1)
+        near = time[known[after]] - time[known[after - 1]] <= _GAP * step
+        inside = (axis >= time[known[0]] - step) & (axis <= time[known[-1]] + step)
+        row[:] = np.where(near & inside, np.interp(axis, time[known], values[known]), np.nan)
+    return axis, means[0] if input.ndim == 1 else means, found[0] if output.ndim == 1 else found
 
 
 def _at(uniform: FloatArray, stamps: FloatArray, values: FloatArray, *, held: bool) -> FloatArray:

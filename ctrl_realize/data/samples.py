@@ -12,6 +12,7 @@ import numpy as np
 from ..errors import DataWarning, OptionError, TimeAxisError, warn_caller
 from ..numerics.arrays import FloatArray
 from ..numerics.signals.counters import counter_period
+from ..numerics.signals.sample_grid import regular_step, usual_step
 from ..numerics.signals.time_axis import axis_fault
 from .record import Record
 
@@ -76,6 +77,8 @@ class Samples:
         if fault is None and not any(one.any() for one in lost):
             return self, "refuse" if self.input_time is None else "keep"
         said = "some stamps are irregular" if fault is not None else ""
+        if said and not regular_step(self.time):
+            said += f" (samples about {usual_step(self.time):g} s apart)"
         samples = self
         if self.input_time is None:
             no_input, no_output = (one.all(axis=0) for one in lost)

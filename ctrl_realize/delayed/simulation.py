@@ -13,8 +13,11 @@ from ..data import Record
 from ..data.given import check_complete, check_input
 from ..errors import DataError, UnsuitableSystemError
 from ..numerics.arrays import FloatArray, later
+from ..numerics.internal_delays.form import delayed_ends
 from ..numerics.state_space.responses import markov, step_response
-from . import DelayedStateSpace
+from ..numerics.state_space.sampling import continuous_ends
+from . import DelayedStateSpace, DelaySystem
+from .inside.conversions import check_logarithm
 
 Start = Literal["estimate", "rest"]
 
@@ -116,9 +119,9 @@ def as_delayed(system: Any, record: Record, *, stable: bool = True) -> DelayedSt
             "the system is not discrete with a sample time; sample it with "
             "delayed_ss(system, dt=...)"
         )
-    if not np.isclose(model.dt, record.dt, rtol=1e-3, atol=0):
+    if not np.isclose(model.dt, record.sample_time, rtol=1e-3, atol=0):
         raise DataError(
-            f"the record has the sample time {record.dt:g} s, the system {model.dt:g} s"
+            f"the record has the sample time {record.sample_time:g} s, the system {model.dt:g} s"
         )
     if (model.ninputs, model.noutputs) != (record.ninputs, record.noutputs):
         raise DataError(
@@ -131,4 +134,16 @@ def as_delayed(system: Any, record: Record, *, stable: bool = True) -> DelayedSt
         raise UnsuitableSystemError(
             f"the system is unstable (a pole at |z| = {worst:.6g}): its simulation diverges"
         )
-    return delayed
+    return _on_axis(delayed, record.dt) if record.irregular else delayed
+
+
+def _on_axis(model: DelayedStateSpace, step: float) -> DelayedStateSpace:
+    """Sample the continuous model again, at the steps of the time axis of irregular stamps."""
+    core = model.delay_free
+    check_logarithm(core.A)
+    ends = model.input_delays, model.output_delays
+    matrices, *delays = continuous_ends((core.A, core.B, core.C, core.D), float(core.dt), *ends)
+    form = delayed_ends(*matrices, *delays)
+    continuous = ct.StateSpace(form.A, form.B, form.C, form.D, 0, remove_useless_states=False)
+    sampled: Any = DelaySystem(continuous, form.delays).to_discrete(step)
+    return sampled.replace(fit=model.fit)  # type: ignore[no-any-return]

@@ -34,6 +34,7 @@ from ..numerics.engine.poles import parameters_from_poles, poles_from_parameters
 from .impulse.from_io import impulse_from_io
 from .output_error.fit import fit_output_error, model_alone
 from .output_error.result import OutputErrorFit
+from .output_error.summary import fitted_model
 from .plausible import continuous_core
 from .several_inputs_result import SeveralInputsFit
 
@@ -111,6 +112,8 @@ def fit_several_inputs(
         if settled:
             break
         settled = moved < _SETTLED
+    if record.irregular:
+        systems = [_sampled(system, record.sample_time) for system in systems]
     fits = _wider([fit_of(system, OutputErrorFit) for system in systems], record)
     result = SeveralInputsFit(fits, (record,), responses, cycle, settled)
     return _joined(systems, result)
@@ -128,15 +131,15 @@ def _checked(records: tuple[Record, ...]) -> Record:
 
 
 def _starting(record: Record) -> FloatArray:
-    """Responses of finite impulse responses to each input; zero where samples are missing."""
-    inputs = np.atleast_2d(record.input)
-    if record.n_missing:
-        return np.zeros(inputs.shape)
+    """Responses (m, N) of finite impulse responses to each input."""
+    even = record.at_equal_distances()
+    inputs = np.atleast_2d(even.input)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", DataWarning)  # a start need not be exact
-        markov = impulse_from_io(record, method="regularized").markov[0]
+        markov = impulse_from_io(even, method="regularized").markov[0]
     pairs = zip(markov, inputs, strict=True)
-    return np.array([lfilter(h, [1.0], u - u[0]) for h, u in pairs])
+    found = (lfilter(h, [1.0], u - u[0]) for h, u in pairs)
+    return np.array([np.interp(record.time, even.time, one) for one in found])
 
 
 def _one(
@@ -154,6 +157,13 @@ def _one(
         return fit_one(one, structures=structures, **options)
     except DataError as error:
         raise DataError(f"{error}. Or leave the input {name!r} out of the record") from None
+
+
+def _sampled(system: DelayedStateSpace, step: float) -> DelayedStateSpace:
+    """Model with the sample time of irregular stamps, fitted at the steps of their time axis."""
+    fit = fit_of(system, OutputErrorFit)
+    fit = replace(fit, records=tuple(one.__replace__(sample_time=step) for one in fit.records))
+    return fitted_model(continuous_core(fit.estimate.numerator, fit.poles), fit)
 
 
 def _kept(fit: OutputErrorFit, structures: Structures | None) -> Any:
@@ -217,9 +227,9 @@ def _tangents(fit: OutputErrorFit, u: FloatArray) -> FloatArray:
 
     def response(late: float, theta: FloatArray, b: FloatArray) -> FloatArray:
         core = continuous_core(b, poles_from_parameters(theta[None])[0][0])
-        return np.asarray(delayed_ss(core, dead_time=late, dt=fit.dt).simulate(u))
+        return np.asarray(delayed_ss(core, dead_time=late, dt=fit.data.dt).simulate(u))
 
-    at, h = fit.dead_time, 0.25 * fit.dt
+    at, h = fit.dead_time, 0.25 * fit.data.dt
     best = response(at, poles, numerator)
     early = max(at - h, 0.0)
     columns = [(response(at + h, poles, numerator) - response(early, poles, numerator)) / 2]

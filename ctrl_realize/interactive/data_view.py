@@ -34,8 +34,11 @@ def data_view(rows: Sequence[Row], selected: int) -> JSON:
 
 def _facts(record: Record) -> str:
     """One line about a record."""
-    gaps = f", {record.n_missing} missing values" if record.n_missing else ""
     length = in_time(record.time[-1] - record.time[0], 4)
+    if record.irregular:
+        usual = in_time(record.sample_time, 4)
+        return f"{np.count_nonzero(record.seen)} samples about {usual} apart, {length} long"
+    gaps = f", {record.n_missing} missing values" if record.n_missing else ""
     return f"{record.n_samples} samples of {in_time(record.dt, 4)}, {length} long{gaps}"
 
 

@@ -169,6 +169,7 @@ def python_lines(row: Mapping[str, Any], name: str) -> list[str]:
             f"    {name}.time, signal, output, units={{**{name}.units, **units}},",
             f"    name={name}.name, missing={missing}, reference={name}.reference,",
             f"    input_labels={name}.input_labels, output_labels={name}.output_labels,",
+            f"    sample_time={name}.sample_time,",
             ")",
         ]
     if row["range"]:

@@ -8,6 +8,8 @@ import pkgutil
 from collections.abc import Sequence
 from typing import Any
 
+import numpy as np
+
 from .._checks import check_type
 from .._facts import version_of
 from .._wording import ASSUMED
@@ -133,9 +135,9 @@ def _record(record: Record) -> dict[str, Any]:
 
     return {
         "name": record.name,
-        "samples": record.n_samples,
-        "missing": record.n_missing,
-        "sample_time": record.dt,
+        "samples": int(np.count_nonzero(record.seen)) if record.irregular else record.n_samples,
+        "missing": 0 if record.irregular else record.n_missing,
+        "sample_time": record.sample_time,
         "length": float(record.time[-1] - record.time[0]),
         "time_unit_assumed": record.units.get("time") == ASSUMED,
         "inputs": signals(record.input_labels, record.input_units),

@@ -134,7 +134,8 @@ def _extent(record: Record | None) -> tuple[str, str, str]:
     if record is None:
         return ("", "", "")
     length = float(record.time[-1] - record.time[0])
-    return str(record.n_samples), f"{record.dt:.6g}", f"{length:.6g}"
+    count = np.count_nonzero(record.seen) if record.irregular else record.n_samples
+    return str(count), f"{record.sample_time:.6g}", f"{length:.6g}"
 
 
 def campaign_table(campaign: Campaign) -> Table:

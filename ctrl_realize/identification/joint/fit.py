@@ -200,7 +200,9 @@ def _records(
     repeats = first.repeatability
     used = first.records if repeats is None else list(compress(first.records, repeats.kept))
     outputs, inputs = ([np.ravel(getattr(r, k)) for r in used] for k in ("output", "input"))
-    data = cut(outputs, inputs, first.dt, first.data.every, KnownFactor()).after(first.dead_time)
+    data = cut(outputs, inputs, first.data.dt, first.data.every, KnownFactor()).after(
+        first.dead_time
+    )
     return *sampled_part(data, first.estimate, latest), *joined(used, data, first.residual)
 
 

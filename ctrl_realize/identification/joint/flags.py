@@ -21,7 +21,7 @@ _SMOOTHED_POINTS = 3  # a single bad point is not a band
 
 def joint_flags(fit: JointFit, latest: float | None) -> tuple[Flag, ...]:
     """List the flags of the joint model, and that of a contradiction first."""
-    of_model = model_flags(fit.estimate, fit.dt, fit.data.length, latest)
+    of_model = model_flags(fit.estimate, fit.data.dt, fit.data.length, latest)
     return (*_contradiction(fit), *of_model)
 
 

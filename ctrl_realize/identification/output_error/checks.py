@@ -73,7 +73,7 @@ def checked(fit: OutputErrorFit, *, alone: bool = True) -> OutputErrorFit:
     if len(fit.records) == 1:
         shown = _shown(fit)
         flags += sensor_flags(fit, shown.output, shown.fitted)
-        held = hold_time(shown.output, shown.fitted, fit.dt * shown.spacing)
+        held = hold_time(shown.output, shown.fitted, fit.data.dt * shown.spacing)
         if held is not None and "coarse_quantisation" not in codes:
             low = max(low - held[0], 0.0)
             flags.append(held[1])
@@ -95,7 +95,7 @@ def checked(fit: OutputErrorFit, *, alone: bool = True) -> OutputErrorFit:
             high = max(high, step.dead_time + Z_95 * step.dead_time_error)
         # Parts of one step are not several responses.
         if not (in_loop or fit.estimate.averaged) and not (stepped and _moves(shown.drive) < 2):
-            changes, notes = against_one_model(shown, fit.delay)
+            changes, notes = against_one_model(shown, fit.dead_time / fit.data.dt)
             flags += changes
             if complete and not stepped and all(flag.code != "not_linear" for flag in flags):
                 flags += nonlinear_flags(shown, fit.delay, fit.total_delay / fit.dt)
@@ -138,7 +138,7 @@ class Shown:
 def _shown(fit: OutputErrorFit) -> Shown:
     record = fit.records[0]
     count = min(fit.measured.size, _MOST_SAMPLES)
-    rows = np.round((fit.time[:count] - record.time[0]) / fit.dt).astype(np.int64)
+    rows = np.round((fit.time[:count] - record.time[0]) / record.dt).astype(np.int64)
     first, last = int(rows[0]), int(rows[-1]) + 1
     drive = np.ravel(record.input)[first:last]
     gaps = None if last - first == count else rows - first

@@ -298,7 +298,7 @@ def _requested(
     noise = one_of(noise, "noise", ("auto", "white"))
     tried = requested(structures)
     limit = None if max_delay is None else positive(max_delay, "max_delay", "number of samples")
-    latest = None if limit is None else limit * records[0].dt
+    latest = None if limit is None else limit * records[0].sample_time
     return replace(tried, latest=latest, whiten=noise == "auto")
 
 

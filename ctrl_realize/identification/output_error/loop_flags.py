@@ -150,7 +150,7 @@ def generalised_step(
 def _step(
     fit: OutputErrorFit, start: UnweightedModel, output: FloatArray, drive: FloatArray
 ) -> WhiteStep | None:
-    step = white_step(output, drive, fit.dt, *start)
+    step = white_step(output, drive, fit.data.dt, *start)
     reach = max(fit.total_delay, fit.dead_time)
     # Farther away, one step of a linearisation is not a valid estimate.
     return step if step is None or abs(step.dead_time - start.dead_time) <= reach else None

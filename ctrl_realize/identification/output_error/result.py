@@ -159,7 +159,7 @@ class OutputErrorFit(FractionalDelayFit):
     @property
     def _jump(self) -> int | None:
         fit = self.estimate
-        return jump(fit.poles, fit.numerator, fit.dead_time, self.interval, self.dt)
+        return jump(fit.poles, fit.numerator, fit.dead_time, self.interval, self.data.dt)
 
     @property
     def order(self) -> int:
@@ -251,7 +251,7 @@ class OutputErrorFit(FractionalDelayFit):
         Without lags that the data do not distinguish from zero. The dead time of a response that
         jumps from one sample to the next is written in whole samples.
         """
-        shown, _ = told(self.parameters, self.dt, self._jump)
+        shown, _ = told(self.parameters, self.data.dt, self._jump)
         return formula(shown, self.integrators, self.time_unit)
 
     @property
@@ -321,8 +321,9 @@ class OutputErrorFit(FractionalDelayFit):
 
     @property
     def dt(self) -> float:
-        """Sample time in s."""
-        return self.data.dt
+        """Sample time of the model in s, that of the records."""
+        first = self.records[0]
+        return first.sample_time if first.irregular else self.data.dt
 
     @property
     def better(self) -> StructureFit | None:
@@ -452,7 +453,8 @@ class OutputErrorFit(FractionalDelayFit):
         """Dead time and what follows it: in s and in samples, of a jump in samples."""
         low, high = self.interval
         if (after := self._jump) is not None:
-            same = interval_in_time((after - 1) * self.dt, after * self.dt)
+            step = self.data.dt
+            same = interval_in_time((after - 1) * step, after * step)
             return (
                 f"{after} sample{'s' * (after > 1)}",
                 f" ({same} give the same samples behind a hold)",
@@ -462,7 +464,7 @@ class OutputErrorFit(FractionalDelayFit):
 
     def _rows(self) -> list[tuple[str, str]]:
         low, high = self.interval
-        _, left_out = told(self.parameters, self.dt, self._jump)
+        _, left_out = told(self.parameters, self.data.dt, self._jump)
         rows = [
             ("transfer function", self.formula),
             *([("not seen", not_seen_in_words(left_out))] if left_out else []),

@@ -10,7 +10,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..._checks import integer
+from ..._wording import chosen, in_time
 from ...data import Record
+from ...data.given import as_records
 from ...data.shown_units import in_shown_units
 from ...delayed import DelayedStateSpace, fit_of
 from ...delayed.simulation import as_delayed
@@ -103,13 +105,16 @@ def fit_state_space(
     >>> sys.fit.order, sys.fit.input_delays, sys.fit.output_delays
     (2, (2, 5), (0, 0))
     """
-    group = as_group(records)
+    given = as_records(records)
+    group = as_group([one.at_equal_distances() for one in given])
     asked = _orders(order)
     _check_signals(group, feedthrough)
     parts, cut = lively_parts(group)
     system = from_starts(parts, asked, delays, feedthrough).system
     fit = fit_of(system, StateSpaceFit)
-    return system.replace(fit=replace(fit, flags=cut + fit.flags)) if cut else system
+    said = [chosen("sample_time.interpolated", usual=in_time(group[0].dt))]
+    choices = (*fit.choices, *said * any(one.irregular for one in given))
+    return system.replace(fit=replace(fit, flags=cut + fit.flags, choices=choices))
 
 
 @single_threaded
@@ -158,7 +163,7 @@ def refine_state_space(
     >>> print(refined.poles().real.max().round(6))
     0.8
     """
-    everything = as_group(records)
+    everything = as_group([one.at_equal_distances() for one in as_records(records)])
     _check_signals(everything, feedthrough)
     group, cut = lively_parts(everything)
     model = as_delayed(system, group[0], stable=False)

@@ -2,7 +2,9 @@
 
 Our own rule. Regular samples with gaps keep their own step. Otherwise the step is the greatest
 common divisor of the distances of time stamps that were written with a few decimals, and stamps of
-full precision are rounded to a fiftieth of the usual step, an error of 1 % of it at most.
+full precision are rounded to a fiftieth of the usual step, an error of 1 % of it at most. On
+simulated records with a jitter of 10 % of a sample, the dead time of a grid of the usual step is
+four to six times as far off, and that of a tenth of it up to three times.
 """
 
 from __future__ import annotations
@@ -19,6 +21,7 @@ _WHOLE = 1e-3  # of the last decimal: rounding of stamps of 1e9 s is 2e-7 s
 _FINER = 50  # times as fine as the usual step
 _LARGEST = 2.0**53  # whole number that a float holds exactly
 _TURNS = 4  # of the step of regular samples, each from steps over longer gaps
+_ROUNDED = 0.01  # of the usual step of irregular samples, by which it may be rounded
 
 
 def grid_step(stamps: FloatArray, most: int) -> float:
@@ -38,15 +41,14 @@ def grid_step(stamps: FloatArray, most: int) -> float:
     >>> grid_step(np.array([0.0, 10.0, 30.0, 40.0, 45.0]), 1000)
     5.0
     """
-    regular = _regular_step(stamps)
+    regular = regular_step(stamps)
     if regular:
         return regular
     span = float(stamps[-1] - stamps[0])
     divisor = _common_divisor(stamps)
     if divisor and span / divisor < most:
         return divisor
-    steps = np.diff(stamps)
-    fine = min(float(np.median(steps)) / _FINER, float(steps.min()))
+    fine = min(usual_step(stamps) / _FINER, float(np.diff(stamps).min()))
     return max(fine, span / max(most - 1, 1))
 
 
@@ -55,7 +57,24 @@ def grid_rows(stamps: FloatArray, start: float, step: float) -> IntArray:
     return np.floor((stamps - start) / step + 0.5).astype(np.int64)
 
 
-def _regular_step(stamps: FloatArray) -> float:
+def usual_step(stamps: FloatArray) -> float:
+    """Median step of samples, as short a number as their jitter allows, in s.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from ctrl_realize.numerics.signals.sample_grid import usual_step
+    >>> usual_step(np.array([0.0, 1.0013, 2.0012, 3.0020, 4.0002]))
+    1.0
+    """
+    steps = np.diff(stamps)
+    low, usual, high = (float(q) for q in np.quantile(steps, [0.05, 0.5, 0.95]))
+    within = min((high - low) / 2, _ROUNDED * usual)
+    short = (float(f"{usual:.{digits}g}") for digits in range(1, 7))
+    return next((one for one in short if abs(one - usual) < within), without_rounding(usual))
+
+
+def regular_step(stamps: FloatArray) -> float:
     """Step of regular samples some of which are missing; 0 if they are not regular."""
     steps = np.diff(stamps)
     step = float(np.median(steps))

@@ -119,7 +119,7 @@ def _only_part(result: OutputErrorFit) -> ActuatedRecord:
         every = replace(data, rows=np.arange(command.size), output=np.zeros(command.size))
         terms = own_regressors(every, result.estimate.poles)
         return actuated_record(output, command, record.dt, edges=data.edges, regressors=terms)
-    rows = np.round((result.time - record.time[0]) / result.dt).astype(np.int64)
+    rows = np.round((result.time - record.time[0]) / record.dt).astype(np.int64)
     output[: rows[0]] = np.nan
     part = slice(0, int(rows[-1]) + 1)
     if rows[-1] - rows[0] + 1 < output.size // 2:
@@ -132,14 +132,14 @@ def _only_part(result: OutputErrorFit) -> ActuatedRecord:
 
 def _free_motion(result: OutputErrorFit, size: int) -> FloatArray:
     """Level, drift, and free response of the lags of the linear model, (N, q)."""
-    clock = result.dt * np.arange(size, dtype=np.float64)
+    clock = result.data.dt * np.arange(size, dtype=np.float64)
     fixed = np.stack([np.ones(size), np.linspace(0, 1, size)], axis=1)
     segment = Segments.single(clock, fixed)
     return np.asarray(local_columns(segment, result.estimate.poles[None])[0])
 
 
 def _scales(result: OutputErrorFit) -> Scales:
-    dt = result.dt
+    dt = result.data.dt
     onset = result.onset if np.isfinite(result.onset) else result.dead_time
     longest = max(record.time[-1] - record.time[0] for record in result.records)
     lags = result.total_delay - result.dead_time
@@ -159,9 +159,9 @@ def _replaced(
     data, time = result.data, result.time
     if len(parts) > 1 or measured.size != result.measured.size:
         command = np.concatenate([part.command[part.rows] for part in parts])
-        sigma, span = float(np.std(found.residual)), measured.size * result.dt
-        data = bare_data(measured, command, result.dt, sigma, span)
-        time = result.dt * np.arange(measured.size, dtype=np.float64)
+        sigma, span = float(np.std(found.residual)), measured.size * result.data.dt
+        data = bare_data(measured, command, result.data.dt, sigma, span)
+        time = result.data.dt * np.arange(measured.size, dtype=np.float64)
     estimate = _estimate(result, scales, found)
     actuator = _actuator_fit(result, found)
     staying = marked("stays_with_actuator")
@@ -172,7 +172,7 @@ def _replaced(
         part = missed(data, estimate, float(time[0]))
         flags.append(flagged("structured_misfit.actuator", missed=part))
     flags += [flag for flag in result.flags if flag.code in staying]
-    flags += model_flags(estimate, result.dt, scales.length, None)
+    flags += model_flags(estimate, result.data.dt, scales.length, None)
     if actuator.unresolved:
         flags.append(flagged("actuator_not_resolved", parameters="; ".join(actuator.unresolved)))
     return replace(
