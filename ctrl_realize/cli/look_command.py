@@ -9,8 +9,10 @@ from typing import Any
 import numpy as np
 
 from .._wording import in_time
+from ..data import MeasuredFRF, Record
 from ..errors import CtrlRealizeError
-from ..io import read_record
+from ..io import read_frf, read_record
+from ..io.frf import parts_of_frf
 from ..io.records import asked
 from ..io.signals.reading import Reading
 from ..io.tables import Table
@@ -19,14 +21,19 @@ from .terminal import complain, one_line, printable, say, table
 
 
 def run_look(file: Path, *, record: Mapping[str, Any], run: Run) -> int:
-    """Show columns and record, and return the exit code: 2 if the file is no record yet."""
+    """Show columns and what they hold, and return the exit code: 2 if it is no record yet."""
     how = asked(file, record)
     shown, long = how.signals(how.table())
     used: dict[int, str] = {}
     failed = ""
+    made: Record | MeasuredFRF
+    response = {} if record else parts_of_frf(shown)
     try:
-        used = _uses(shown, how, is_long=long is not None)
-        made = read_record(file, **record)
+        if response:
+            used, made = {k: part for part, k in response.items()}, read_frf(file)
+        else:
+            used = _uses(shown, how, is_long=long is not None)
+            made = read_record(file, **record)
     except CtrlRealizeError as error:
         failed = one_line(error)
     rows = [
@@ -38,6 +45,10 @@ def run_look(file: Path, *, record: Mapping[str, Any], run: Run) -> int:
     if failed:
         complain(failed)
         return 2
+    if not isinstance(made, Record):
+        say(f"\n{printable(repr(made))}, a frequency response")
+        say(f"in Python: cr.fit_frf(cr.read_frf({str(file)!r})) makes a model of it")
+        return 0
     span = in_time(float(made.time[-1] - made.time[0]))
     say(f"\n{printable(repr(made))}, {span} long")
     return 0

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import DataError
+from .frf import MeasuredFRF
 from .record import Record
 
 
@@ -22,6 +23,8 @@ def as_record(given: Any) -> Record:
         raise DataError(
             "expected a Record, such as Record(time, input, output) or read_record(path), "
             f"got a {type(given).__name__}"
+            + "; fit_frf makes a model of a frequency response"
+            * isinstance(given, MeasuredFRF)
         )
     return given
 

@@ -149,6 +149,14 @@ def _checked_unit(given: Mapping[str, Any], argument: str, known: Iterable[str])
     return plain
 
 
+def parts_of_frf(table: Table) -> dict[str, int]:
+    """Position of each part of a frequency response, by the header; none in another file."""
+    try:
+        return _columns(table, dict.fromkeys(_NAMES)) if has_header(table) else {}
+    except OptionError:
+        return {}
+
+
 def _columns(table: Table, asked: Mapping[str, Any]) -> dict[str, int]:
     """Position of each part that is present."""
     columns = {

@@ -3,6 +3,8 @@ import pytest
 import scipy.io
 from numpy.testing import assert_allclose
 
+import ctrl_realize as cr
+from ctrl_realize.cli import main
 from ctrl_realize.errors import DataError, DataWarning, FileFormatError, OptionError
 from ctrl_realize.io import read_frf
 
@@ -123,3 +125,18 @@ def test_every_measured_frequency_response_is_read(shared_data):
         turns = (np.angle(response.complex, deg=True) - phase) / 360
         # angle() and exp() round, and 2160 degrees cost three digits
         assert_allclose(turns, np.round(turns), atol=1e-13)
+
+
+def test_a_frequency_response_in_place_of_a_record_is_named(tmp_path, capsys):
+    file = tmp_path / "bench.csv"
+    file.write_text(written("f [Hz],magnitude,phase [deg]", F, abs(G), np.rad2deg(PHASE)))
+    told = r"holds a frequency response .*read_frf\('.*bench\.csv'\) reads it, and cr\.fit_frf"
+    with pytest.raises(OptionError, match=told):
+        cr.read_record(file)
+    with pytest.raises(DataError, match="fit_frf makes a model of a frequency response"):
+        cr.identify(read_frf(file))
+    assert main(["look", str(file)]) == 0
+    said = capsys.readouterr().out
+    assert "<MeasuredFRF 'bench': 5 points, 0.5...10 Hz>, a frequency response" in said
+    assert "cr.fit_frf(cr.read_frf(" in said
+    assert said.splitlines()[2].split()[-1] == "frequency"

@@ -15,6 +15,7 @@ from ..._checks import one_of, positive
 from ...data import Record
 from ...data.samples import COARSE, Samples
 from ...errors import DataError, OptionError, TimeAxisError
+from ..frf import parts_of_frf
 from ..read import read_table
 from ..tables import Table
 from ..text_options import TextOptions
@@ -86,9 +87,18 @@ class Reading(SimpleNamespace):
     def parts(self, signals: Table, taken: Sequence[int] | None) -> Parts:
         """Which column is what; `taken` are no signals, and None for those of a long table."""
         time, dt = (None, 1.0) if taken is None else (self.time, self.dt)
-        return choose_columns(
-            signals, time, self.input, self.output, dt, taken or (), self.reference, self.mode
-        )
+        try:
+            return choose_columns(
+                signals, time, self.input, self.output, dt, taken or (), self.reference, self.mode
+            )
+        except OptionError:
+            if not parts_of_frf(signals):
+                raise
+            raise OptionError(
+                f"{signals.path} holds a frequency response ({signals.listing()}); expected a "
+                f"record in time. In Python cr.read_frf({str(signals.path)!r}) reads it, and "
+                "cr.fit_frf of that makes a model"
+            ) from None
 
 
 def record_of(table: Table, how: Reading, name: str, taken: Sequence[int] = ()) -> Record:
