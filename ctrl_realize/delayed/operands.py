@@ -53,13 +53,9 @@ def form_of(system: Any) -> DelayForm:
         check_proper(system, "an interconnection")
         system = ct.ss(system)
     if isinstance(system, ct.StateSpace):
-        A, B, C, D = (np.asarray(M, np.float64) for M in _matrices(system))
+        A, B, C, D = (np.asarray(M, np.float64) for M in (system.A, system.B, system.C, system.D))
         return DelayForm(A, B, C, D)
     return forms.static(np.atleast_2d(np.asarray(system, dtype=np.float64)))
-
-
-def _matrices(system: ct.StateSpace) -> tuple[Any, ...]:
-    return system.A, system.B, system.C, system.D
 
 
 def check_proper(system: ct.TransferFunction, purpose: str) -> None:

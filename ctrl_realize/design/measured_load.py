@@ -157,10 +157,6 @@ def feedforward(plant: Any, disturbance: Any, *, dt: float | None = None) -> Fee
         lag=second.lag,
         delay=whole * step,
         uncovered=missing,
-        peak=_peak(second, missing),
+        # the response to a unit step of the load after the missing time
+        peak=float(abs(second.step(np.array([second.dead_time + missing]))[0])),
     )
-
-
-def _peak(load: ProcessModel, missing: float) -> float:
-    """Response to a unit step of the load after the missing time, in size."""
-    return float(abs(load.step(np.array([load.dead_time + missing]))[0]))

@@ -124,7 +124,7 @@ def write_identification(
     return write_report(
         path,
         title=f"Model of {record.name}" if record.name else "Identified model",
-        subtitle=_kind(system),
+        subtitle="model with dead time" if system.fit is None else system.fit._method,
         verdict=verdict_of(system, comparison=comparison),
         sketches=identification_sketches(system, record, frf=frf, comparison=comparison),
         tables=[
@@ -334,7 +334,3 @@ def write_report(
         controller=controller,
     )
     return write_page(path, page)
-
-
-def _kind(system: DelayedStateSpace) -> str:
-    return "model with dead time" if system.fit is None else system.fit._method

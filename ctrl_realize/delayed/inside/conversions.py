@@ -312,7 +312,7 @@ def _held(form: DelayForm, step: float, held: list[bool]) -> DelayForm:
     M = np.zeros((n + 2 * width, n + 2 * width))
     M[:n, :n], M[:n, n : n + width] = form.A * step, form.B * step
     M[n : n + width, n + width :] = np.eye(width)
-    E = _exponential(M)
+    E = np.asarray(expm(M), dtype=np.float64)
     A, whole_step, ramp = E[:n, :n], E[:n, n : n + width], E[:n, n + width :]
     B = whole_step.copy()
     D = form.D.copy()
@@ -320,10 +320,6 @@ def _held(form: DelayForm, step: float, held: list[bool]) -> DelayForm:
     B[:, m:] = whole_step[:, m:] - late + A @ late
     D[:, m:] = D[:, m:] + form.C @ late
     return DelayForm(A, B, form.C, D, form.delays)
-
-
-def _exponential(M: FloatArray) -> FloatArray:
-    return np.asarray(expm(M), dtype=np.float64)
 
 
 def _closed_again(form: DelayForm, inner: tuple[float, ...]) -> DelayForm:

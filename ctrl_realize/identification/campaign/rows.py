@@ -253,7 +253,7 @@ def _with_model(row: CampaignRow, system: DelayedStateSpace) -> CampaignRow:
         dead_time=_or_nan(fit.dead_time),
         interval=(float(low), float(high)),
         residual=_unit_residual(fit, row.amplitude),
-        gain=_gain(system),
+        gain=complex(system(1.0, warn_infinite=False)).real,  # infinite where it integrates
         gain_std=_or_nan(fit.gain_std_given_structure),
         total_delay=_or_nan(fit.total_delay),
         total_delay_interval=fit.total_delay_interval or (np.nan, np.nan),
@@ -273,11 +273,6 @@ def _unit_residual(fit: ModelFit, amplitude: float) -> float:
 
 def _or_nan(value: float | None) -> float:
     return float("nan") if value is None else float(value)
-
-
-def _gain(system: DelayedStateSpace) -> float:
-    # The gain of an integrating plant is infinite; no warning is given.
-    return complex(system(1.0, warn_infinite=False)).real
 
 
 def source_name(source: RecordSource, position: int) -> str:

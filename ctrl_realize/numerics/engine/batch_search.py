@@ -29,7 +29,6 @@ def fit_batch(
     starts: FloatArray,
     bounds: Bounds,
     *,
-    dead_time_fixed: bool = False,
     most_iterations: int = 30,
     tolerance: float = 1e-4,
 ) -> tuple[FloatArray, FloatArray]:
@@ -39,8 +38,6 @@ def fit_batch(
     ----------
     starts : ndarray, shape (B, 1 + n)
         Dead time in s and pole parameters.
-    dead_time_fixed : bool
-        Keep the first column as it is (profile likelihood).
     most_iterations : int
         Limit for all starts together.
     tolerance : float
@@ -52,8 +49,6 @@ def fit_batch(
     cost : ndarray, shape (B,)
     """
     x = np.clip(starts, bounds.low, bounds.high)
-    if dead_time_fixed:
-        x[:, 0] = starts[:, 0]
     state = compress(problem, structure, x)
     residual, jacobian, cost = state.residual, state.jacobian, state.cost
     damping = np.full(x.shape[0], 1e-2)
@@ -61,12 +56,9 @@ def fit_batch(
     active: IntArray = np.arange(x.shape[0])
     for turn in range(most_iterations):
         step, short = _damped_step(
-            x[active], residual[active], jacobian[active], damping[active], bounds, dead_time_fixed
+            x[active], residual[active], jacobian[active], damping[active], bounds
         )
-        trial = x[active] + step
-        trial[:, 1:] = np.clip(trial[:, 1:], bounds.low[1:], bounds.high[1:])
-        if not dead_time_fixed:
-            trial[:, 0] = np.clip(trial[:, 0], bounds.low[0], bounds.high[0])
+        trial = np.clip(x[active] + step, bounds.low, bounds.high)
         state = compress(problem, structure, trial)
         new = state.cost
         better = new < cost[active]
@@ -78,8 +70,7 @@ def fit_batch(
         damping[down] *= 8.0
         failures[up] = 0
         failures[down] += 1
-        late = turn >= _TURNS_FOR_ALL and not dead_time_fixed
-        hopeless = late & (cost[active] > _HOPELESS * cost.min())
+        hopeless = (turn >= _TURNS_FOR_ALL) & (cost[active] > _HOPELESS * cost.min())
         active = active[~(settled | hopeless | (failures[active] >= _MOST_FAILURES))]
         if not active.size:
             break
@@ -92,7 +83,6 @@ def _damped_step(
     jacobian: FloatArray,
     damping: FloatArray,
     bounds: Bounds,
-    dead_time_fixed: bool,
 ) -> tuple[FloatArray, BoolArray]:
     """Levenberg-Marquardt steps in the free directions, and which of them were not limited."""
     # The dead time is relative to its range, so that the steps do not depend on the unit of time.
@@ -102,8 +92,6 @@ def _damped_step(
     jacobian = np.clip(jacobian * unit, -_STEEPEST, _STEEPEST)
     downhill = np.einsum("bmp,bm->bp", jacobian, residual)
     free = ~((x <= bounds.low) & (downhill < 0) | (x >= bounds.high) & (downhill > 0))
-    if dead_time_fixed:
-        free[:, 0] = False
     normal = np.swapaxes(jacobian, 1, 2) @ jacobian
     normal = normal * (free[:, :, None] & free[:, None, :])
     diagonal = np.einsum("bii->bi", normal)

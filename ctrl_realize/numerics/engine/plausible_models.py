@@ -79,19 +79,14 @@ class PlausibleDraw:
         """`COUNT` equally likely models; the same for the same data."""
         rng = np.random.default_rng(COUNT)
         weights = np.array(list(self.evidence.values()))
-        counts = _counts(weights / weights.sum(), COUNT)
+        ends = np.round(np.cumsum(weights / weights.sum()) * COUNT - 1e-9)
+        counts = np.diff(ends, prepend=0.0)  # of each, within one of its share
         models: list[PlausibleModel] = []
         with one_blas_thread():
             for structure, count in zip(self.evidence, counts, strict=True):
                 if count:
                     models += _about(self.fits, self.best[structure], int(count), rng)
         return tuple(models)
-
-
-def _counts(shares: FloatArray, count: int) -> FloatArray:
-    """Draws of each, within one of its share."""
-    ends = np.round(np.cumsum(shares) * count - 1e-9)
-    return np.diff(ends, prepend=0.0)
 
 
 def _about(

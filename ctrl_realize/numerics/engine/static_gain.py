@@ -18,7 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import ndtr, ndtri
 
-from ..arrays import ComplexArray, FloatArray
+from ..arrays import BoolArray, ComplexArray, FloatArray
 from ..constants import SMALLEST, Z_95
 from .eliminate import eliminate
 from .modal import partial_fractions, responses
@@ -145,13 +145,7 @@ class LocalErrors:
 
     def covariance(self) -> FloatArray:
         """Covariance (p, p) of dead time, pole parameters, numerator, for noise of variance 1."""
-        columns = np.concatenate([self.slopes, self.own], axis=1)
-        size = np.linalg.norm(columns, axis=0)
-        size[size == 0] = 1.0
-        _, singular, turned = np.linalg.svd(columns / size, full_matrices=False)
-        singular = np.maximum(singular, max(_NOTHING * singular[0], SMALLEST))
-        count = self.slopes.shape[1]
-        root = (turned / singular[:, None])[:, :count] / size[:count]
+        root = self._root(np.ones(self.slopes.shape[1], dtype=np.bool_))
         if self.tangent is not None:
             root = root @ self.tangent.T
         return np.asarray(root.T @ root)
@@ -167,13 +161,18 @@ class LocalErrors:
             gradient = gradient @ self.tangent
             gradient[np.abs(gradient) < _ROUNDED * size] = 0.0
         seen = np.any(gradient != 0, axis=0)
+        along = self._root(seen) @ gradient[:, seen].T
+        return np.asarray(np.sqrt(variance * np.sum(along**2, axis=0)))
+
+    def _root(self, seen: BoolArray) -> FloatArray:
+        """Root R (r, s) of the covariance ``R^T R`` of some of the slopes' parameters."""
         columns = np.concatenate([self.slopes[:, seen], self.own], axis=1)
         size = np.linalg.norm(columns, axis=0)
         size[size == 0] = 1.0
         _, singular, turned = np.linalg.svd(columns / size, full_matrices=False)
-        along = turned[:, : seen.sum()] @ (gradient[:, seen] / size[: seen.sum()]).T
-        along /= np.maximum(singular, max(_NOTHING * singular[0], SMALLEST))[:, None]
-        return np.asarray(np.sqrt(variance * np.sum(along**2, axis=0)))
+        singular = np.maximum(singular, max(_NOTHING * singular[0], SMALLEST))
+        count = int(seen.sum())
+        return np.asarray((turned / singular[:, None])[:, :count] / size[:count])
 
 
 def local_errors(

@@ -21,7 +21,7 @@ from ..engine.responses import StepSequence
 from ..engine.structures import Scales
 from ..engine.window import Window
 from ..signals.baseline import noise_about_a_motion, relaxation
-from ..signals.bins import Bins, response_bins
+from ..signals.bins import response_bins
 from ..signals.filters import moving_mean
 from ..signals.load_step import LoadStep
 from ..signals.noise import (
@@ -264,9 +264,12 @@ def window(data: StepData, stop: int, known: KnownFactor) -> Window:
     if data.relaxing:
         on_bins, own = Segments.single(drive.first, means, drive), Segments.single(times, columns)
         columns, means = columns[:, :0], means[:, :0]
+    weights = bins.width.astype(np.float64)  # inverse variances, over that of a single sample
+    if data.coarse:  # means of samples without dither keep the rounding error
+        weights = weights / (1 + weights) * 2
     problem = Problem(
         bins.average(data.output[:stop]),
-        np.sqrt(_weights(data, bins)),
+        np.sqrt(weights),
         drive,
         means,
         known,
@@ -326,13 +329,6 @@ def own_regressors(data: StepData, poles: ComplexArray) -> FloatArray:
     if not data.relaxing:
         return fixed
     return np.asarray(local_columns(Segments.single(data.clock, fixed), poles[None])[0])
-
-
-def _weights(data: StepData, bins: Bins) -> FloatArray:
-    """Inverse variance of every mean, relative to that of a single sample."""
-    count = bins.width.astype(np.float64)
-    # Means of samples without dither keep the rounding error, however many there are.
-    return count / (1 + count) * 2 if data.coarse else count
 
 
 def _at(index: IntArray, dt: float) -> FloatArray:

@@ -74,31 +74,22 @@ def least_squares(equations: NormalEquations) -> LeastSquares:
 
 @dataclass(frozen=True, eq=False)
 class ArxFit:
-    """ARX model ``y[k] + sum A_i y[k-i] = sum B_j u[k-delay-j] + e``.
+    """ARX model ``y[k] + sum A_i y[k-i] = sum B_j u[k-j] + e``.
 
-    ``a`` (na, p, p) contains A_1 ..., ``b`` (nb, p, m) contains B_0 ..., `a_std` and `b_std` their
-    standard deviations, `noise` (p, p) the covariance of e, `rows` the number of equations and
-    `solution` the regression, with the lags of y before those of u.
+    ``a`` (na, p, p) contains A_1 ..., ``b`` (nb, p, m) contains B_0 ..., `noise` (p, p) the
+    covariance of e, `rows` the number of equations and `solution` the regression, with the lags of
+    y before those of u.
     """
 
     a: FloatArray
     b: FloatArray
-    a_std: FloatArray
-    b_std: FloatArray
-    delay: int
     noise: FloatArray
     rows: int
     solution: LeastSquares
 
 
 def arx_equations(
-    inputs: FloatArray,
-    outputs: FloatArray,
-    na: int,
-    nb: int,
-    delay: int = 0,
-    *,
-    offset: bool = True,
+    inputs: FloatArray, outputs: FloatArray, na: int, nb: int, *, offset: bool = True
 ) -> NormalEquations:
     """Sum up the regression of an ARX model; sums of several records can be added.
 
@@ -106,33 +97,29 @@ def arx_equations(
     ----------
     inputs, outputs : ndarray, shapes (m, N), (p, N)
         NaN removes the rows that contain it.
-    na, nb, delay : int
-        Lags 1 ... na of y and delay ... delay + nb - 1 of u.
+    na, nb : int
+        Lags 1 ... na of y and 0 ... nb - 1 of u.
     offset : bool, default True
         Include an unknown constant in every output.
     """
-    lags = max(na + 1, delay + nb)
+    lags = max(na + 1, nb)
     both = np.concatenate([outputs, inputs])
     equations = normal_equations(both, outputs, lags, offset=offset)
     p, m = outputs.shape[0], inputs.shape[0]
     past = [a * lags + i for i in range(1, na + 1) for a in range(p)]
-    drive = [(p + j) * lags + delay + i for i in range(nb) for j in range(m)]
+    drive = [(p + j) * lags + i for i in range(nb) for j in range(m)]
     return equations.take(past + drive)
 
 
-def solve_arx(equations: NormalEquations, na: int, nb: int, delay: int = 0) -> ArxFit:
+def solve_arx(equations: NormalEquations, na: int, nb: int) -> ArxFit:
     """Solve the regression of `arx_equations`."""
     solution = least_squares(equations)
     p = equations.power.shape[0]
     m = (equations.gram.shape[0] - na * p) // nb
-    theta, std = solution.coefficients, solution.std
-    cut = na * p
+    theta, cut = solution.coefficients, na * p
     return ArxFit(
         a=-theta[:cut].reshape(na, p, p).transpose(0, 2, 1),
         b=theta[cut:].reshape(nb, m, p).transpose(0, 2, 1),
-        a_std=std[:cut].reshape(na, p, p).transpose(0, 2, 1),
-        b_std=std[cut:].reshape(nb, m, p).transpose(0, 2, 1),
-        delay=delay,
         noise=solution.noise,
         rows=equations.rows,
         solution=solution,
@@ -143,20 +130,18 @@ def arx_markov(fit: ArxFit, count: int) -> FloatArray:
     """Compute the pulse response A^-1 B of an ARX model, shape (p, m, count)."""
     nb, p, m = fit.b.shape
     drive = np.zeros((count, p, m))
-    last = min(nb, count - fit.delay)
-    if last > 0:
-        drive[fit.delay : fit.delay + last] = fit.b[:last]
+    drive[:nb] = fit.b[:count]
     return _divide(fit.a, drive).transpose(1, 2, 0)
 
 
 def arx_state_space(fit: ArxFit) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
     """Write A^-1 B in observer form: q p states for q lags, matrices A, B, C, D."""
     nb, p, m = fit.b.shape
-    count = max(fit.a.shape[0], fit.delay + nb - 1)
+    count = max(fit.a.shape[0], nb - 1)
     a = np.zeros((count, p, p))
     a[: fit.a.shape[0]] = fit.a
     b = np.zeros((count + 1, p, m))
-    b[fit.delay : fit.delay + nb] = fit.b
+    b[:nb] = fit.b
     # Observer form: x1+ = -a1 x1 + x2 + (b1 - a1 b0) u, and so on; y = x1 + b0 u.
     A = np.eye(count * p, k=p)
     A[:, :p] -= a.reshape(count * p, p)
@@ -183,9 +168,8 @@ def arx_markov_std(fit: ArxFit, count: int) -> FloatArray:
         source = np.zeros((count, W.shape[0]))
         for lag in range(1, min(na, count - 1) + 1):
             source[lag:, (lag - 1) * p : lag * p] = H[: count - lag, :, j]
-        for i in range(nb):
-            if fit.delay + i < count:
-                source[fit.delay + i, na * p + i * m + j] = 1.0
+        for i in range(min(nb, count)):
+            source[i, na * p + i * m + j] = 1.0
         weighted = source @ W
         points = 2 * count
         transform = np.fft.rfft(weighted, n=points, axis=0)

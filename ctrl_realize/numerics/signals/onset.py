@@ -33,10 +33,9 @@ class CorrelationOnset:
     """Cross-correlation of the prewhitened input with the output, filtered alike.
 
     ``onset`` is the first lag where ``|rho| > bound`` (-1 if there is none) and `peak` the lag of
-    the largest; `rho` and `bound` have shape (lags + 1,).
+    the largest; `bound` has shape (lags + 1,).
     """
 
-    rho: FloatArray
     bound: FloatArray
     onset: int
     peak: int
@@ -76,7 +75,7 @@ def correlation_onset(
     bound += [left[1 : lags + 1 - k] @ np.abs(rho[k + 1 :]) for k in range(lags + 1)]
     seen = np.flatnonzero(np.abs(rho) > bound)
     onset = int(seen[0]) if seen.size else -1
-    return CorrelationOnset(rho, bound, onset, int(np.abs(rho).argmax()))
+    return CorrelationOnset(bound, onset, int(np.abs(rho).argmax()))
 
 
 def phase_slope(omega: FloatArray, phase: FloatArray, share: float) -> tuple[float, float]:

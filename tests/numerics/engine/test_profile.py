@@ -12,7 +12,7 @@ from ctrl_realize.numerics.engine.descend import descend
 from ctrl_realize.numerics.engine.eliminate import evaluate
 from ctrl_realize.numerics.engine.newton import settle, solve_level
 from ctrl_realize.numerics.engine.poles import parameters_from_poles
-from ctrl_realize.numerics.engine.problem import KnownFactor, Structure
+from ctrl_realize.numerics.engine.problem import Bounds, KnownFactor, Structure
 from ctrl_realize.numerics.engine.profile import dead_time_error, dead_time_profile, profile_limits
 from ctrl_realize.numerics.engine.structures import Candidate, parameter_bounds, search
 from ctrl_realize.numerics.output_error.step_data import step_data, step_scales, window
@@ -177,6 +177,6 @@ def test_no_random_start_beats_the_model_at_a_dead_time_far_from_the_best(dead_t
     best = search(problem, [structure], scales)[structure]
     box = parameter_bounds(structure, scales)
     starts = np.random.default_rng(9).uniform(box.low, box.high, size=(30, 4))
-    starts[:, 0] = dead_time
-    cost = fit_batch(problem, structure, starts, box, dead_time_fixed=True, most_iterations=60)[1]
+    held = Bounds(*(np.append(dead_time, ends[1:]) for ends in (box.low, box.high)))
+    cost = fit_batch(problem, structure, starts, held, most_iterations=60)[1]
     assert at_dead_time(problem, best, scales, dead_time).cost <= cost.min()
