@@ -20,6 +20,8 @@ from ..numerics.engine.compared_fits import settled
 from ..numerics.engine.problem import Structure
 from ..numerics.engine.profile import Points, dead_time_error, profile_points
 from ..numerics.engine.structures import Candidate
+from ..numerics.output_error.interval import MOST_ROUNDS
+from ..numerics.output_error.profiles import LOWER
 from ..numerics.rational.frf_data import FRFData, dead_time_interval
 from ..numerics.rational.search import (
     information_criteria,
@@ -32,9 +34,6 @@ from .frf_fit import FRFStructure
 _NEAR_BIC = 8.0
 """Difference to the best BIC below which a structure widens the interval; beyond, its weight is
 below 2 %."""
-_LOWER, _MOST_ROUNDS = 0.01, 6
-"""Variances by which a profile must lead below a minimum to be followed, and how often; as in
-`output_error.profiles`."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,7 +62,7 @@ def compared_fits(
 ) -> ComparedFits:
     """Compare structures, and again where the profile of one leads below its minimum."""
     points: dict[Structure, Points] = {}
-    for _ in range(_MOST_ROUNDS):
+    for _ in range(MOST_ROUNDS):
         rows, scales = _structures(data, fits, unit, noise_known)
         near = [key_of(row) for row in rows if row.bic - rows[0].bic < _NEAR_BIC]
         lower = {}
@@ -72,7 +71,7 @@ def compared_fits(
             if key not in points:
                 points[key] = profile_points(data.problem, fits[key], variance, data.scales)
             best = min(points[key].values(), key=lambda point: point.cost)
-            if fits[key].cost - best.cost > _LOWER * variance:
+            if fits[key].cost - best.cost > LOWER * variance:
                 lower[key] = settled(data.problem, best, data.scales)
         if not lower:
             break

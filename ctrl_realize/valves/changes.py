@@ -8,7 +8,7 @@ import numpy as np
 
 from ..data import Record
 from ..numerics.arrays import FloatArray
-from ..numerics.signals.edges import Edge, despike, difference_noise
+from ..numerics.signals.edges import Edge, despike, difference_noise, median_jumps
 from ..numerics.signals.noise import mad_sigma, quantisation_step
 from ..numerics.valve_test.play import slope_of
 from .part import PartKind, TestPart
@@ -41,7 +41,7 @@ def changes_of(record: Record, span: float) -> list[TestPart]:
     ramps = _noisy_ramps(record, max(noise, rounding), span) if max(noise, rounding) else []
     half = 4 if noise else 1
     width = 2 * half + 1
-    jump = _jumps(clean, width)
+    jump = median_jumps(clean, width)
     # A median of w samples has 1.25 / sqrt(w) of the deviation of one; two of them differ here.
     threshold = max(5 * 1.25 * noise * np.sqrt(2 / width), 1e-6 * float(np.ptp(command)))
     residue = noise * (1.25 / np.sqrt(2 * spikes + 1) if spikes else 1.0)
@@ -135,10 +135,3 @@ def _noise_of(command: FloatArray) -> float:
     third = np.diff(command, 3)
     smooth = mad_sigma(third) / np.sqrt(20) if third.size else 0.0
     return min(difference_noise(command), smooth)
-
-
-def _jumps(values: FloatArray, width: int) -> FloatArray:
-    """Median of the `width` samples from each sample on, minus that of those before it."""
-    padded = np.pad(values, width, mode="edge")
-    medians = np.median(np.lib.stride_tricks.sliding_window_view(padded, width), axis=1)
-    return np.asarray(medians[width : width + values.size] - medians[: values.size])

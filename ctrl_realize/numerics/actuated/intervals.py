@@ -19,7 +19,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..arrays import FloatArray
-from ..constants import CHI2_95
+from ..constants import CHI2_95, Z_95
 from ..engine.poles import lag_sum, poles_from_parameters
 from ..engine.profile import bracket_ends, profile_limits, root_of
 from ..engine.static_gain import LocalErrors, StaticGain
@@ -27,7 +27,6 @@ from ..families.physical import ProcessParameter, process_parameters
 from .family import Member
 from .search import cost_of
 
-_EDGE = float(np.sqrt(CHI2_95))
 _MOST_WIDENED, _MOST_NARROWED = 8, 6  # steps to an end
 _CLOSE = 0.04  # standard errors to which an end is sought
 _CLIFF = 4.0  # times the excess at an end: it counts for no more in the search
@@ -124,12 +123,12 @@ def _interval(member: Member, index: int, error: float, variance: float) -> tupl
         return min(max((found.cost - member.cost) / variance, 0.0), _CLIFF * CHI2_95)
 
     for side, bound in zip((-1.0, 1.0), family.bounds, strict=True):
-        at, step = float(member.x[index]), float(np.clip(_EDGE * error, shortest, longest))
+        at, step = float(member.x[index]), float(np.clip(Z_95 * error, shortest, longest))
         for _ in range(_MOST_WIDENED):
             if side * (bound[index] - at) <= 0:
                 break
             at = float(side * min(side * (at + side * step), side * bound[index]))
-            root = np.sqrt(excess_at(at)) / _EDGE
+            root = np.sqrt(excess_at(at)) / Z_95
             if root > 1:
                 break
             # As a parabola would have it, or twice as far.
@@ -137,7 +136,7 @@ def _interval(member: Member, index: int, error: float, variance: float) -> tupl
     for _ in range(_MOST_NARROWED):
         known = {at: excess(one) for at, one in points.items()}
         for inside, outside in bracket_ends(known):
-            below, above = (root_of(known[at]) - _EDGE for at in (inside, outside))
+            below, above = (root_of(known[at]) - Z_95 for at in (inside, outside))
             if min(-below, above) > _CLOSE:
                 # Regula falsi in the root, which is linear for a quadratic misfit.
                 share = np.clip(below / (below - above), 0.15, 0.85)

@@ -42,7 +42,7 @@ REACH = 3 * VERY_STRONG
 searches ended up to 21 above them; what is not ruled out is within 10, charges aside."""
 _SLOWEST, _FASTEST, _RATES = 0.01, 10.0, 8
 """Poles that are tried, over length and rise. Ablation: pole tried anywhere."""
-_CLOSE, _OTHERS = 1.0, 2
+CLOSE, _OTHERS = 1.0, 2
 """Variances by which ends differ that are both followed down, and how many others: time."""
 _STARTS, _PROMISING = 3, 10.0
 """Starts that are followed beside the best end of a search, and variances that they may be above
@@ -170,7 +170,7 @@ def _near_minimum(
         starts = [old.parameters, *more]
     ends, costs = descend(problem, structure, np.array(starts), bounds, scales.dt)
     order = np.argsort(costs)
-    close = order[costs[order] <= costs[order[0]] * (1 + _CLOSE / problem.data.size)]
+    close = order[costs[order] <= costs[order[0]] * (1 + CLOSE / problem.data.size)]
     others = apart(ends[close])[:_OTHERS]
     best = order[0]
     return Candidate(structure, ends[best], float(costs[best]), others, searched=False)
@@ -188,7 +188,7 @@ def at_dead_time(
     starts = np.array([candidate.parameters, *pattern_starts(structure, scales)])
     starts[:, 0] = dead_time
     fixed, costs = descend(problem, structure, starts, bounds, scales.dt, dead_time_fixed=True)
-    near = fixed[costs <= costs.min() * (1 + _CLOSE / problem.data.size)]
+    near = fixed[costs <= costs.min() * (1 + CLOSE / problem.data.size)]
     fits = [
         settle(problem, structure, start, bounds, scales.dt, dead_time_fixed=True) for start in near
     ]

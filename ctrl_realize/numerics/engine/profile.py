@@ -21,14 +21,13 @@ from typing import TypeAlias
 import numpy as np
 
 from ..arrays import FloatArray
-from ..constants import CHI2_95
+from ..constants import CHI2_95, Z_95
 from .descend import descend
 from .eliminate import evaluate
 from .newton import solve_level
 from .problem import Bounds, Problem
 from .structures import Candidate, Scales, parameter_bounds
 
-_EDGE = float(np.sqrt(CHI2_95))
 _SOLVED = 1e-6  # standard errors, and samples, to which an end is solved
 _MOST_TRIES = 12  # of regula falsi, each of which halves the bracket or does better
 
@@ -39,6 +38,11 @@ _LATE = 0.2  # samples before a jump is over; a lag of a twentieth of that fits 
 _INSIDE = np.array([-0.5, 0.02, 0.4, 1 - _LATE, 1.2])  # of the sample in which the optimum lies
 JUMP = 4.0  # pole, in 1/samples, whose response is over within a sample
 _NOTHING = 1e-9  # part of a sensitivity that is rounding
+_NO_POINT_NEAR = 50.0
+"""Variances of a point beyond an end above which none was laid near it: those near an end of the
+interval that the curvature at the minimum tells reach three half intervals, 35 variances. Beside a
+zero that takes the place of dead time there is no such curvature, and the profile is no parabola:
+ends between its points were off by a factor of 5."""
 _SWEEPS, _HIGH, _SAME = 3, 30.0, 1e-3
 """Rounds in which points start from those beside them: in single starts from the optimum, profiles
 of structures with zeros were up to 6 variances too high near their ends. Points that are `_HIGH`
@@ -81,7 +85,7 @@ def profile_grid(
     problem: Problem, candidate: Candidate, variance: float, scales: Scales
 ) -> FloatArray:
     """Dead times (G,) that bracket the ends of the interval of a structure."""
-    half = _EDGE * dead_time_error(problem, candidate, variance)
+    half = Z_95 * dead_time_error(problem, candidate, variance)
     bounds = parameter_bounds(candidate.structure, scales)
     low, high = float(bounds.low[0]), float(bounds.high[0])
     grid = np.linspace(low, high, _FAR)
@@ -211,7 +215,7 @@ def _end(
     least, variance = level
     inside, outside = ends
     structure, goal = inside.structure, least + CHI2_95 * variance
-    below, above = (root_of((end.cost - least) / variance) - _EDGE for end in ends)
+    below, above = (root_of((end.cost - least) / variance) - Z_95 for end in ends)
     point = inside if -below < above else outside
     found: list[Candidate] = []
     side = 0
@@ -230,7 +234,7 @@ def _end(
         best = int(np.argmin(cost))
         point = Candidate(structure, x[best], float(cost[best]))
         found.append(point)
-        root = root_of((point.cost - least) / variance) - _EDGE
+        root = root_of((point.cost - least) / variance) - Z_95
         if root < 0:
             above = above / 2 if side < 0 else above
             inside, below, side = point, root, -1
@@ -264,6 +268,12 @@ def bracket_ends(excess: Mapping[float, float]) -> list[tuple[float, float]]:
     return found + (
         [(dead_times[last], dead_times[last + 1])] if last < len(dead_times) - 1 else []
     )
+
+
+def without_points(excess: Mapping[float, float]) -> tuple[bool, bool]:
+    """Whether no point of a profile lies near its lower, and its upper end."""
+    far = {at > near: excess[at] > _NO_POINT_NEAR for near, at in bracket_ends(excess)}
+    return far.get(False, False), far.get(True, False)
 
 
 def root_of(excess: float) -> float:

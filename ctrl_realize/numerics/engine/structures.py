@@ -35,6 +35,7 @@ NEEDLESS_ZERO, NEEDLESS_POLE = 6.0, 4.0
 ones lower the sum of squares by so many variances in one record of 70, and of 22. Ablation:
 needless parameters."""
 
+SLOWEST_PAIR, LEAST_DAMPING = 1e-2, 0.005  # of a pair: frequency, over the length; damping
 SLOWEST = 1e-4
 """Smallest pole, over the length of the record: stands for an integrator."""
 _DAMPING = 20.0
@@ -196,7 +197,7 @@ def parameter_bounds(structure: Structure, scales: Scales) -> Bounds:
             total = np.log(2 * _DAMPING) + fast
             size = (total + slow) / 2
             damping = (total - slow) / 2 - np.log(2.0)
-        low += [np.log(1e-2 / scales.length), np.log(0.005)]
+        low += [np.log(SLOWEST_PAIR / scales.length), np.log(LEAST_DAMPING)]
         high += [size, damping]
     return Bounds(np.array(low), np.array(high))
 

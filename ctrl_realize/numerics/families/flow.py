@@ -20,6 +20,7 @@ import numpy as np
 
 from ..arrays import ComplexArray, FloatArray
 from ..constants import VERY_STRONG
+from ..engine.compared_fits import REACH
 from ..engine.eliminate import eliminate
 from ..engine.modal import moved_amplitudes, partial_fractions
 from ..engine.problem import Bounds, KnownFactor, Problem
@@ -34,7 +35,6 @@ _CHARGE = 8.0
 flow."""
 _MINOR = 0.5  # of the lag behind it: a flow that spreads by less is no different from a second lag
 _FOLLOWED = 3  # starts that are improved: time
-_REACH = 3 * VERY_STRONG  # excess up to which a flow is followed to its minimum
 _SPREADS = (0.1, 1.2)
 """Standard deviations over means: narrower is no different from many lags, wider from few."""
 _DELAYS, _LAGS = (0.0, 0.4, 0.7, 0.95), (0.05, 0.3, 0.6, 0.9)
@@ -225,7 +225,7 @@ def fit_flows(
             break
         promising = starts[np.argsort(eliminate(problem, family, starts).cost)[:_FOLLOWED]]
         charge = (family.bounds.low.size + 1) * penalty + _CHARGE
-        fit = lowest(problem, family, promising, scales.dt, (level + _REACH - charge) * variance)
+        fit = lowest(problem, family, promising, scales.dt, (level + REACH - charge) * variance)
         criterion = fit.cost / variance + charge
         flows.append(
             DispersedFlow(fit, *family.times(fit.parameters), criterion, criterion - level)

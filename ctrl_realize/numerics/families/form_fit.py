@@ -22,12 +22,11 @@ from ..arrays import FloatArray
 from ..constants import SMALLEST
 from ..engine.problem import Bounds, Problem
 from ..engine.static_gain import INTEGRATOR, LocalErrors
-from ..engine.structures import FASTEST, SLOWEST, Candidate, Scales
+from ..engine.structures import FASTEST, LEAST_DAMPING, SLOWEST, Candidate, Scales
 from .physical import ProcessParameter
 from .process_form import ProcessForm
 from .shaped import LagFamily, Mapped, lowest, paired
 
-_LEAST_DAMPING = 0.005  # as in `parameter_bounds`
 _AT_BOUND = 1e-4  # part of a parameter by which it may be away from a bound that it is at
 
 
@@ -133,7 +132,7 @@ def _limits(form: ProcessForm, scales: Scales) -> dict[str, tuple[float, float]]
     wide = {
         "gain": (-np.inf, np.inf),
         "dead_time": (scales.earliest, scales.latest) if form.dead_time else (0.0, 0.0),
-        "pair_damping_1": (_LEAST_DAMPING, 1.0),
+        "pair_damping_1": (LEAST_DAMPING, 1.0),
         "lead_1": (-lead, lead),
     }
     limits = {}

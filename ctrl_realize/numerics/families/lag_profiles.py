@@ -30,7 +30,7 @@ import numpy as np
 from scipy.optimize import brentq
 
 from ..arrays import FloatArray
-from ..constants import CHI2_95, Z_95
+from ..constants import Z_95
 from ..engine.problem import Bounds, Problem
 from ..engine.profile import root_of
 from ..engine.structures import Candidate, Scales
@@ -42,7 +42,6 @@ from .shaped import lowest
 Excess: TypeAlias = Callable[[FloatArray, float], tuple[FloatArray, float]]
 """From a start and the logarithm of a lag to the best other parameters, and the root of the excess
 over that at an end."""
-_EDGE = float(np.sqrt(CHI2_95))
 _STEP, _WIDER = 0.2, 2.0  # of a search for an end: largest first step in the logarithm, its growth
 _LONGER, _SHORTER = 2.0, 0.75
 """Lag that is ruled out over the longest along profiles of the dead time: with other dead times it
@@ -84,7 +83,7 @@ def with_profiled_lags(
     def excess(place: int, start: FloatArray, log_lag: float) -> tuple[FloatArray, float]:
         held = _ordered(family, order, place, log_lag)
         found = lowest(problem, held, start[None], scales.dt)
-        return found.parameters, root_of((found.cost - best.cost) / variance) - _EDGE
+        return found.parameters, root_of((found.cost - best.cost) / variance) - Z_95
 
     profiled = []
     for p in parameters:
@@ -162,7 +161,7 @@ def _end(at: Excess, x: FloatArray, inside: float, last: float, step: float) -> 
     nothing = 0.0 if step < 0 else np.inf
     if step < 0 and at(x, last)[1] <= 0:
         return nothing
-    known = {inside: -_EDGE}
+    known = {inside: -Z_95}
     while True:
         outside = max(inside + step, last) if step < 0 else min(inside + step, last)
         there, known[outside] = at(x, outside)

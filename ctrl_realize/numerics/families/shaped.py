@@ -27,6 +27,7 @@ import numpy as np
 
 from ..arrays import ComplexArray, FloatArray
 from ..constants import SMALLEST
+from ..engine.compared_fits import CLOSE
 from ..engine.descend import descend
 from ..engine.local_terms import solve_upper
 from ..engine.modal import moved_amplitudes, partial_fractions
@@ -35,8 +36,7 @@ from ..engine.poles import poles_from_parameters
 from ..engine.problem import Evaluation, Family, Problem
 from ..engine.structures import Candidate, apart
 
-_CLOSE, _OTHERS = 1.0, 1
-"""Variances by which ends differ that are both followed to their minimum, and how many others."""
+_OTHERS = 1  # ends beside the best that are followed to their minimum, if they are as close
 
 
 @dataclass(frozen=True, eq=False)
@@ -236,7 +236,7 @@ def lowest(
     best, least = ends[order[0]], float(costs[order[0]])
     if least > enough:
         return Candidate(family, best, least)
-    near = ends[order[costs[order] <= least * (1 + _CLOSE / problem.data.size)]]
+    near = ends[order[costs[order] <= least * (1 + CLOSE / problem.data.size)]]
     followed = (best, *apart(near)[:_OTHERS])
     fits = [settle(problem, family, end, family.bounds, dt) for end in followed]
     return Candidate(family, *min(fits, key=lambda fit: fit[1]))

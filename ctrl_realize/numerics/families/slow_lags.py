@@ -22,10 +22,9 @@ from ..constants import CHI2_95
 from ..engine.eliminate import eliminate, evaluate
 from ..engine.problem import Bounds, Evaluation, Family, Problem
 from ..engine.static_gain import local_errors
-from ..engine.structures import SLOWEST, Candidate, Scales
+from ..engine.structures import LEAST_DAMPING, SLOWEST, SLOWEST_PAIR, Candidate, Scales
 from .shaped import lowest, paired
 
-_SLOWEST_PAIR, _LEAST_DAMPING = 1e-2, 0.005  # as in `parameter_bounds`
 _APART = 0.03  # in logarithm: poles that are nearly equal have no derivatives by differences
 
 
@@ -112,8 +111,8 @@ def _lowest(
     """Best model with so many pairs that oscillate; missing lags start as the fastest."""
     structure, most = like.structure, float(-np.log(fastest))
     real = structure.order - 2 * pairs
-    slow, swing = np.log(np.array([SLOWEST, _SLOWEST_PAIR]) / scales.length)
-    low = [scales.earliest, *[slow] * real, *[swing, np.log(_LEAST_DAMPING)] * pairs]
+    slow, swing = np.log(np.array([SLOWEST, SLOWEST_PAIR]) / scales.length)
+    low = [scales.earliest, *[slow] * real, *[swing, np.log(LEAST_DAMPING)] * pairs]
     high = [scales.latest, *[most] * real, *[most, 0.0] * pairs]
     tried = []
     for one in starts:

@@ -60,7 +60,7 @@ _UNSEEN = 3.0
 motion. Diffusion behind lags and parallel paths mostly need 1 to 3. Ablation: open beginning behind
 a zero."""
 
-_MOST_ROUNDS = 6
+MOST_ROUNDS = 6
 """In which profiles are laid anew where they lead below a minimum."""
 
 
@@ -172,7 +172,7 @@ def _compared(
 ) -> tuple[WindowFit, Choice, _Kept]:
     """Choose, and lay the profiles of what is not ruled out: again where these lead lower."""
     points: dict[Structure, Points] = {}
-    for _ in range(_MOST_ROUNDS):
+    for _ in range(MOST_ROUNDS):
         choice = choose_model(fits, equal_lags, flows)
         values = charged(fits.criterion, fits.penalty)
         level = _charged_level(fits, choice)

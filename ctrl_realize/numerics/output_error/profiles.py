@@ -21,26 +21,21 @@ from ..engine.compared_fits import settled
 from ..engine.problem import Structure
 from ..engine.profile import (
     Points,
-    bracket_ends,
     dead_time_profile,
     profile_curve,
     profile_limits,
     profile_points,
     with_ends,
+    without_points,
 )
 from ..engine.structures import Candidate
 from ..engine.window_fit import WindowFit
 
-_LOWER = 0.01
+LOWER = 0.01
 """Variances by which a profile must lead below a minimum to be followed.
 
 Ablation: profiles followed below a minimum."""
 _ROUGHLY = 0.05  # of an interval, by which ends between the points of a profile may be wrong
-_NO_POINT_NEAR = 50.0
-"""Variances of a point beyond an end above which none was laid near it: those near an end of the
-interval that the curvature at the minimum tells reach three half intervals, 35 variances. Beside a
-zero that takes the place of dead time there is no such curvature, and the profile is no parabola:
-ends between its points were off by a factor of 5."""
 
 Profile: TypeAlias = tuple[FloatArray, FloatArray]
 """Dead times, and the misfit at each; see `dead_time_profile`."""
@@ -75,7 +70,7 @@ def solved_profiles(
     found = dict(points)
     for s, (first, last) in limits.items():
         margin = _ROUGHLY * (last - first)
-        lower, upper = _without_points(profiles[s])
+        lower, upper = without_points(dict(zip(*profiles[s], strict=True)))
         ends = (
             s == chosen or lower or first - margin <= low,
             s == chosen or upper or last + margin >= high,
@@ -83,13 +78,6 @@ def solved_profiles(
         if any(ends):
             found[s] = with_ends(fits.problem, points[s], *setting, ends)
     return found
-
-
-def _without_points(profile: Profile) -> tuple[bool, bool]:
-    """Whether no point of a profile lies near its lower, and its upper end."""
-    excess = dict(zip(*profile, strict=True))
-    far = {at > near: excess[at] > _NO_POINT_NEAR for near, at in bracket_ends(excess)}
-    return far.get(False, False), far.get(True, False)
 
 
 def curves(fits: WindowFit, points: dict[Structure, Points]) -> dict[Structure, Profile]:
@@ -103,6 +91,6 @@ def lower_minima(fits: WindowFit, points: dict[Structure, Points]) -> dict[Struc
     found = {}
     for s, own in points.items():
         best = min(own.values(), key=lambda point: point.cost)
-        if fits.candidates[s].cost - best.cost > _LOWER * fits.variance:
+        if fits.candidates[s].cost - best.cost > LOWER * fits.variance:
             found[s] = settled(fits.problem, best, fits.scales)
     return found

@@ -29,14 +29,11 @@ from ..engine.eliminate import evaluate
 from ..engine.modal import partial_fractions
 from ..engine.poles import poles_from_parameters
 from ..engine.problem import Bounds, Evaluation, KnownFactor, Problem, Structure
-from ..engine.profile import Points, bracket_ends, profile_curve, profile_limits, with_ends
+from ..engine.profile import Points, profile_curve, profile_limits, with_ends, without_points
 from ..engine.structures import Candidate, Scales, parameter_bounds
 from ..signals.sines import Sines, stacked_parts
 
 _FIRST_ITERATIONS = 10  # after which the starts are compared, and the best ones go on
-_NO_POINT_NEAR = 50.0
-"""Variances of a point beyond an end above which none was laid near it; see
-`output_error.profiles`."""
 _BEYOND, _SHARPEST, _DULLEST = 100.0, 1e-4, 1e3
 """Of poles of a frequency response: times beyond the band, and damping of a pair. A pole farther
 away turns the phase by 0.6 degrees at most."""
@@ -145,11 +142,7 @@ def dead_time_interval(
     """
     least = min(point.cost for point in points.values())
     excess = {at: (point.cost - least) / variance for at, point in points.items()}
-    wanted = {
-        outside > inside: solved or excess[outside] > _NO_POINT_NEAR
-        for inside, outside in bracket_ends(excess)
-    }
-    which = wanted.get(False, False), wanted.get(True, False)
+    which = (True, True) if solved else without_points(excess)
     points = with_ends(data.problem, points, variance, data.scales, which)
     low, high = profile_limits(*profile_curve(points, fit, variance, data.scales))
     return min(low, fit.dead_time), max(high, fit.dead_time)

@@ -107,7 +107,7 @@ def find_edges(
     threshold = max(min_share * span, 5 * noise) * (1 - 1e-9)
     width = spike_samples + 1
     # Level before and after each sample; they differ at an edge.
-    jump = _jumps(clean, width)
+    jump = median_jumps(clean, width)
     edges: list[Edge] = []
     for k in _peaks(jump, threshold):
         edge = _measure(clean, jump, k, noise)
@@ -133,7 +133,7 @@ def _significant_range(values: FloatArray, noise: float) -> float:
     return span
 
 
-def _jumps(values: FloatArray, width: int) -> FloatArray:
+def median_jumps(values: FloatArray, width: int) -> FloatArray:
     """Median of the `width` samples from each sample on, minus that of those before it."""
     jump = np.empty(values.size)
     # in pieces, because intermediate arrays would take several times the memory of a long record
