@@ -2,6 +2,7 @@
 
 import control as ct
 import numpy as np
+import pandas as pd
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.signal import lfilter
@@ -288,3 +289,35 @@ def test_several_channels_with_irregular_stamps_have_their_sample_time():
     assert whole.dt == 1.0
     assert_allclose(whole.dcgain().ravel(), [2, -1], rtol=0.05)
     assert any("interpolates" in choice for choice in whole.fit.choices)
+
+
+def test_logs_of_different_stamps_are_fitted_together():
+    first, u, y = jittered()
+    rng = np.random.default_rng(6)
+    second = np.cumsum(1.013 + 0.1 * rng.uniform(-1, 1, 300))
+    again = 8 * -np.expm1(-np.maximum(second - second[60] - 5.3, 0) / 20)
+    even = np.arange(300.0)
+    regular = 8 * -np.expm1(-np.maximum(even - 65.3, 0) / 20)
+    noise = 0.02 * rng.standard_normal((2, 300))
+    records = [
+        cr.Record.from_samples(first, u, y),
+        cr.Record.from_samples(second, u, again + noise[0]),
+        cr.Record(even, u, regular + noise[1]),
+    ]
+    sys = cr.identify(records, structures="FOPDT")
+    assert sys.dt == 1.0
+    assert_allclose([sys.fit.dead_time, sys.fit.gain], [5.3, 0.8], rtol=0.01)
+
+
+def test_a_frame_with_irregular_rows_is_kept_on_request():
+    time, u, y = jittered()
+    index = pd.Timestamp("2025-03-01 10:00") + pd.to_timedelta(time, unit="s")
+    frame = pd.DataFrame({"OP": u, "PV": y}, index=index)
+    with pytest.raises(TimeAxisError, match=r"from_frame\(..., missing='keep'\) does so"):
+        cr.Record.from_frame(frame, input="OP", output="PV")
+    record = cr.Record.from_frame(frame, input="OP", output="PV", missing="keep")
+    seen = record.seen
+    assert_array_equal(record.output[seen], y)
+    assert_allclose(record.time[seen], time - time[0], atol=0.011)
+    with pytest.raises(TimeAxisError, match="newest sample is first"):
+        cr.Record.from_frame(frame[::-1], input="OP", output="PV", missing="keep")

@@ -20,11 +20,14 @@ def as_record(given: Any) -> Record:
     DataError
     """
     if not isinstance(given, Record):
+        advice = ""
+        if isinstance(given, MeasuredFRF):
+            advice = "; fit_frf makes a model of a frequency response"
+        elif hasattr(given, "columns") and hasattr(given, "index"):
+            advice = "; Record.from_frame(frame, input=..., output=...) makes one of a table"
         raise DataError(
             "expected a Record, such as Record(time, input, output) or read_record(path), "
-            f"got a {type(given).__name__}"
-            + "; fit_frf makes a model of a frequency response"
-            * isinstance(given, MeasuredFRF)
+            f"got a {type(given).__name__}{advice}"
         )
     return given
 

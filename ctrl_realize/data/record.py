@@ -136,6 +136,7 @@ class Record(RecordConversions):
         if stamps.ndim != 1 or stamps.size < MIN_SAMPLES:
             raise DataError(
                 f"time has shape {stamps.shape}; a record needs shape (N,) with N >= {MIN_SAMPLES}"
+                + "; numpy.ravel makes one of a column" * (stamps.ndim == 2 and 1 in stamps.shape)
             )
         signals = {"input": numbers(input, "input"), "output": numbers(output, "output")}
         for what, values in signals.items():

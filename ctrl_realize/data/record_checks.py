@@ -106,7 +106,8 @@ def axis_words(fault: AxisFault) -> str:
     return {
         "extreme": f"time is {value:g} s at row {row}",
         "tiny_steps": f"time runs in steps of {value:g} s",
-        "backwards": f"time runs backwards: row 1 is at {value:g} s, row 0 at {usual:g} s",
+        "backwards": f"time runs backwards: row 1 is at {value:g} s, row 0 at {usual:g} s (the "
+        "newest sample is first: reverse time, input and output)",
         "repeated": f"time repeats at row {row}: {value:.9g} s after {usual:.9g} s",
         "jumps_back": f"time jumps back at row {row}: {value:.9g} s after {usual:.9g} s",
         "gap": f"time has a gap at row {row}: {value:.6g} s where {usual:.6g} s is usual "

@@ -9,7 +9,7 @@ import control as ct
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..errors import DataError
+from ..errors import DataError, TimeAxisError
 from ..numerics.arrays import FloatArray
 from ..results import Drawable
 from .frames import frame_of_signals, signals_of_frame
@@ -34,6 +34,9 @@ class RecordConversions(Drawable):
     output_labels: tuple[str, ...]
     dt: float
     sample_time: float
+
+    def _arguments(self) -> dict[str, Any]:
+        raise NotImplementedError
 
     def __replace__(self, **changes: Any) -> Self:
         raise NotImplementedError
@@ -70,7 +73,8 @@ class RecordConversions(Drawable):
         reference : str or sequence of str, optional
             Columns of the set points, one for each output.
         **options
-            Further arguments of `Record`. With ``missing="keep"``, missing values are kept.
+            Further arguments of `Record`. With ``missing="keep"``, missing values are kept, and
+            rows that are missing or at irregular times, see `from_samples`.
 
         Raises
         ------
@@ -92,7 +96,15 @@ class RecordConversions(Drawable):
         labels: dict[str, Any] = {"input_labels": inputs, "output_labels": outputs}
         if reference is not None:
             labels["reference"] = signals_of_frame(frame, input, reference, time)[2]
-        return cls(*signals, **labels | options)
+        labels |= options
+        try:
+            return cls(*signals, **labels)
+        except TimeAxisError as error:
+            if np.any(np.diff(signals[0]) <= 0):
+                raise
+            if labels.get("missing") == "keep":
+                return cls.from_samples(*signals, **labels)
+            raise TimeAxisError(f"{error}; from_frame(..., missing='keep') does so") from None
 
     def to_frame(self, start: Any = None) -> pd.DataFrame:
         """Convert the record to a pandas table with a column for each signal.
@@ -239,6 +251,26 @@ class RecordConversions(Drawable):
         return self.__replace__(
             time=time, input=signals[0], output=signals[1], reference=reference, sample_time=None
         )
+
+    def on_axis(self, dt: float) -> Self:
+        """Return the record with its samples on a time axis in steps of `dt`, the nearest to each.
+
+        Examples
+        --------
+        >>> import ctrl_realize as cr
+        >>> record = cr.Record([0, 1, 2], [0, 1, 1], [5, 5, 6]).on_axis(0.5)
+        >>> record.dt, record.sample_time, record.output.tolist()
+        (0.5, 1.0, [5.0, nan, 5.0, nan, 6.0])
+        """
+        seen = ~np.isnan(np.atleast_2d(self.output)).all(axis=0)
+        labels = self._arguments()
+        signals = [labels.pop(key) for key in ("time", "input", "output", "reference")]
+        time, u, y, reference = signals
+        return self.from_samples(
+            time[seen], u, y[..., seen], input_time=time, dt=dt,
+            reference=None if reference is None else reference[..., seen],
+            **labels | {"missing": "keep", "sample_time": self.sample_time},
+        )  # fmt: skip
 
     @classmethod
     def from_response(cls, response: ct.TimeResponseData, *, name: str | None = None) -> Self:

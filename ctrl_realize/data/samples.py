@@ -77,8 +77,9 @@ class Samples:
         if fault is None and not any(one.any() for one in lost):
             return self, "refuse" if self.input_time is None else "keep"
         said = "some stamps are irregular" if fault is not None else ""
-        if said and not regular_step(self.time):
-            said += f" (samples about {usual_step(self.time):g} s apart)"
+        once = np.unique(self.time)
+        if said and once.size > 1 and not regular_step(once):
+            said += f" (samples about {usual_step(once):g} s apart)"
         samples = self
         if self.input_time is None:
             no_input, no_output = (one.all(axis=0) for one in lost)

@@ -283,3 +283,17 @@ def test_a_process_model_is_checked_in_continuous_time():
     made = cr.design.pid(model)
     exact = cr.design.margins(model.transfer_function(), made, dead_time=0.029)
     assert made.check.margins.delay_margin == pytest.approx(exact.delay_margin, rel=1e-12)
+
+
+def test_dead_times_of_plausible_models_are_their_own_not_whole_samples():
+    # No dead time, known to a tenth of a sample; a sample more would make the loop unstable.
+    t = np.arange(600.0)
+    rng = np.random.default_rng(1)
+    y = -np.expm1(-np.maximum(t - 60, 0) / 15) + 0.005 * rng.standard_normal(600)
+    sys = cr.identify(cr.Record(t, (t >= 60) * 1.0, y))
+    check = cr.design.pid(sys).check
+    assert sys.fit.interval[1] < 0.2
+    assert check.margins.delay_margin < 1.0
+    assert check.stable_within_interval
+    assert check.worst.dead_time < 0.5
+    assert dict(check.rows())["over the interval"].startswith("stable")

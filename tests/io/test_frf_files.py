@@ -1,4 +1,5 @@
 import numpy as np
+import pandas as pd
 import pytest
 import scipy.io
 from numpy.testing import assert_allclose
@@ -140,3 +141,14 @@ def test_a_frequency_response_in_place_of_a_record_is_named(tmp_path, capsys):
     assert "<MeasuredFRF 'bench': 5 points, 0.5...10 Hz>, a frequency response" in said
     assert "cr.fit_frf(cr.read_frf(" in said
     assert said.splitlines()[2].split()[-1] == "frequency"
+
+
+def test_json_and_tables_are_named_with_what_reads_them(tmp_path):
+    file = tmp_path / "log.json"
+    file.write_text('{"t": [0, 1, 2], "u": [0, 1, 1], "y": [0, 0, 1]}')
+    with pytest.raises(FileFormatError, match=r"is JSON; expected a table .*json\.load reads it"):
+        cr.read_record(file)
+    with pytest.raises(DataError, match=r"got a DataFrame; Record\.from_frame\(frame"):
+        cr.identify(pd.DataFrame({"u": F, "y": F}))
+    with pytest.raises(DataError, match=r"numpy\.ravel makes one of a column"):
+        cr.Record(F[:, None], F, F)

@@ -7,7 +7,6 @@ from the identification.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -76,6 +75,9 @@ class LoopCheck(Result):
         ``"sensitive"`` if Ms is larger than 2 on the model; ``"unstable_within_interval"`` if some
         dead time within the interval, or a corner, makes the loop unstable;
         ``"sensitive_within_interval"`` if Ms is larger than 2 at a corner.
+    by_models : bool
+        The corners are plausible models, whose dead times are no whole samples: they decide on
+        `stable_within_interval`, not the interval widened to whole samples.
 
     Examples
     --------
@@ -90,6 +92,7 @@ class LoopCheck(Result):
     robustness: DelayRobustness | None = None
     corners: tuple[Corner, ...] = ()
     flags: tuple[Flag, ...] = ()
+    by_models: bool = False
 
     @property
     def worst(self) -> Corner | None:
@@ -104,6 +107,8 @@ class LoopCheck(Result):
     @property
     def stable_within_interval(self) -> bool | None:
         """Stable for all dead times of the interval; None if there is no interval."""
+        if self.by_models and self.worst is not None:
+            return self.worst.ms < float("inf")
         return None if self.robustness is None else self.robustness.stable
 
     def rows(self) -> list[tuple[str, str]]:
@@ -119,7 +124,7 @@ class LoopCheck(Result):
             )
         ]
         if self.robustness is not None:
-            word = "stable" if self.robustness.stable else "UNSTABLE somewhere"
+            word = "stable" if self.stable_within_interval else "UNSTABLE somewhere"
             interval = interval_in_time(*self.robustness.dead_time_interval)
             rows.append(("over the interval", f"{word}, dead time {interval}"))
         if self.worst is not None:
@@ -136,10 +141,8 @@ class LoopCheck(Result):
         word = "stable" if self.stable else "unstable"
         inside = ""
         if self.robustness is not None:
-            inside = (
-                f", {'stable' if self.robustness.stable else 'unstable'} over the dead-time "
-                "interval"
-            )
+            word_inside = "stable" if self.stable_within_interval else "unstable"
+            inside = f", {word_inside} over the dead-time interval"
         return f"<LoopCheck {word} on the design model{inside}>"
 
 
@@ -161,8 +164,8 @@ def loop_check(plant: Any, controller: Any, dead_time: float = 0.0) -> LoopCheck
     interval = interval_of_dead_time(plant, None)
     robust = None if interval is None else over_interval(plant, loop, found, interval, TRIED)
     corners = _corners(plant, loop, found, robust)
-    made = LoopCheck(found, robust, corners)
-    return replace(made, flags=(*flags, *_left_open(made, _models_of(plant) is not None)))
+    made = LoopCheck(found, robust, corners, by_models=_models_of(plant) is not None)
+    return replace(made, flags=(*flags, *_left_open(made)))
 
 
 def _sensitive(found: Margins) -> tuple[Flag, ...]:
@@ -177,7 +180,7 @@ def _corners(
     """Ms at the ends of the intervals of dead time and gain; the gain scales the whole loop."""
     models = _models_of(plant)
     if models is not None:
-        return _of_models(loop, models.systems)
+        return _of_models(loop, models)
     gains = _gains(plant)
     if robust is None and not gains:
         return ()
@@ -201,16 +204,16 @@ def _models_of(plant: DelayedStateSpace) -> PlausibleModels | None:
     return None if plant.fit is None else plant.fit.plausible_models
 
 
-def _of_models(loop: Loop, systems: Iterable[DelayedStateSpace]) -> tuple[Corner, ...]:
+def _of_models(loop: Loop, models: PlausibleModels) -> tuple[Corner, ...]:
     """Ms with other models of the plant, in the place of the first factor of a loop."""
     found = []
-    for system in systems:
+    for one, system in zip(models.models, models.systems, strict=True):
         other = replace(loop, factors=(factor(system, loop.dt), *loop.factors[1:]))
         at, gain = loop_margins(other), float(np.real(system.delay_free.dcgain()))
         ms = _ms(at.modulus_margin if at.stable else 0.0)
-        found.append(Corner(float(system.dead_time), gain if np.isfinite(gain) else None, ms))
-    worst = max(found, key=lambda one: one.ms)
-    return tuple(one for one in found if one is not worst)
+        found.append(Corner(one.dead_time, gain if np.isfinite(gain) else None, ms))
+    worst = max(found, key=lambda corner: corner.ms)
+    return tuple(corner for corner in found if corner is not worst)
 
 
 def _ms(modulus_margin: float) -> float:
@@ -233,11 +236,12 @@ def _moved(loop: Loop, delay: int, factor: float) -> Loop:
     return replace(loop, factors=(scaled, *loop.factors[1:]))
 
 
-def _left_open(made: LoopCheck, models: bool) -> tuple[Flag, ...]:
+def _left_open(made: LoopCheck) -> tuple[Flag, ...]:
     """What the identification leaves open does to the loop: its models, or else its intervals.
 
     The interval of a dead time alone is for fits that say nothing on the lags that go with it.
     """
+    models = made.by_models
     if not models and made.robustness is not None and not made.robustness.stable:
         low, high = made.robustness.dead_time_interval
         inside = flagged(

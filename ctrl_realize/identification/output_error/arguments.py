@@ -98,6 +98,17 @@ def checked_records(records: Record | Sequence[Record]) -> tuple[Record, ...]:
     return several
 
 
+def on_common_axis(records: tuple[Record, ...]) -> tuple[Record, ...]:
+    """Place records on the finest of their time axes, if the stamps of some are irregular."""
+    finest = min(one.dt for one in records)
+    if not any(one.irregular for one in records):
+        return records
+    return tuple(
+        one if np.isclose(one.dt, finest, rtol=1e-6, atol=0) else one.on_axis(finest)
+        for one in records
+    )
+
+
 def step_data_of(record: Record) -> StepData | None:
     """Data of a step record; None for any other input."""
     signal, output = np.ravel(record.input), np.ravel(record.output)

@@ -30,7 +30,7 @@ from .actuated.alternatives import ASKED, Asked
 from .actuated.fit import with_actuator
 from .actuated.limits import fit_within_limits, without_cut_noise
 from .any_input import fit_any_input
-from .arguments import checked_records, edges_of, known_factor, step_data_of
+from .arguments import checked_records, edges_of, known_factor, on_common_axis, step_data_of
 from .averaging import (
     aligned_steps,
     latest_onset,
@@ -247,7 +247,7 @@ def fit_output_error(
                 f"actuator={actuator!r} with known dynamics or gains='own': expected one of them"
             )
     factor = known_factor(known)
-    several = checked_records(records)
+    several = on_common_axis(checked_records(records))
     tried = replace(
         _requested(several, structures, max_delay, noise),
         known=factor,

@@ -95,6 +95,11 @@ def sniff(source: TextSource, options: TextOptions) -> TextLayout:
     ]
     if not rows:
         raise FileFormatError(f"{path} has no data lines in its first {len(head_bytes)} bytes")
+    if lines[rows[0]].lstrip()[:2] in ('{"', "[{", "[["):
+        raise FileFormatError(
+            f"{path} is JSON; expected a table such as CSV. In Python json.load reads it, and "
+            "Record(time, input, output) makes a record of its lists"
+        )
     lower = [lines[index] for index in rows[len(rows) // 2 :]]
     delimiter, decimal = _delimiter_and_decimal(path, lower[:_SAMPLE_LINES], options)
     cells = [split_line(lines[index], delimiter) for index in rows]
@@ -127,7 +132,8 @@ def _encoding(path: Path, head: bytes) -> str:
         head_text = head.rstrip(b"\0")
         if b"\0" in head_text or not head_text:
             raise FileFormatError(
-                f"{path} is binary; expected text (CSV, TSV), .npz, .mat or Parquet"
+                f"{path} is binary; expected text (CSV, TSV), .xlsx, .npz, .mat, Parquet, HDF5 or "
+                "TDMS"
             )
     try:
         codecs.getincrementaldecoder("utf-8")().decode(head)
