@@ -94,7 +94,9 @@ def main(arguments: list[str]) -> None:
     elif task == "test":
         if not rest:
             lint()
-        workers = ["-n", "2", "--dist", "worksteal"] if not rest else []
+        # One more than processors: tests of other processes and of browsers wait for these.
+        count = min(os.cpu_count() or 1, 7) + 1
+        workers = ["-n", str(count), "--dist", "worksteal"] if not rest else []
         run(PYTHON, "-m", "pytest", *workers, *rest)
 
 
