@@ -74,6 +74,10 @@ class PlausibleDraw:
     evidence: Mapping[Structure, float]
     best: Mapping[Structure, Candidate]
 
+    def __getstate__(self) -> dict[str, tuple[PlausibleModel, ...]]:
+        """What is stored or sent: the models, which are far smaller than the fits."""
+        return {"models": self.models}
+
     @cached_property
     def models(self) -> tuple[PlausibleModel, ...]:
         """`COUNT` equally likely models; the same for the same data."""
