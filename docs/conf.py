@@ -128,6 +128,11 @@ TABLES = {
         "python -m benchmarks.closed_loop --store loops.jsonl --table "
         "docs/tables/closed_loop_table.md",
     ),
+    "factors": (
+        "docs/tables/factors_table.md",
+        "python -m benchmarks.accuracy.factors --store factors.jsonl --table "
+        "docs/tables/factors_table.md",
+    ),
     "relay": (
         "docs/tables/relay_table.md",
         "python -m benchmarks.relay --store relay.jsonl --output docs/tables/relay_table.md",

@@ -19,7 +19,7 @@ import argparse
 import itertools
 import json
 import warnings
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from datetime import date
 from pathlib import Path
 from zlib import crc32
@@ -132,9 +132,9 @@ def delay_of_arx(record: cr.Record) -> float:
     return float(np.argmin(losses)) + 0.5  # with b at the samples delay and delay + 1
 
 
-def rows(seeds: tuple[int, int], known: set[tuple]) -> Iterator[Row]:
+def rows(seeds: tuple[int, int], loops: Sequence[str], known: set[tuple]) -> Iterator[Row]:
     """One row for every record; a fit that is refused has no dead time."""
-    levels = itertools.product(range(*seeds), LOOPS, INPUTS, RATIOS, PLANTS)
+    levels = itertools.product(range(*seeds), loops, INPUTS, RATIOS, PLANTS)
     for seed, loop, kind, ratio, name in levels:
         if (seed, loop, kind, ratio, name) in known:
             continue
@@ -196,13 +196,14 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--store", type=Path, required=True, help="rows that are there are kept")
     parser.add_argument("--seeds", type=int, nargs=2, default=(0, 4), metavar=("FIRST", "STOP"))
+    parser.add_argument("--loops", nargs="+", default=LOOPS, choices=LOOPS)
     parser.add_argument("--table", type=Path, help="Markdown file to write, from what is stored")
     arguments = parser.parse_args()
     store = arguments.store
     done = [json.loads(line) for line in store.read_text().splitlines()] if store.exists() else []
     known = {(r["seed"], r["loop"], r["input"], r["ratio"], r["plant"]) for r in done}
     with store.open("a") as out:
-        for row in rows(tuple(arguments.seeds), known):
+        for row in rows(tuple(arguments.seeds), arguments.loops, known):
             out.write(json.dumps(row) + "\n")
             out.flush()
             done.append(row)
