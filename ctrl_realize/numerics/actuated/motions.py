@@ -15,6 +15,7 @@ from typing import Literal, NamedTuple, TypeAlias
 import numpy as np
 
 from ..actuators.friction import backlash, kano
+from ..actuators.limits import slew_limited
 from ..arrays import FloatArray
 from .records import ActuatedRecord
 
@@ -106,7 +107,7 @@ class Motion(NamedTuple):
         """Position (N,) for a demand (N,) that changes from sample to sample."""
         position = KINDS[self.kind].position
         if position is None:
-            return slewed(demand, dt, self.values[0], self.values[-1])
+            return slew_limited(demand, self.values[0], self.values[-1], dt)
         return position(self.values, self.levels, demand, start)
 
     def driven(self, record: ActuatedRecord, start: float) -> FloatArray:
@@ -116,26 +117,6 @@ class Motion(NamedTuple):
             return slewed_means(record.command, record.dt, self.values[0], self.values[-1])
         held, index = record.held
         return position(self.values, self.levels, held, start)[index]
-
-
-def slewed(command: FloatArray, dt: float, up: float, down: float) -> FloatArray:
-    """Follow a command (N,) at no more than two rates: position at every sample."""
-    change = np.diff(command, prepend=command[0])
-    too_fast = np.flatnonzero((change > up * dt) | (change < -down * dt))
-    out, rise, fall = command.tolist(), up * dt, -down * dt
-    k = 0  # caught up with the command, until it is too fast again
-    for first in too_fast.tolist():
-        if first <= k:
-            continue
-        k, current = first, out[first - 1]
-        while k < len(out):
-            away = out[k] - current
-            if fall <= away <= rise:
-                break
-            current += rise if away > 0 else fall
-            out[k] = current
-            k += 1
-    return np.array(out)
 
 
 def slewed_means(command: FloatArray, dt: float, up: float, down: float) -> FloatArray:
