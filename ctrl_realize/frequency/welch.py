@@ -58,41 +58,24 @@ def from_segments(
         raise OptionError(
             f"method={method!r} is for one input and one output; use 'H1' for several"
         )
-    estimate = _many_channels if several else _one_channel
-    return estimate(sums, frequency, lines, method, averages), dt
+    return _divided(sums, frequency, lines, method, averages), dt
 
 
-def _one_channel(
+def _divided(
     sums: SpectralSums, frequency: FloatArray, lines: slice, method: str, averages: float
 ) -> MeasuredPoints:
-    """Divide the spectra of one input and one output."""
-    uu, yy, yu = sums.uu[0, 0, lines].real, sums.yy[0, lines], sums.yu[0, 0, lines]
-    if not np.any(uu > 0):
-        raise DataError("the input is constant: it does not excite the plant")
-    excited = (uu > np.finfo(float).eps ** 2 * uu.max()) & (yy > 0) & (np.abs(yu) > 0)
-    if not excited.any():
-        raise DataError("the output is constant: there is no response to estimate")
-    uu, yy, yu = uu[excited], yy[excited], yu[excited]
-    h1, h2 = yu / uu, yy / yu.conj()
-    response = {"H1": h1, "H2": h2, "Hv": yu / np.abs(yu) * np.sqrt(yy / uu)}[method]
-    coherence = np.minimum(np.abs(yu) ** 2 / (uu * yy), 1.0)
-    std = np.abs(h1) * np.sqrt((1 - coherence) / (coherence * (averages - 1)))
-    return MeasuredPoints(frequency[lines][excited], response, coherence, std, averages)
-
-
-def _many_channels(
-    sums: SpectralSums, frequency: FloatArray, lines: slice, method: str, averages: float
-) -> MeasuredPoints:
-    """Solve ``S_yu = H S_uu`` at every frequency (H1)."""
+    """Solve ``S_yu = H S_uu`` at every frequency: H1, of which H2 and Hv are multiples."""
     uu = np.moveaxis(sums.uu[..., lines], -1, 0)
     yu, yy = np.moveaxis(sums.yu[..., lines], -1, 0), sums.yy[:, lines].T
-    m = uu.shape[1]
+    m, single = uu.shape[1], yu.shape[1:] == (1, 1)
     if averages <= m:
         raise DataError(
             f"{averages:.3g} independent segments are too few for {m} inputs; give a shorter "
             "segment"
         )
     power = np.einsum("fii->fi", uu).real
+    if single and not np.any(power > 0):
+        raise DataError("the input is constant: it does not excite the plant")
     excited = np.all(power > np.finfo(float).eps ** 2 * power.max(), axis=1)
     # Fully correlated inputs cannot be distinguished: their matrix is singular.
     scaled = uu / np.sqrt(np.maximum(power[:, :, None] * power[:, None, :], 1e-300))
@@ -102,6 +85,10 @@ def _many_channels(
             "the inputs do not excite the plant independently: their contributions cannot be "
             "separated at any frequency"
         )
+    if single:
+        excited &= (yy[:, 0] > 0) & (np.abs(yu[:, 0, 0]) > 0)
+    if not excited.any():
+        raise DataError("the output is constant: there is no response to estimate")
     uu, yu, yy = uu[excited], yu[excited], yy[excited]
     inverse = np.linalg.inv(uu)
     response = yu @ inverse
@@ -110,13 +97,11 @@ def _many_channels(
     left = yy * (1 - coherence) / (averages - m)
     share = np.einsum("fii->fi", inverse).real
     std = np.sqrt(left[:, :, None] * share[:, None, :])
-    return MeasuredPoints(
-        frequency[lines][excited],
-        np.moveaxis(response, 0, -1),
-        np.moveaxis(np.broadcast_to(coherence[:, :, None], response.shape), 0, -1),
-        np.moveaxis(std, 0, -1),
-        averages - m + 1,
-    )
+    response = response / coherence[:, :, None] ** {"H1": 0.0, "Hv": 0.5, "H2": 1.0}[method]
+    part = (0, 0) if single else ...
+    seen = np.broadcast_to(coherence[:, :, None], response.shape)
+    response, seen, std = (np.moveaxis(each, 0, -1)[part] for each in (response, seen, std))
+    return MeasuredPoints(frequency[lines][excited], response, seen, std, averages - m + 1)
 
 
 def _window(length: int, window: str | tuple[str, float]) -> FloatArray:
