@@ -112,3 +112,24 @@ def test_the_preview_of_a_file_names_set_point_and_mode(tmp_path, capsys, text):
     lines = capsys.readouterr().out.splitlines()
     for tag, use in uses.items():
         assert next(line for line in lines if f"TIC1.{tag} " in line).endswith(use)
+
+
+@pytest.mark.parametrize("inner", ["SP2,PV2,OP2", "SP2,PV2"], ids=["complete", "no inner output"])
+def test_the_loops_of_a_cascade_are_read_one_at_a_time(tmp_path, inner):
+    """What the outer controller asks for is the set point of the inner one."""
+    k = np.arange(40)
+    asked = 30 + np.round(5 * np.sin(k / 7), 2)
+    columns = {"t": k, "SP1": 50 + (k > 9), "PV1": 50 + np.cos(k), "OP1": asked}
+    columns |= {"SP2": asked + 0.001 * (k % 2), "PV2": asked + np.cos(k / 3), "OP2": 40 + np.sin(k)}
+    names = ["t", "SP1", "PV1", "OP1", *inner.split(",")]
+    rows = np.stack([columns[name] for name in names], axis=1)
+    text = "\n".join([",".join(names), *(",".join(map(str, row)) for row in rows)])
+    with pytest.raises(OptionError, match="'SP2' follows column 'OP1'"):
+        read(tmp_path, text)
+    outer = read(tmp_path, text, input="OP1", output="PV1", reference="SP1")
+    assert_array_equal(outer.input, asked)
+    # independent loops are one plant with two inputs
+    columns["SP2"] = 30 + (k > 20)
+    rows = np.stack([columns[name] for name in ("t", "SP1", "PV1", "OP1", "SP2", "PV2", "OP2")])
+    text = "\n".join(["t,SP1,PV1,OP1,SP2,PV2,OP2", *(",".join(map(str, row)) for row in rows.T)])
+    assert read(tmp_path, text).reference.shape == (2, 40)

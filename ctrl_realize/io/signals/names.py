@@ -6,6 +6,7 @@ import math
 import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 
@@ -32,6 +33,7 @@ NAMES = {key: frozenset(words) for key, words in facts("io/words.toml")["columns
 """Names of columns by what they hold, and the last parts of tags, such as ``TIC101_PV``."""
 MODES = facts("io/words.toml")["modes"]
 """Words of a controller's mode."""
+_SAME = 1 - 1e-4  # correlation: all but a hundredth, as of rounded values
 
 
 @dataclass(frozen=True)
@@ -120,6 +122,7 @@ def choose_columns(
     if reference is None:
         free = {k for k in setpoints if k not in (*used, *taken) and holds_numbers(table, k)}
         references = sorted(free) if len(free) == len(outputs) else []
+        _no_cascade(table, inputs, references)
     elif len(references) != len(outputs):
         raise OptionError(
             f"reference={reference!r} selects {len(references)} columns; expected one for each of "
@@ -146,6 +149,19 @@ def _signals(table: Table, kind: str, taken: Sequence[int], loop: bool) -> list[
     if len(families) > 1 and families & (NAMES["input_tag"] | NAMES["output_tag"]):
         raise ambiguous(table, found, f"the {kind}", kind)
     return found
+
+
+def _no_cascade(table: Table, inputs: Sequence[int], references: Sequence[int]) -> None:
+    """Refuse the loops of a cascade as one plant: the one moves the set point of the other."""
+    for k, r in product(inputs, references if len(references) > 1 else ()):
+        both = np.stack([table.numbers(at, keep_missing=True) for at in (k, r)])
+        both = both[:, np.isfinite(both).all(axis=0)]
+        if (np.ptp(both, axis=1) > 0).all() and np.corrcoef(both)[0, 1] > _SAME:
+            raise OptionError(
+                f"{table.path}: {table.title(r)} follows {table.title(k)}, as the set point of an "
+                "inner loop follows the controller of an outer one; read one loop at a time with "
+                "input=, output= and reference="
+            )
 
 
 def _modes(table: Table, taken: Iterable[int]) -> list[int]:
