@@ -321,3 +321,25 @@ def test_a_frame_with_irregular_rows_is_kept_on_request():
     assert_allclose(record.time[seen], time - time[0], atol=0.011)
     with pytest.raises(TimeAxisError, match="newest sample is first"):
         cr.Record.from_frame(frame[::-1], input="OP", output="PV", missing="keep")
+
+
+def test_samples_that_are_missing_more_often_than_not_keep_the_sample_time():
+    rng = np.random.default_rng(4)
+    for left in (0.4, 0.2):
+        kept = np.flatnonzero(rng.random(500) < left).astype(float)
+        record = cr.Record.from_samples(kept, kept, kept)
+        assert (record.dt, record.sample_time) == (1.0, 1.0)
+
+
+def test_samples_close_together_are_averaged():
+    rng = np.random.default_rng(8)
+    time = np.cumsum(rng.exponential(1.0, 600))
+    u = 10.0 * (time > 100)
+    y = 20 * -np.expm1(-np.maximum(time - time[np.argmax(u > 0)] - 5.3, 0) / 20)
+    record = cr.Record.from_samples(time, u, y + 0.05 * rng.standard_normal(600))
+    assert 400 < np.count_nonzero(record.seen) <= 600
+    fit = cr.identify(record, structures="FOPDT").fit
+    assert fit.interval[0] <= 5.3 <= fit.interval[1]
+    assert_allclose(fit.dead_time, 5.3, atol=0.1)
+    twice = cr.Record.from_samples([0, 1, 1 + 1e-6, 2, 3], [0] * 5, [0, 1, 3, 4, 5])
+    assert_array_equal(twice.output[twice.seen], [0, 2, 4, 5])

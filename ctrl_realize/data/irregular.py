@@ -7,7 +7,7 @@ from numpy.typing import ArrayLike
 
 from .._checks import numbers, positive
 from ..errors import DataError, OptionError, TimeAxisError
-from ..numerics.arrays import FloatArray
+from ..numerics.arrays import FloatArray, IntArray
 from ..numerics.signals.sample_grid import grid_rows, grid_step, regular_step, usual_step
 from ..numerics.signals.time_axis import axis_fault
 from .record_checks import axis_words, check_finite, check_shape, check_size
@@ -15,6 +15,8 @@ from .resampling import MAX_DENSER, MIN_SAMPLES
 
 _AS_IT_IS = 1.5
 """Steps of the time axis from which on the distance of samples is no step of it."""
+_NEXT_TO_ANOTHER = 0.05
+"""Share of samples one step behind another, from which on they are regular, with many missing."""
 
 
 def on_one_axis(
@@ -57,7 +59,7 @@ def on_one_axis(
         )
     rows = grid_rows(stamps[seen], float(every[0]), step)
     shared = np.flatnonzero(np.diff(rows) == 0)
-    if shared.size:
+    if shared.size and dt is not None:
         first = int(shared[0])
         raise TimeAxisError(
             f"two samples, at {stamps[seen][first]:.9g} s and {stamps[seen][first + 1]:.9g} s, "
@@ -66,13 +68,15 @@ def on_one_axis(
         )
     axis = every[0] + step * np.arange(max(int(rows[-1]) + 1, MIN_SAMPLES), dtype=np.float64)
     spread = np.full((*y.shape[:-1], axis.size), np.nan)
-    spread[..., rows] = y[..., seen]
+    spread[..., np.unique(rows)] = _means(y[..., seen], rows)
     held = np.stack([
         _held(moves[row], values[row], axis, step)
         for row, values in zip(known, np.atleast_2d(u), strict=True)
     ])  # fmt: skip
     measured = stamps[seen & ~np.isnan(np.atleast_2d(y)).all(axis=0)]
-    usual = step if regular_step(every) else usual_step(measured)
+    apart = np.diff(measured) / step
+    regular = regular_step(every) or np.mean(apart < _AS_IT_IS) > _NEXT_TO_ANOTHER
+    usual = step if regular else usual_step(measured)
     signals = axis, held[0] if u.ndim == 1 else held, spread
     return signals, usual if usual > _AS_IT_IS * step else step
 
@@ -87,6 +91,17 @@ def _stamps(time: ArrayLike, what: str, least: int) -> FloatArray:
     if fault is not None:
         raise TimeAxisError(f"{axis_words(fault)}; {what} must increase from row to row")
     return stamps
+
+
+def _means(values: FloatArray, rows: IntArray) -> FloatArray:
+    """Mean of the values that share a row, NaN where all are missing."""
+    if rows.size == 0 or np.all(np.diff(rows)):
+        return values
+    starts = np.flatnonzero(np.diff(rows, prepend=rows[0] - 1))
+    known = ~np.isnan(values)
+    sums = np.add.reduceat(np.where(known, values, 0.0), starts, axis=-1)
+    counts = np.add.reduceat(known.astype(np.float64), starts, axis=-1)
+    return np.asarray(np.where(counts > 0, sums / np.maximum(counts, 1), np.nan))
 
 
 def _held(stamps: FloatArray, values: FloatArray, axis: FloatArray, step: float) -> FloatArray:

@@ -201,7 +201,8 @@ class RecordConversions(Drawable):
         dt : float, optional
             Step of the grid in s; each sample goes to the nearest row. Default: regular samples
             keep their step; otherwise the greatest common divisor of the distances between the
-            stamps, or a fiftieth of the usual distance if that would be too fine.
+            stamps, or a fiftieth of the usual distance if that would be too fine; samples that are
+            closer together are averaged.
         reference : array_like, optional
             Set point at the stamps of the output; it holds its value from one to the next.
         **labels

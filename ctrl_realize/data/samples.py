@@ -24,6 +24,17 @@ _LONG = 2.5
 """Usual steps in which an input may move unseen."""
 
 
+def _in_words(time: FloatArray) -> str:
+    """What is irregular about time stamps, which do not decrease."""
+    once = np.unique(time)
+    if once.size > 1 and not regular_step(once):
+        return f"some stamps are irregular (samples about {usual_step(once):g} s apart)"
+    repeated = time.size - once.size
+    if repeated:
+        return f"{repeated} stamps repeat, of which the later sample counts"
+    return "samples are missing between some stamps"
+
+
 @dataclass(frozen=True, eq=False)
 class Samples:
     """Input and output with the stamps of each, as they stand in a file.
@@ -76,10 +87,7 @@ class Samples:
             return self, "refuse"
         if fault is None and not any(one.any() for one in lost):
             return self, "refuse" if self.input_time is None else "keep"
-        said = "some stamps are irregular" if fault is not None else ""
-        once = np.unique(self.time)
-        if said and once.size > 1 and not regular_step(once):
-            said += f" (samples about {usual_step(once):g} s apart)"
+        said = "" if fault is None else _in_words(self.time)
         samples = self
         if self.input_time is None:
             no_input, no_output = (one.all(axis=0) for one in lost)

@@ -183,7 +183,9 @@ def model_from_text(text: str, *, max_states: int | None = None) -> Model:
     try:
         content = parsed(text)
     except (ValueError, RecursionError) as error:
-        raise FileFormatError(f"not a model file, or truncated: {error}") from error
+        raise FileFormatError(
+            f"not a model file, or truncated; expected JSON that save_model has written: {error}"
+        ) from error
     try:
         _check_origin(content)
         return _model_from(content, max_states=max_states)
