@@ -343,3 +343,8 @@ def test_samples_close_together_are_averaged():
     assert_allclose(fit.dead_time, 5.3, atol=0.1)
     twice = cr.Record.from_samples([0, 1, 1 + 1e-6, 2, 3], [0] * 5, [0, 1, 3, 4, 5])
     assert_array_equal(twice.output[twice.seen], [0, 2, 4, 5])
+
+
+def test_time_that_runs_backwards_from_nothing_is_named():
+    with pytest.raises(TimeAxisError, match="reverse time, input and output"):
+        cr.Record([1e-300, -1e10, -2e10], [0, 1, 1], [0, 0, 1])

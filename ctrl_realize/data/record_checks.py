@@ -103,6 +103,7 @@ def checked_units(given: Any, labels: Sequence[str]) -> dict[str, str]:
 def axis_words(fault: AxisFault) -> str:
     """Describe what is wrong with a time axis, and where."""
     kind, row, value, usual, worst = fault
+    missing = value / usual - 1 if kind == "gap" else 0.0  # of other faults it may overflow
     return {
         "extreme": f"time is {value:g} s at row {row}",
         "tiny_steps": f"time runs in steps of {value:g} s",
@@ -111,7 +112,7 @@ def axis_words(fault: AxisFault) -> str:
         "repeated": f"time repeats at row {row}: {value:.9g} s after {usual:.9g} s",
         "jumps_back": f"time jumps back at row {row}: {value:.9g} s after {usual:.9g} s",
         "gap": f"time has a gap at row {row}: {value:.6g} s where {usual:.6g} s is usual "
-        f"(about {value / usual - 1 if usual else 0:.0f} sample(s) missing)",
+        f"(about {missing:.0f} sample(s) missing)",
         "not_uniform": f"time is not uniform: row {row} is {value:.2g} samples off the uniform "
         f"grid of {usual:.6g} s (worst: {worst:.2f}; allowed: {UNIFORM_WITHIN})",
     }[kind]
