@@ -18,6 +18,7 @@ import numpy as np
 
 import ctrl_realize as cr
 
+from .bound import bound
 from .candidates import candidates
 from .cases import CASES, MOVES, PLANTS, record
 from .surface import projected, surface
@@ -30,6 +31,7 @@ SHOWN = (
     "projected: mean, Akaike",
 )
 """Ways in the table; what begins with *direct* and *projected* is on the grid."""
+BOUND = "Cramer-Rao bound, lags known"
 Row = dict[str, float | str | bool | list[float]]
 
 
@@ -116,6 +118,12 @@ def table(done: list[Row]) -> list[str]:
         "|---|---|---|---|---|---|---|---|",
     ]
     for case in CASES:
+        if not CASES[case].load:
+            least = [
+                bound(*world) for world in worlds((seeds[0], seeds[0] + 1)) if world[1] == case
+            ]
+            size = np.sqrt(np.mean(np.square(least)))
+            lines.append(f"| {case} | {BOUND} | {len(least)} | | {size:.2f} | | | |")
         for way in SHOWN:
             chosen = [row for row in done if row["case"] == case and row["way"] == way]
             fitted = [row for row in chosen if row.get("delay") is not None]

@@ -83,7 +83,7 @@ def _diffusion_rates(order: int, shift: float) -> tuple[FloatArray, FloatArray]:
     return 2 * np.log(number / (1 - shift)), 2 / (1 - shift) - 2 / number
 
 
-_TANKS = _Law(_spread_rates, 0.08**2, 0.1**2, 0.5**2)  # partial fractions need distinct poles
+TANKS = _Law(_spread_rates, 0.08**2, 0.1**2, 0.5**2)  # partial fractions need distinct poles
 _DIFFUSION = _Law(_diffusion_rates, 0.0, 0.25, 0.5)
 
 
@@ -133,7 +133,7 @@ def fit_chains(
     if not moments[1] > 0:
         return chains
     for order in range(SHORTEST, LONGEST + 1):
-        chain = _chain(problem, order, _TANKS, moments, scales, variance, penalty)
+        chain = _chain(problem, order, TANKS, moments, scales, variance, penalty)
         if _over_within_a_sample(chain, scales):
             break
         if chains and chain.criterion > chains[-1].criterion + _WORSE:

@@ -23,6 +23,7 @@ from ..constants import SMALLEST
 from ..engine.problem import Bounds, Problem
 from ..engine.static_gain import INTEGRATOR, LocalErrors
 from ..engine.structures import FASTEST, LEAST_DAMPING, SLOWEST, Candidate, Scales
+from .equal_lags import TANKS
 from .physical import ProcessParameter
 from .process_form import ProcessForm
 from .shaped import LagFamily, Mapped, lowest, paired
@@ -79,8 +80,10 @@ class FormFamily(LagFamily):
     def mapped(self, x: FloatArray) -> Mapped:
         """Model with gain 1, and its derivatives."""
         form, every = self.form, np.eye(x.size)
-        lags = slice(1, 1 + form.lags)
+        lags = np.ones(form.lags, dtype=np.int64) if form.equal else np.arange(1, 1 + form.lags)
         rates, slopes = -x[lags], -every[lags]
+        if form.equal:
+            rates = rates + TANKS.rates(form.lags, TANKS.low)[0]
         growth, dgrowth = float(rates.sum()), slopes.sum(axis=0)
         if form.integrator:
             rates = np.append(rates, np.log(SLOWEST / self.scales.length))

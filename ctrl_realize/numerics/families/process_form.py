@@ -24,7 +24,8 @@ from ..engine.structures import Candidate
 class ProcessForm:
     """Form of a process model: number of real lags, a pair, a lead, an integrator, a dead time.
 
-    `fixed`, `bounds` and `start` are by the names of `ProcessParameter`; times are in s.
+    `fixed`, `bounds` and `start` are by the names of `ProcessParameter`; times are in s. The lags
+    of an `equal` form have one time constant, as tanks in series.
     """
 
     name: str
@@ -36,6 +37,7 @@ class ProcessForm:
     fixed: Mapping[str, float] = field(default_factory=dict)
     bounds: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     start: Mapping[str, float] = field(default_factory=dict)
+    equal: bool = False
 
     @property
     def structure(self) -> Structure:
@@ -46,7 +48,7 @@ class ProcessForm:
     @property
     def names(self) -> tuple[str, ...]:
         """Names of the parameters."""
-        lags = tuple(f"lag_{i}" for i in range(1, self.lags + 1))
+        lags = tuple(f"lag_{i}" for i in range(1, 2 if self.equal else self.lags + 1))
         pair = ("pair_time_1", "pair_damping_1") if self.pair else ()
         return ("gain", "dead_time", *lags, *pair, *(("lead_1",) if self.lead else ()))
 

@@ -92,6 +92,18 @@ def test_a_long_dead_time_is_within_the_interval(case, moves):
     assert low <= plant.dead_time <= high
 
 
+def test_three_lags_that_are_nearly_equal_are_not_taken_for_two():
+    """Two lags fit as well, and begin 5 samples later."""
+    plant = PLANTS["0.3"]
+    fit = cr.identify(loop("white", "three", 502, plant)).fit
+    assert fit.interval[0] <= plant.dead_time <= fit.interval[1]
+
+
+def test_in_white_noise_two_lags_are_seldom_taken_for_three():
+    fit = cr.identify(loop("white", "nine", 502)).fit
+    assert abs(fit.dead_time - PLANT.dead_time) < 1.0
+
+
 def test_stretches_in_manual_are_told():
     data = loop("white", "nine")
     wanted = np.where(data.time < 250, np.nan, data.reference)

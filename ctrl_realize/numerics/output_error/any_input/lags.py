@@ -1,9 +1,11 @@
 """Lags with dead time in slow noise: the dead time is the mean over all that is not ruled out.
 
-Slow noise hides the second lag of a plant. The information criterion then chooses one lag, whose
-dead time is that of the plant and most of its second lag. The mean over dead times, weighted by the
-profile likelihoods [1]_ of one to three real lags with Akaike's charge for each further one [2]_
-and one for its initial value, has no such bias. In loops, moreover, zeros and pairs of poles
+Slow noise hides the second lag of a plant, and any noise the third. The information criterion then
+chooses fewer lags, and takes the others for dead time. The mean over dead times has less of such a
+bias: every number of lags with its profile likelihood [1]_, and a weight by its best fit [2]_, with
+a charge for each lag and each initial value. A lag costs what one that is not there gains in 5 % of
+records, so that criterion and likelihood-ratio test say the same [4]_. Three equal lags [5]_ cost
+as much as one: else three lags are taken for two. In loops, moreover, zeros and pairs of poles
 imitate the slow noise that the controller answers.
 
 Noise is the autoregression of the residual of these lags, and both are fitted in turn [3]_, for
@@ -14,9 +16,12 @@ References
 .. [1] S. A. Murphy and A. W. van der Vaart, On profile likelihood, J. Amer. Statist. Assoc. 95
    (2000) 449-465, doi:10.1080/01621459.2000.10474219.
 .. [2] K. P. Burnham and D. R. Anderson, Model Selection and Multimodel Inference, 2nd ed., Springer
-   2002, sections 2.9 (Akaike weights) and 4.2 (model averaging).
+   2002, section 4.2 (model averaging).
 .. [3] D. W. Clarke, Generalized least squares estimation of the parameters of a dynamic model, IFAC
    Symposium on Identification in Automatic Control Systems, Prague 1967, paper 3.17.
+.. [4] T. Soderstrom and P. Stoica, System Identification, Prentice Hall 1989, section 11.5.
+.. [5] V. Strejc, Naherungsverfahren fur aperiodische Ubergangscharakteristiken, Regelungstechnik 7
+   (1959) 124-128.
 """
 
 from __future__ import annotations
@@ -29,9 +34,9 @@ import numpy as np
 from scipy.interpolate import PchipInterpolator
 
 from ...arrays import FloatArray
-from ...constants import SMALLEST
+from ...constants import CHI2_95, SMALLEST
 from ...engine.eliminate import evaluate
-from ...engine.plausible_models import PlausibleDraw
+from ...engine.plausible_models import CALIBRATED, PlausibleDraw
 from ...engine.problem import Structure
 from ...engine.profile import Points, profile_curve, profile_grid, profile_points
 from ...engine.structures import Candidate
@@ -54,6 +59,7 @@ from .data import SampledData
 from .window import SampledWindow, fit_windows, modelled
 
 LAGS = tuple(ProcessForm(f"P{n}D", n) for n in (1, 2, 3))
+EQUAL = ProcessForm("P3D", 3, equal=True)
 _RIVALS = (Structure(1, 1), Structure(2, 2), Structure(2, 1))
 _RULED_OUT = 30.0
 """Of the criterion: a zero beside a pole slower than the record reached 11 in loops without one, a
@@ -64,10 +70,6 @@ _BEYOND = 1.5  # total delays of the first fit, up to which a dead time is sough
 _HIDDEN = 0.1
 """Of the record, that may come from before it and is left out for that: dead times longer than what
 is left out would be ruled out by samples that depend on an input that is not known."""
-_AKAIKE = 2.0  # for each parameter, in twice the log of the likelihood
-_CALIBRATED = 1.2
-"""Variance that counts for weights, over that of the noise, so that intervals hold as often as they
-say: `benchmarks.closed_loop`, seeds 500 and 501."""
 _SHORTER = 0.3  # of the last lag: a further one, where a profile starts
 _BETWEEN = 8  # dead times between two points of a profile
 _TAIL = 0.025  # of the weight, beyond each end of an interval
@@ -109,7 +111,9 @@ def fit_lags(data: SampledData, requested: Requested) -> tuple[SampledWindow, Ou
     if requested.huber:
         fits, fitted = _robust(fits, forms, fitted)
     part, problem, scales = replace(part, fit=fits), fits.problem, fits.scales
-    profiles = _profiles(fits, fitted)
+    # Free lags follow all that equal ones do: these count for weights alone.
+    equal = [] if requested.forms else [fit_form(problem, EQUAL, scales, fitted)]
+    profiles = _profiles(fits, [*fitted, *equal])
     dead_times, shares = _weighted(fits, profiles)
     weights = shares.sum(axis=0)
     mean = float(np.sum(weights * dead_times))
@@ -118,7 +122,7 @@ def fit_lags(data: SampledData, requested: Requested) -> tuple[SampledWindow, Ou
     chosen = _with_dead_time(fits, mean, forms, fitted)
     curves = {
         one.structure: profile_curve(points, one, fits.variance, scales)
-        for one, points in zip(fitted, profiles, strict=True)
+        for one, points in zip(fitted, profiles, strict=False)
     }
     found = assembled(
         fits, chosen, True, (), curves, DelayInterval(float(first), float(last), std),
@@ -130,10 +134,11 @@ def fit_lags(data: SampledData, requested: Requested) -> tuple[SampledWindow, Ou
     plain = {s.plain: _plain(one) for s, one in fits.candidates.items()}
     plainly = replace(fits, candidates=plain, criterion=fits.criteria(plain))
     better = _better(part, min(fitted, key=partial(_value, fits)), within)
-    evidence = dict(zip(plain, shares.sum(axis=1).tolist(), strict=True))
+    of_lags = np.add.reduceat(shares.sum(axis=1), range(len(forms)))
+    evidence = dict(zip(plain, of_lags.tolist(), strict=True))
     points = {
         one.structure.plain: {at: _plain(point) for at, point in own.items()}
-        for one, own in zip(fitted, profiles, strict=True)
+        for one, own in zip(fitted, profiles, strict=False)
     }
     others = OtherStructures(better)
     found = replace(found, process=process, points=points, others=others, averaged=True)
@@ -244,7 +249,7 @@ def _profiles(fits: WindowFit, fitted: Sequence[Candidate]) -> list[Points]:
     found: list[Points] = []
     for one in fitted:
         starts = np.tile(one.parameters, (grid.size, 1))
-        if found:
+        if found and starts.shape[1] > found[-1][float(grid[0])].parameters.size:
             fewer = np.stack([found[-1][float(at)].parameters for at in grid])
             more = np.arange(1, starts.shape[1] - fewer.shape[1] + 1)
             starts = np.hstack([fewer, fewer[:, -1:] + np.log(_SHORTER) * more])
@@ -261,9 +266,11 @@ def _weighted(fits: WindowFit, profiles: Sequence[Points]) -> tuple[FloatArray, 
     part = np.arange(_BETWEEN) / _BETWEEN
     fine = np.append((every[:-1, None] + np.diff(every)[:, None] * part).ravel(), every[-1])
     between = PchipInterpolator(every, values, axis=1)(fine)
-    density = np.exp(-0.5 * (between - values.min()))
-    weights = density * np.gradient(fine)
-    return fine, weights / max(float(weights.sum()), SMALLEST)
+    least = values.min(axis=1, keepdims=True)
+    density = np.exp(-0.5 * (between - least)) * np.gradient(fine)
+    weights = np.exp(-0.5 * (least - least.min()))
+    share = weights / weights.sum() / np.maximum(density.sum(axis=1, keepdims=True), SMALLEST)
+    return fine, share * density
 
 
 def _plain(lags: Candidate) -> Candidate:
@@ -273,6 +280,6 @@ def _plain(lags: Candidate) -> Candidate:
 
 def _value(fits: WindowFit, lags: Candidate) -> float:
     """Misfit and charges; one initial value more of a record lowers the misfit by one for noise."""
-    order = lags.structure.order
-    charge = _AKAIKE * order + fits.problem.local_count(order)
-    return lags.cost / (_CALIBRATED * fits.variance) + charge
+    free = CHI2_95 * (lags.parameters.size - 1)
+    charge = free + fits.problem.local_count(lags.structure.order)
+    return lags.cost / (CALIBRATED * fits.variance) + charge

@@ -1,0 +1,50 @@
+"""Cramer-Rao bound of a dead time: least error of an unbiased estimate that is told the structure.
+
+The input is known, so that a direct estimate in noise with a known pole is one of least squares
+(Ljung, System Identification, 2nd ed., Prentice Hall 1999, section 7.4): lags, gain, level and
+drift are estimated beside the dead time. What moves the input has no part in it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from scipy.signal import lfilter
+
+from .cases import CASES, GAIN, PLANTS, Plant, chain, record
+
+_STEP = 0.01  # of a parameter, for a slope by differences
+_APART = 0.02  # of lags that are equal
+
+
+def bound(seed: int, case: str, plant: str, moves: str) -> float:
+    """Least standard deviation of the dead time, in samples."""
+    given, noise = PLANTS[plant], CASES[case]
+    spread = _APART * np.arange(len(given.lags))
+    true = replace(given, lags=tuple(np.array(given.lags) * (1 - spread)))
+    drive = record(given, noise, moves, seed)[1].input.ravel()
+    values = np.array([true.dead_time, *true.lags])
+    slopes = [response(true, drive), np.ones(drive.size), np.arange(drive.size) / drive.size]
+    for move in np.diag(_STEP * values):
+        low, high = (
+            response(Plant(tuple(one[1:]), one[0]), drive) for one in (values - move, values + move)
+        )
+        slopes.append((high - low) / (2 * move.sum()))
+    white = lfilter([1.0, -noise.pole], [1.0], np.stack(slopes), axis=1)[:, 1:].T
+    # The dead time comes last, so that the last diagonal element is what nothing else explains.
+    order = [*range(3), *range(4, white.shape[1]), 3]
+    alone = abs(np.linalg.qr(white[:, order])[1][-1, -1])
+    return float(noise.noise * np.sqrt(1 - noise.pole**2) / alone)
+
+
+def response(plant: Plant, drive: np.ndarray) -> np.ndarray:
+    """Output of a plant at rest for a held input (N,)."""
+    whole = int(plant.dead_time)
+    transition, early, late = chain(plant, plant.dead_time - whole)
+    before = np.concatenate([np.zeros(whole + 1), drive])
+    state, output = np.zeros(len(plant.lags)), np.zeros(drive.size)
+    for k in range(drive.size):
+        output[k] = GAIN * state[-1]
+        state = transition @ state + early * before[k] + late * before[k + 1]
+    return output
