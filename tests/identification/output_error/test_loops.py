@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 import ctrl_realize as cr
+from benchmarks.accuracy import factors
 from benchmarks.closed_loop.cases import CASES, GAIN, PLANTS, record
 
 PLANT = PLANTS["0.4"]
@@ -130,3 +131,12 @@ def test_lags_that_are_ruled_out_are_not_fitted():
     fit = cr.fit_output_error(cr.Record(TIME[:350], drive, output, reference=drive)).fit
     assert np.abs(fit.poles.imag).max() == pytest.approx(np.sqrt(0.01 - 0.02**2), rel=0.02)
     assert fit.interval[0] <= 5 <= fit.interval[1]
+
+
+@pytest.mark.parametrize("plant", ["slow, four lags", "fast, four lags"])
+def test_three_lags_that_stand_for_four_leave_the_dead_time_open(plant):
+    # noise is a tenth of the output: three lags reach it too, with a dead time that is too long
+    made, _ = factors.record(factors.PLANTS[plant], "binary, to Nyquist", 100.0, "closed", 100)
+    fit = cr.identify(made).fit
+    assert fit.structure == (3, 3)
+    assert fit.interval[0] <= factors.PLANTS[plant].dead_time <= fit.interval[1]
