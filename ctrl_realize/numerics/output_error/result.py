@@ -132,8 +132,7 @@ class OtherStructures:
 
     def __getstate__(self) -> dict[str, object]:
         """What is stored or sent: all intervals, and not the fits of which they are."""
-        told = {"better": self.better, "alike": self.alike}
-        return told | {"not_ruled_out": self.not_ruled_out}
+        return {"better": self.better, "alike": self.alike, "not_ruled_out": self.not_ruled_out}
 
     def with_interval(self, line: StructureFit) -> StructureFit:
         """One that is not ruled out, with the 95 % profile-likelihood interval of its dead time."""

@@ -126,7 +126,7 @@ def fit_lags(data: SampledData, requested: Requested) -> tuple[SampledWindow, Ou
     dead_times, shares = _weighted(fits, profiles)
     weights = shares.sum(axis=0)
     mean = float(np.sum(weights * dead_times))
-    first, last = np.interp([_TAIL, 1.0 - _TAIL], np.cumsum(weights), dead_times)
+    first, last = np.interp([_TAIL, 1.0 - _TAIL], np.cumsum(weights), dead_times).tolist()
     if not requested.forms and shares[len(LAGS) - 1 :].sum() > 0.5:
         # Three lags may stand for more: one more than chosen is never ruled out.
         further = fit_form(problem, FURTHER, scales, fitted)
@@ -139,7 +139,7 @@ def fit_lags(data: SampledData, requested: Requested) -> tuple[SampledWindow, Ou
         for one, points in zip(fitted, profiles, strict=False)
     }
     found = assembled(
-        fits, chosen, True, (), curves, DelayInterval(float(first), float(last), std),
+        fits, chosen, True, (), curves, DelayInterval(first, last, std),
         curves[chosen.structure],
     )  # fmt: skip
     form = forms[fitted.index(fits.candidates[chosen.structure])]
