@@ -30,6 +30,7 @@ from scipy.signal import butter, sosfilt
 
 import ctrl_realize as cr
 
+from ..closed_loop.bound import least_error, response
 from ..closed_loop.cases import GAIN, Plant, chain, tuning
 
 SAMPLES, REST = 600, 40  # of 1 s
@@ -60,18 +61,6 @@ def signal(kind: str, rng: np.random.Generator) -> np.ndarray:
     return np.concatenate([np.zeros(REST), made])
 
 
-def responses(plant: Plant, applied: np.ndarray) -> np.ndarray:
-    """Undisturbed output for a held input."""
-    whole = int(plant.dead_time)
-    transition, early, late = chain(plant, plant.dead_time - whole)
-    drive = np.concatenate([np.zeros(whole + 1), applied])
-    state, output = np.zeros(len(plant.lags)), np.zeros(applied.size)
-    for k in range(applied.size):
-        output[k] = GAIN * state[-1]
-        state = transition @ state + early * drive[k] + late * drive[k + 1]
-    return output
-
-
 def looped(plant: Plant, wanted: np.ndarray, noise: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Output of a PI controller and of the plant in its loop, where noise is fed back."""
     proportional, integral_time = tuning(plant)
@@ -93,29 +82,13 @@ def record(plant: Plant, kind: str, ratio: float, loop: str, seed: int) -> tuple
     moves, white = signal(kind, rng), rng.standard_normal(SAMPLES)
     time = np.arange(SAMPLES) * 1.0
     if loop == "open":
-        clean = responses(plant, moves)
+        clean = response(plant, moves)
         sigma = float(np.std(clean) / np.sqrt(ratio))
         return cr.Record(time, moves, clean + sigma * white), sigma
     _, clean = looped(plant, moves, np.zeros(SAMPLES))
     sigma = float(np.std(clean) / np.sqrt(ratio))
     applied, output = looped(plant, moves, sigma * white)
     return cr.Record(time, applied, output, reference=moves), sigma
-
-
-def bound(plant: Plant, applied: np.ndarray, sigma: float) -> float:
-    """Cramer-Rao bound of the dead time, lags and gain unknown, for the input as it was.
-
-    By differences; in a loop the asymptotic one of prediction errors.
-    """
-    values = np.array([plant.dead_time, *plant.lags])
-    columns = [responses(plant, applied)]
-    for i in range(values.size):
-        moved = [values + sign * 1e-4 * np.eye(values.size)[i] for sign in (1, -1)]
-        later, sooner = (responses(Plant((*v[1:],), v[0]), applied) for v in moved)
-        columns.append((later - sooner) / 2e-4)
-    columns.append(np.ones(applied.size))
-    information = np.linalg.pinv(np.stack(columns, axis=1))
-    return float(sigma * np.linalg.norm(information[1]))
 
 
 def delay_of_arx(record: cr.Record) -> float:
@@ -140,7 +113,10 @@ def rows(seeds: tuple[int, int], loops: Sequence[str], known: set[tuple]) -> Ite
             continue
         made, sigma = record(PLANTS[name], kind, ratio, loop, seed)
         row: Row = {"seed": seed, "loop": loop, "input": kind, "ratio": ratio, "plant": name}
-        row |= {"bound": bound(PLANTS[name], made.input.ravel(), sigma), "arx": delay_of_arx(made)}
+        row |= {
+            "bound": least_error(PLANTS[name], made.input.ravel(), sigma),
+            "arx": delay_of_arx(made),
+        }
         try:
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore")

@@ -21,9 +21,14 @@ _APART = 0.02  # of lags that are equal
 def bound(seed: int, case: str, plant: str, moves: str) -> float:
     """Least standard deviation of the dead time, in samples."""
     given, noise = PLANTS[plant], CASES[case]
-    spread = _APART * np.arange(len(given.lags))
-    true = replace(given, lags=tuple(np.array(given.lags) * (1 - spread)))
     drive = record(given, noise, moves, seed)[1].input.ravel()
+    return least_error(given, drive, noise.noise, noise.pole)
+
+
+def least_error(plant: Plant, drive: np.ndarray, sigma: float, pole: float = 0.0) -> float:
+    """Least standard deviation of the dead time, for an input (N,) and first-order noise."""
+    spread = _APART * np.arange(len(plant.lags))
+    true = replace(plant, lags=tuple(np.array(plant.lags) * (1 - spread)))
     values = np.array([true.dead_time, *true.lags])
     slopes = [response(true, drive), np.ones(drive.size), np.arange(drive.size) / drive.size]
     for move in np.diag(_STEP * values):
@@ -31,11 +36,11 @@ def bound(seed: int, case: str, plant: str, moves: str) -> float:
             response(Plant(tuple(one[1:]), one[0]), drive) for one in (values - move, values + move)
         )
         slopes.append((high - low) / (2 * move.sum()))
-    white = lfilter([1.0, -noise.pole], [1.0], np.stack(slopes), axis=1)[:, 1:].T
+    white = lfilter([1.0, -pole], [1.0], np.stack(slopes), axis=1)[:, 1:].T
     # The dead time comes last, so that the last diagonal element is what nothing else explains.
     order = [*range(3), *range(4, white.shape[1]), 3]
     alone = abs(np.linalg.qr(white[:, order])[1][-1, -1])
-    return float(noise.noise * np.sqrt(1 - noise.pole**2) / alone)
+    return float(sigma * np.sqrt(1 - pole**2) / alone)
 
 
 def response(plant: Plant, drive: np.ndarray) -> np.ndarray:
