@@ -24,12 +24,11 @@ def signals_of_frame(
     import pandas as pd
 
     if not isinstance(frame, pd.DataFrame):
-        kind = type(frame)
-        converts = "; frame.to_pandas() converts it" * hasattr(frame, "to_pandas")
-        raise DataError(
-            f"expected a pandas DataFrame, got a {kind.__module__.split('.')[0]} "
-            f"{kind.__name__}{converts}"
-        )
+        kind, converts = type(frame).__name__, ""
+        if hasattr(frame, "to_pandas"):
+            kind = f"{type(frame).__module__.split('.')[0]} {kind}"
+            converts = "; frame.to_pandas() converts it"
+        raise DataError(f"expected a pandas DataFrame, got a {kind}{converts}")
     stamps = frame.index if time is None else _column(frame, time, "time")
     inputs, outputs = _labels(input, "input"), _labels(output, "output")
     u, y = _signals(frame, inputs, "input"), _signals(frame, outputs, "output")

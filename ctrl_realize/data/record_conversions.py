@@ -241,9 +241,9 @@ class RecordConversions(Drawable):
         Examples
         --------
         >>> import ctrl_realize as cr
-        >>> record = cr.Record.from_samples([0, 1.01, 2, 3.02, 4], [0, 0, 1, 1, 1], [5, 5, 5, 6, 7])
+        >>> record = cr.Record.from_samples([0, 1.1, 2, 3.2, 4], [0, 0, 1, 1, 1], [5, 5, 5, 6, 7])
         >>> print(record.at_equal_distances().output.round(2))
-        [5.   5.   5.   5.98 7.  ]
+        [5.   5.   5.   5.83 7.  ]
         """
         if not self.irregular:
             return self

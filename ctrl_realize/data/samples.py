@@ -27,12 +27,12 @@ _LONG = 2.5
 def _in_words(time: FloatArray) -> str:
     """What is irregular about time stamps, which do not decrease."""
     once = np.unique(time)
+    why = "samples are missing"
     if once.size > 1 and not regular_step(once):
-        return f"some stamps are irregular (samples about {usual_step(once):g} s apart)"
-    repeated = time.size - once.size
-    if repeated:
-        return f"{repeated} stamps repeat, of which the later sample counts"
-    return "samples are missing between some stamps"
+        why = f"samples are about {usual_step(once):g} s apart"
+    elif time.size > once.size:
+        why = f"{time.size - once.size} stamps repeat, of which the later sample counts"
+    return f"{why}: some stamps are irregular"
 
 
 @dataclass(frozen=True, eq=False)

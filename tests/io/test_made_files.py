@@ -63,7 +63,7 @@ def test_a_gap_in_which_the_input_moved_is_refused_and_others_are_kept_and_told(
         path.write_text("\n".join(["t_s,u,y", *rows]) + "\n")
         return path
 
-    with pytest.warns(DataWarning, match="they are kept as they are"):
+    with pytest.warns(DataWarning, match="stamps are irregular; they are kept as they are"):
         record = cr.read_record(wrote(np.where(t < 40, 0.0, 1.0)))
     assert record.n_samples == 60
     assert np.isnan(record.output[20:30]).all()
