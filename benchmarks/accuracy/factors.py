@@ -31,7 +31,7 @@ from scipy.signal import butter, sosfilt
 import ctrl_realize as cr
 
 from ..closed_loop.bound import least_error, response
-from ..closed_loop.cases import GAIN, Plant, chain, tuning
+from ..closed_loop.cases import Case, Plant, looped
 
 SAMPLES, REST = 600, 40  # of 1 s
 PLANTS = {
@@ -61,21 +61,6 @@ def signal(kind: str, rng: np.random.Generator) -> np.ndarray:
     return np.concatenate([np.zeros(REST), made])
 
 
-def looped(plant: Plant, wanted: np.ndarray, noise: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Output of a PI controller and of the plant in its loop, where noise is fed back."""
-    proportional, integral_time = tuning(plant)
-    whole = int(plant.dead_time)
-    transition, early, late = chain(plant, plant.dead_time - whole)
-    drive, state = np.zeros(SAMPLES + whole + 1), np.zeros(len(plant.lags))
-    output, integral = np.zeros(SAMPLES), 0.0
-    for k in range(SAMPLES):
-        output[k] = GAIN * state[-1] + noise[k]
-        integral += proportional * (wanted[k] - output[k]) / integral_time
-        drive[k + whole + 1] = proportional * (wanted[k] - output[k]) + integral
-        state = transition @ state + early * drive[k] + late * drive[k + 1]
-    return drive[whole + 1 :], output
-
-
 def record(plant: Plant, kind: str, ratio: float, loop: str, seed: int) -> tuple[cr.Record, float]:
     """Record, and the standard deviation of its noise."""
     rng = np.random.default_rng([seed, crc32(repr((plant, kind, ratio, loop)).encode())])
@@ -85,9 +70,10 @@ def record(plant: Plant, kind: str, ratio: float, loop: str, seed: int) -> tuple
         clean = response(plant, moves)
         sigma = float(np.std(clean) / np.sqrt(ratio))
         return cr.Record(time, moves, clean + sigma * white), sigma
-    _, clean = looped(plant, moves, np.zeros(SAMPLES))
+    at_rest = np.zeros(SAMPLES)
+    _, clean = looped(plant, moves, at_rest, Case(), at_rest)
     sigma = float(np.std(clean) / np.sqrt(ratio))
-    applied, output = looped(plant, moves, sigma * white)
+    applied, output = looped(plant, moves, sigma * white, Case(), at_rest)
     return cr.Record(time, applied, output, reference=moves), sigma
 
 

@@ -87,13 +87,21 @@ def record(plant: Plant, case: Case, moves: str, seed: int) -> tuple[np.ndarray,
     coloured = lfilter([np.sqrt(1 - case.pole**2)], [1.0, -case.pole], white)[500:]
     noise = case.noise * coloured
     load = case.load * np.cumsum(rng.standard_normal(SAMPLES))
+    applied, output = looped(plant, wanted, noise, case, load)
+    return wanted, cr.Record(np.arange(SAMPLES) * 1.0, applied, output)
+
+
+def looped(
+    plant: Plant, wanted: np.ndarray, noise: np.ndarray, case: Case, load: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Output of a PI controller, and of the plant in its loop, in which noise is fed back (N,)."""
     proportional, integral_time = tuning(plant)
-    whole = int(plant.dead_time)
+    whole, samples = int(plant.dead_time), wanted.size
     transition, early, late = chain(plant, plant.dead_time - whole)
     state = np.zeros(len(plant.lags))
-    drive = np.zeros(SAMPLES + whole + 1)  # from whole + 1 samples before the record on
-    applied, output, integral = np.zeros(SAMPLES), np.zeros(SAMPLES), 0.0
-    for k in range(SAMPLES):
+    drive = np.zeros(samples + whole + 1)  # from whole + 1 samples before the record on
+    applied, output, integral = np.zeros(samples), np.zeros(samples), 0.0
+    for k in range(samples):
         output[k] = GAIN * state[-1] + noise[k]
         error = wanted[k] - output[k]
         asked = proportional * error + integral + proportional * error / integral_time
@@ -105,7 +113,7 @@ def record(plant: Plant, case: Case, moves: str, seed: int) -> tuple[np.ndarray,
         applied[k] = value
         drive[k + whole + 1] = value + load[k]
         state = transition @ state + early * drive[k] + late * drive[k + 1]
-    return wanted, cr.Record(np.arange(SAMPLES) * 1.0, applied, output)
+    return applied, output
 
 
 def tuning(plant: Plant) -> tuple[float, float]:
