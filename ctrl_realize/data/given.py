@@ -80,8 +80,8 @@ def check_complete(record: Record, task: str) -> None:
     if record.irregular:
         raise DataError(
             f"{task} needs samples at equal distances; the stamps of this record are irregular. "
-            "identify(record) and fit_output_error use them as they are; read_record(..., "
-            "resample=True) or Record.resampled(time, input, output) interpolates"
+            "identify(record) and fit_output_error use them as they are; "
+            "record.at_equal_distances() or read_record(..., resample=True) interpolates"
         )
     if record.missing == "keep" and record.n_missing:
         raise DataError(
