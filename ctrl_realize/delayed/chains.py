@@ -76,8 +76,3 @@ def powers(points: ComplexArray, delays: tuple[int, ...]) -> ComplexArray:
     if np.all(np.abs(points) >= ON_CIRCLE):
         return np.stack([whole_power(1 / points, d) for d in delays])
     return np.stack([points ** (-d) for d in delays])
-
-
-def common(delays: tuple[int, ...]) -> int | None:
-    """Return the common delay; None if the delays differ."""
-    return delays[0] if len(set(delays)) == 1 else None

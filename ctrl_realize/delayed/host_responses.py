@@ -42,6 +42,12 @@ class HostResponses(HostMargins):
     def _simulated(self, inputs: FloatArray, state: FloatArray | None = None) -> FloatArray:
         """Compute the outputs (p, N) from zero initial state, or from a given one."""
 
+    def _in_continuous_time(
+        self, kind: str, timepts: Any, inputs: Any, state: ArrayLike, settings: dict[str, Any]
+    ) -> ct.TimeResponseData:
+        """Response of a system with internal delays, which alone may be continuous."""
+        raise NotImplementedError
+
     @abstractmethod
     def dominant_poles(self, count: int = 10) -> ComplexArray:
         """Compute the poles that decay most slowly, or grow fastest."""
@@ -115,15 +121,45 @@ class HostResponses(HostMargins):
     def forced_response(
         self,
         timepts: ArrayLike | None = None,
-        inputs: ArrayLike = 0.0,
+        inputs: Any = 0.0,
         initial_state: ArrayLike = 0.0,
         **settings: Any,
     ) -> ct.TimeResponseData:
         """Compute the response to any input, see `control.forced_response`.
 
-        If the states are requested, python-control simulates with the matrices.
+        Parameters
+        ----------
+        timepts : array_like
+            Times in s, increasing from 0 (continuous time), or every sample.
+        inputs : array_like or callable
+            Values at these times, linear between them in continuous time; or a function of an
+            array of K times that returns values of shape (inputs, K).
+        initial_state : array_like, optional
+            In discrete time of all states: those of the core, then the past samples, in the order
+            of ``state_labels``; in continuous time of the core.
+        **settings
+            ``squeeze`` and ``transpose``; in discrete time those of `control.forced_response` (if
+            the states are requested, python-control simulates with the matrices). In continuous
+            time also ``history``, the constant input of each delay before time 0
+            (default 0); and ``tolerance``, the largest error relative to the largest output (1e-8).
+
+        Returns
+        -------
+        control.TimeResponseData
+
+        Notes
+        -----
+        In continuous time the delay differential equation is solved by the method of steps, with
+        all breaking points; all steps are halved until the result no longer changes [1]_.
+
+        References
+        ----------
+        .. [1] A. Bellen and M. Zennaro, Numerical Methods for Delay Differential Equations, Oxford
+           University Press 2003, chapters 2 and 3, doi:10.1093/acprof:oso/9780198506546.001.0001.
         """
-        if set(settings) - PLAIN or not self.dt:
+        if not self.dt:
+            return self._in_continuous_time("forced", timepts, inputs, initial_state, settings)
+        if set(settings) - PLAIN:
             return super().forced_response(timepts, inputs, initial_state, **settings)
         given = finite(inputs, "inputs")
         times = self._times(timepts, np.atleast_2d(given).shape[-1])
@@ -139,9 +175,12 @@ class HostResponses(HostMargins):
     ) -> ct.TimeResponseData:
         """Compute the response to an initial state, see `control.initial_response`.
 
-        The states are those of the core, then the past samples in the order of ``state_labels``.
+        In discrete time of all states, as in `forced_response`; in continuous time of the core,
+        with ``history`` and ``tolerance`` as in `forced_response`.
         """
-        if set(settings) - PLAIN or not self.dt:
+        if not self.dt:
+            return self._in_continuous_time("initial", timepts, 0.0, initial_state, settings)
+        if set(settings) - PLAIN:
             return super().initial_response(timepts, initial_state, **settings)
         times = self._all_times(timepts)
         rest = np.zeros((self.ninputs, times.size))
@@ -155,10 +194,13 @@ class HostResponses(HostMargins):
     ) -> ct.TimeResponseData:
         """Compute the step responses, see `control.step_response`.
 
-        Without `timepts` until the slowest pole has decayed to a thousandth, for 5000 samples at
-        most.
+        Without `timepts` until the slowest pole has decayed; in discrete time to a thousandth, for
+        5000 samples at most. In continuous time from zero initial state, and ``tolerance`` is
+        accepted as in `forced_response`.
         """
-        if set(settings) - PLAIN or not self.dt:
+        if not self.dt:
+            return self._in_continuous_time("step", timepts, 1.0, initial_state, settings)
+        if set(settings) - PLAIN:
             return super().step_response(timepts, initial_state, **settings)
         return self._traces(timepts, "step", 1.0, initial_state, settings)
 
@@ -224,9 +266,12 @@ class HostResponses(HostMargins):
     ) -> ct.TimeResponseData:
         """Compute the responses to pulses of height 1/dt, see `control.impulse_response`.
 
-        `timepts` as for `step_response`.
+        In continuous time those to impulses, from zero initial state: the slope of the step
+        response; impulses in the output are omitted. `timepts` as for `step_response`.
         """
-        if set(settings) - PLAIN or not self.dt:
+        if not self.dt:
+            return self._in_continuous_time("impulse", timepts, 1.0, 0.0, settings)
+        if set(settings) - PLAIN:
             return super().impulse_response(timepts, **settings)
         return self._traces(timepts, "impulse", 1 / self.dt, 0.0, settings)
 
@@ -241,12 +286,16 @@ class HostResponses(HostMargins):
         times = self._all_times(timepts)
         signal = np.zeros(times.size)
         signal[: 1 if kind == "impulse" else None] = height
-        m = self.ninputs
-        drive = np.zeros((m, m, times.size))
-        drive[np.arange(m), np.arange(m)] = signal
-        start = self._state(state)
-        outputs = np.stack([self._simulated(drive[:, j], start) for j in range(m)], axis=1)
+        drive, outputs = self._one_by_one(signal, self._state(state))
         return self._unit_responses(times, outputs, drive, kind, **settings)
+
+    def _one_by_one(
+        self, signal: FloatArray, state: FloatArray | None = None
+    ) -> tuple[FloatArray, FloatArray]:
+        """Drive each input alone: inputs (inputs, trace, N) and outputs (outputs, trace, N)."""
+        drive = np.eye(self.ninputs)[:, :, None] * signal
+        every = [self._simulated(drive[:, j], state) for j in range(self.ninputs)]
+        return drive, np.stack(every, axis=1)
 
     def _unit_responses(
         self, times: FloatArray, outputs: FloatArray, drive: FloatArray, kind: str, **settings: Any

@@ -11,8 +11,7 @@ import numpy as np
 from ..errors import UnsuitableSystemError
 from ..numerics.internal_delays import form as forms
 from .inside.system import DelaySystem
-from .operands import common_dt, form_of
-from .system import DelayedStateSpace
+from .operands import common_dt, core_states, form_of
 
 
 def interconnect(systems: Sequence[Any], *args: Any, **settings: Any) -> Any:
@@ -82,19 +81,11 @@ def interconnect(systems: Sequence[Any], *args: Any, **settings: Any) -> Any:
 def _state_names(systems: Sequence[Any]) -> list[str]:
     """Names of the states of all cores, with those of their systems, as in python-control."""
     delimiter = ct.config.defaults["iosys.state_name_delim"]
-    names = []
-    for system in systems:
-        if isinstance(system, DelayedStateSpace):
-            labels = system.delay_free.state_labels
-        elif isinstance(system, DelaySystem):
-            labels = system.core.state_labels
-        else:
-            labels = getattr(system, "state_labels", None) or []
-        count = form_of(system).states
-        if len(labels) != count:  # a transfer function
-            labels = [f"x[{i}]" for i in range(count)]
-        names += [f"{system.name}{delimiter}{label}" for label in labels]
-    return names
+    return [
+        f"{system.name}{delimiter}{label}"
+        for system in systems
+        for label in core_states(system, form_of(system))
+    ]
 
 
 def _time_base(systems: Sequence[Any]) -> float:

@@ -95,6 +95,13 @@ def common_dt(first: Any, second: Any) -> float | None:
     return float(bases[0])
 
 
+def core_states(system: Any, form: DelayForm) -> list[str]:
+    """Names of the states of a system's core; python-control's for a transfer function."""
+    core = getattr(system, "delay_free", getattr(system, "core", system))
+    labels, count = getattr(core, "state_labels", None) or [], form.states
+    return list(labels) if len(labels) == count else [f"x[{i}]" for i in range(count)]
+
+
 def labels_of(system: Any, side: str, own: Sequence[str]) -> Sequence[str]:
     """Signal names of the other factor; our own if python-control has numbered those."""
     labels: list[str] = getattr(system, side, list(own))
@@ -118,18 +125,17 @@ def product(second: DelayForm, first: DelayForm) -> DelayForm:
         second = _repeated(second, first.outputs)
     elif is_single(first) and second.inputs != 1:
         first = _repeated(first, second.inputs)
-    if is_single(second) and is_single(first):
-        return _single_product(second, first)
     if second.inputs != first.outputs:
         raise OptionError(f"systems {shapes(second, first)} cannot be multiplied")
-    return forms.series(second, first)
-
-
-def _single_product(second: DelayForm, first: DelayForm) -> DelayForm:
-    """Series of single channels: all delays, wherever they are, are moved to the input."""
     (before, behind, core), (entry, exit_, other) = ends_apart(first), ends_apart(second)
-    total = before[0] + behind[0] + entry[0] + exit_[0]
-    return forms.series(forms.series(other, core), forms.lines((total,)))
+    between = {a + b for a, b in zip(behind, entry, strict=True)}
+    if len(between) > 1:
+        return forms.series(second, first)
+    # a delay that all signals between have in common is one of all inputs
+    joined, late = forms.series(other, core), between.pop()
+    if is_single(joined):
+        late, exit_ = late + exit_[0], (0.0,)
+    return forms.delayed_ends(joined, [delay + late for delay in before], exit_)
 
 
 def _repeated(single: DelayForm, count: int) -> DelayForm:

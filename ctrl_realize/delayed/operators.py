@@ -16,6 +16,7 @@ from .deferred import DeferredMatrices
 from .operands import (
     Numbers,
     common_dt,
+    core_states,
     everywhere,
     form_of,
     is_linear,
@@ -82,10 +83,13 @@ class DelayOperators(DeferredMatrices):
             return None
         return form_of(other)
 
+    def _scaled(self, factor: float) -> Any:
+        form, labels = self._form(), (self.input_labels, self.output_labels)
+        scaled = forms.through(form, np.eye(form.outputs), factor * np.eye(form.inputs))
+        return self._joined(scaled, self.dt, *labels, core_states(self, form))
+
     def __neg__(self) -> Any:
-        form = self._form()
-        gain = forms.through(form, -np.eye(form.outputs), np.eye(form.inputs))
-        return self._joined(gain, self.dt, self.input_labels, self.output_labels)
+        return self._scaled(-1.0)
 
     def __add__(self, other: Any) -> Any:
         """Sum: parallel connection with the same input."""
@@ -117,18 +121,24 @@ class DelayOperators(DeferredMatrices):
         theirs = self._other(other)
         if theirs is None:
             return NotImplemented
-        labels = labels_of(other, "input_labels", self.input_labels)
-        series = product(self._form(), theirs)
-        return self._joined(series, common_dt(self, other), labels, self.output_labels)
+        if isinstance(other, Numbers):
+            return self._scaled(float(other))
+        labels = labels_of(other, "input_labels", self.input_labels), self.output_labels
+        mine = self._form()
+        series, states = product(mine, theirs), core_states(other, theirs) + core_states(self, mine)
+        return self._joined(series, common_dt(self, other), *labels, states)
 
     def __rmul__(self, other: Any) -> Any:
         """Series: first this system, then `other`."""
         theirs = self._other(other)
         if theirs is None:
             return NotImplemented
-        labels = labels_of(other, "output_labels", self.output_labels)
-        series = product(theirs, self._form())
-        return self._joined(series, common_dt(self, other), self.input_labels, labels)
+        if isinstance(other, Numbers):
+            return self._scaled(float(other))
+        labels = self.input_labels, labels_of(other, "output_labels", self.output_labels)
+        mine = self._form()
+        series, states = product(theirs, mine), core_states(self, mine) + core_states(other, theirs)
+        return self._joined(series, common_dt(self, other), *labels, states)
 
     def __pow__(self, power: Any) -> Any:
         """Power; -1 is the inverse, if that is proper."""

@@ -13,11 +13,12 @@ from ..data import Record
 from ..data.given import check_complete, check_input
 from ..errors import DataError, UnsuitableSystemError
 from ..numerics.arrays import FloatArray, later
-from ..numerics.internal_delays.form import delayed_ends
+from ..numerics.internal_delays.form import DelayForm, delayed_ends
 from ..numerics.state_space.responses import markov, step_response
 from ..numerics.state_space.sampling import continuous_ends
 from . import DelayedStateSpace, DelaySystem
 from .inside.conversions import check_logarithm
+from .operands import plain
 
 Start = Literal["estimate", "rest"]
 
@@ -143,7 +144,6 @@ def _on_axis(model: DelayedStateSpace, step: float) -> DelayedStateSpace:
     check_logarithm(core.A)
     ends = model.input_delays, model.output_delays
     matrices, *delays = continuous_ends((core.A, core.B, core.C, core.D), float(core.dt), *ends)
-    form = delayed_ends(*matrices, *delays)
-    continuous = ct.StateSpace(form.A, form.B, form.C, form.D, 0, remove_useless_states=False)
-    sampled: Any = DelaySystem(continuous, form.delays).to_discrete(step)
+    form = delayed_ends(DelayForm(*matrices), *delays)
+    sampled: Any = DelaySystem(plain(form, 0), form.delays).to_discrete(step)
     return sampled.replace(fit=model.fit)  # type: ignore[no-any-return]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import control as ct
@@ -122,11 +123,7 @@ class InsideConversions(DelayOperators):
         inner = tuple(float(d) for d in whole_ones[inputs + rest.outputs :])
         held = [not np.any(row) for row in _not_held(rest)]
         core = _held(rest, step, held)
-        ends = forms.delayed_ends(
-            core.A, core.B, core.C, core.D,
-            (*entry, *[0.0] * len(inner)), (*exit_, *[0.0] * len(inner)),
-        )  # fmt: skip
-        form = _closed_again(ends, inner)
+        form = forms.delayed_ends(replace(core, delays=inner), entry, exit_)
         made = self._joined(form, step, *names)
         if not all(held):
             self._state_error(made, step)
@@ -171,7 +168,7 @@ class InsideConversions(DelayOperators):
         whole = [[int(tau) for tau in end] for end in (before, behind)]
         matrices = core.A, core.B, core.C, core.D
         found, entry, exit_ = continuous_ends(matrices, float(self.dt), *whole)
-        made = forms.through(forms.delayed_ends(*found, entry, exit_), left, right)
+        made = forms.through(forms.delayed_ends(DelayForm(*found), entry, exit_), left, right)
         return self._joined(made, 0, self.input_labels, self.output_labels)
 
     def sample(
@@ -261,7 +258,7 @@ def _paths_sampled(
         )
     sampled, *whole = sample_ends((core.A, core.B, core.C, core.D), step, before, behind)
     ends = (tuple(map(float, end)) for end in whole)
-    return forms.through(forms.delayed_ends(*sampled, *ends), left, right)
+    return forms.through(forms.delayed_ends(DelayForm(*sampled), *ends), left, right)
 
 
 def _samples(tau: float, step: float) -> int:
@@ -320,18 +317,3 @@ def _held(form: DelayForm, step: float, held: list[bool]) -> DelayForm:
     B[:, m:] = whole_step[:, m:] - late + A @ late
     D[:, m:] = D[:, m:] + form.C @ late
     return DelayForm(A, B, form.C, D, form.delays)
-
-
-def _closed_again(form: DelayForm, inner: tuple[float, ...]) -> DelayForm:
-    """Close the last inputs and outputs of a form through additional delays."""
-    q = len(inner)
-    m, p, own = form.inputs - q, form.outputs - q, len(form.delays)
-    columns = [*range(m), *range(m + q, m + q + own), *range(m, m + q)]
-    rows = [*range(p), *range(p + q, p + q + own), *range(p, p + q)]
-    return DelayForm(
-        form.A,
-        form.B[:, columns],
-        form.C[rows],
-        form.D[np.ix_(rows, columns)],
-        (*form.delays, *inner),
-    )

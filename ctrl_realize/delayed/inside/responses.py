@@ -37,91 +37,15 @@ class InsideResponses(Motion, HostResponses, DelayOperators):
             self._response = Response(self._form(), discrete=bool(self.dt))
         return settled_values(self._response(points), points, warn_infinite=warn_infinite)
 
-    def forced_response(
-        self,
-        timepts: ArrayLike | None = None,
-        inputs: Any = 0.0,
-        initial_state: ArrayLike = 0.0,
-        **settings: Any,
+    def _in_continuous_time(
+        self, kind: str, timepts: Any, inputs: Any, state: ArrayLike, settings: dict[str, Any]
     ) -> ct.TimeResponseData:
-        """Compute the response to any input, see `control.forced_response`.
-
-        Parameters
-        ----------
-        timepts : array_like
-            Times in s, increasing from 0 (continuous time), or every sample.
-        inputs : array_like or callable
-            Values at these times, linear between them in continuous time; or a function of an
-            array of K times that returns values of shape (inputs, K).
-        initial_state : array_like, optional
-            In discrete time of all states, in the order of ``state_labels``; in continuous time of
-            the core.
-        **settings
-            ``squeeze`` and ``transpose``; in discrete time those of `control.forced_response`. In
-            continuous time also ``history``, the constant input of each delay before time 0
-            (default 0); and ``tolerance``, the largest error relative to the largest output (1e-8).
-
-        Returns
-        -------
-        control.TimeResponseData
-
-        Notes
-        -----
-        In continuous time the delay differential equation is solved by the method of steps, with
-        all breaking points; all steps are halved until the result no longer changes [1]_.
-
-        References
-        ----------
-        .. [1] A. Bellen and M. Zennaro, Numerical Methods for Delay Differential Equations, Oxford
-           University Press 2003, chapters 2 and 3, doi:10.1093/acprof:oso/9780198506546.001.0001.
-        """
-        if self.dt:
-            return super().forced_response(timepts, inputs, initial_state, **settings)
-        return self._forced_motion(timepts, inputs, initial_state, **settings)
-
-    def initial_response(
-        self,
-        timepts: ArrayLike | float | None = None,
-        initial_state: ArrayLike = 0.0,
-        **settings: Any,
-    ) -> ct.TimeResponseData:
-        """Compute the response to an initial state, see `control.initial_response`.
-
-        In continuous time of the core, with ``history`` and ``tolerance`` as in `forced_response`.
-        """
-        if self.dt:
-            return super().initial_response(timepts, initial_state, **settings)
-        times = self._motion_times(timepts)
-        return self._forced_motion(times, 0.0, initial_state, **settings)
-
-    def step_response(
-        self,
-        timepts: ArrayLike | float | None = None,
-        initial_state: ArrayLike = 0.0,
-        **settings: Any,
-    ) -> ct.TimeResponseData:
-        """Compute the step responses, see `control.step_response`.
-
-        Without `timepts` until the slowest pole has decayed; in discrete time for 5000 samples at
-        most. In continuous time from zero initial state, and ``tolerance`` is accepted as in
-        `forced_response`.
-        """
-        if self.dt:
-            return super().step_response(timepts, initial_state, **settings)
-        if np.any(initial_state):
+        if kind == "step" and np.any(state):
             raise OptionError("a step response starts from rest; use sys.forced_response")
-        return self._unit_motion(timepts, "step", **settings)
-
-    def impulse_response(
-        self, timepts: ArrayLike | float | None = None, **settings: Any
-    ) -> ct.TimeResponseData:
-        """Compute the impulse responses from zero initial state, see `control.impulse_response`.
-
-        In continuous time the slope of the step response; impulses in the output are omitted.
-        """
-        if self.dt:
-            return super().impulse_response(timepts, **settings)
-        return self._unit_motion(timepts, "impulse", **settings)
+        if kind in ("step", "impulse"):
+            return self._unit_motion(timepts, kind, **settings)
+        times = self._motion_times(timepts) if kind == "initial" else timepts
+        return self._forced_motion(times, inputs, state, **settings)
 
     def markov(self, count: int) -> FloatArray:
         """Compute the unit-pulse response.
@@ -130,9 +54,8 @@ class InsideResponses(Motion, HostResponses, DelayOperators):
         -------
         ndarray, shape (count,) or (outputs, inputs, count)
         """
-        pulse = np.zeros(integer(count, "count", 1))
-        pulse[0] = 1.0
-        return self._one_by_one(pulse, "impulse_response")
+        self._refuse_continuous("impulse_response")
+        return self._channels(np.eye(1, integer(count, "count", 1))[0])
 
     def step(self, count: int) -> FloatArray:
         """Compute the response to a unit step on each input.
@@ -141,17 +64,12 @@ class InsideResponses(Motion, HostResponses, DelayOperators):
         -------
         ndarray, shape (count,) or (outputs, inputs, count)
         """
-        return self._one_by_one(np.ones(integer(count, "count", 1)), "step_response")
+        self._refuse_continuous("step_response")
+        return self._channels(np.ones(integer(count, "count", 1)))
 
-    def _one_by_one(self, signal: FloatArray, instead: str) -> FloatArray:
-        self._refuse_continuous(instead)
-        form, m = self._form(), self.ninputs
-        out = np.empty((self.noutputs, m, signal.size))
-        for j in range(m):
-            inputs = np.zeros((m, signal.size))
-            inputs[j] = signal
-            out[:, j] = recurrence(form, inputs)
-        return out[0, 0] if self.issiso() else out
+    def _channels(self, signal: FloatArray) -> FloatArray:
+        _, outputs = self._one_by_one(signal)
+        return outputs[0, 0] if self.issiso() else outputs
 
     def _simulated(self, inputs: FloatArray, state: FloatArray | None = None) -> FloatArray:
         return recurrence(self._form(), inputs, state)

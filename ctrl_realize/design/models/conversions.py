@@ -13,10 +13,11 @@ from ..._checks import positive
 from ..._wording import in_time
 from ...delayed import DelayedStateSpace, DelaySystem, delayed_ss
 from ...delayed.inside.conversions import check_logarithm
+from ...delayed.operands import plain
 from ...errors import OptionError, UnsuitableSystemError
 from ...numerics.arrays import FloatArray
 from ...numerics.blas_threads import single_threaded
-from ...numerics.internal_delays.form import delayed_ends
+from ...numerics.internal_delays.form import DelayForm, delayed_ends
 from ...numerics.state_space.sampling import continuous_ends
 from ...results import Result
 from ..siso import delayed_system, proper_ss
@@ -132,9 +133,10 @@ class ContinuousModel(Result):
     def system(self) -> DelaySystem:
         """Core and dead time as one continuous system, exact in loops; see `DelaySystem`."""
         core = self.core
-        form = delayed_ends(core.A, core.B, core.C, core.D, self.input_delays, self.output_delays)
+        form = DelayForm(core.A, core.B, core.C, core.D)
+        form = delayed_ends(form, self.input_delays, self.output_delays)
         return DelaySystem(
-            ct.StateSpace(form.A, form.B, form.C, form.D, 0, remove_useless_states=False),
+            plain(form, 0),
             form.delays,
             name=core.name,
             inputs=core.input_labels,
