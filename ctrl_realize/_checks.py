@@ -103,10 +103,27 @@ def complex_numbers(values: ArrayLike, what: str) -> NDArray[np.complex128]:
 def finite(values: ArrayLike, what: str) -> NDArray[np.float64]:
     """Convert finite real numbers to an array."""
     array = numbers(values, what)
-    bad = int(np.sum(~np.isfinite(array)))
-    if bad:
-        raise DataError(f"{what} has {bad} non-finite value{'s' if bad > 1 else ''}")
+    check_finite(array, what)
     return array
+
+
+def check_finite(values: NDArray[Any], what: str, *, allow_nan: bool = False) -> None:
+    """Refuse infinities, and NaN unless it marks a missing sample; the last axis is time."""
+    bad = np.isinf(values) if allow_nan else ~np.isfinite(values)
+    if bad.any():
+        count = int(bad.sum())
+        missing = not allow_nan and np.isnan(values).any() and what in ("input", "output")
+        hint = "; missing='keep' takes NaN as missing samples" if missing else ""
+        raise DataError(
+            f"{what} has {count} non-finite value{'s' if count > 1 else ''}, "
+            f"the first at index {first_index(bad)}{hint}"
+        )
+
+
+def first_index(marked: NDArray[np.bool_]) -> int:
+    """Return the first sample (last axis) that is marked in any channel."""
+    along = np.atleast_1d(marked)
+    return int(np.flatnonzero(along.reshape(-1, along.shape[-1]).any(axis=0))[0])
 
 
 def _array(values: Any, what: str) -> NDArray[Any]:

@@ -88,12 +88,10 @@ class Result(Drawable):
         @property
         def choices(self) -> tuple[str, ...]:
             """Choices that were made automatically, with reasons."""
-            ...
 
         @property
         def flags(self) -> tuple[Flag, ...]:
             """Warnings about the result."""
-            ...
 
     else:
         choices = ()
@@ -191,37 +189,30 @@ class ModelFit(Result):
         @property
         def dead_time(self) -> float | None:
             """Dead time in s."""
-            ...
 
         @property
         def interval(self) -> tuple[float, float] | None:
             """Interval of the dead time in s."""
-            ...
 
         @property
         def delay(self) -> float | None:
             """Dead time in samples."""
-            ...
 
         @property
         def delay_interval(self) -> tuple[float, float] | None:
             """Interval of the dead time in samples."""
-            ...
 
         @property
         def order(self) -> int | None:
             """Number of states of the core."""
-            ...
 
         @property
         def records(self) -> tuple[Any, ...]:
             """Records that were fitted."""
-            ...
 
         @property
         def _method(self) -> str:
             """Name of the method, in words."""
-            ...
 
     else:
         _method = "model with dead time"
@@ -409,17 +400,14 @@ class FractionalDelayFit(ModelFit):
         @property
         def dead_time(self) -> float:
             """Dead time in s."""
-            ...
 
         @property
         def interval(self) -> tuple[float, float]:
             """Interval of the dead time in s."""
-            ...
 
         @property
         def dt(self) -> float:
             """Sample time in s."""
-            ...
 
     @property
     def delay(self) -> float:

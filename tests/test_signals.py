@@ -57,7 +57,7 @@ def test_broken_time_is_named_with_its_first_bad_row(kind, match):
         ((T, ONES[:50], ONES), DataError, "input has 50 samples, time has 100"),
         ((T, ONES, np.ones((100, 2))), DataError, r"transposed, pass output.T"),
         ((T, ONES, np.where(T == 0.5, np.nan, 1)), DataError, "first at index 50"),
-        ((T, np.where(T > 0.97, np.inf, 1), ONES), DataError, "2 non-finite samples"),
+        ((T, np.where(T > 0.97, np.inf, 1), ONES), DataError, "2 non-finite values"),
         ((T, ["a"] * 100, ONES), DataError, "real numbers"),
         ((T, 1j * ONES, ONES), DataError, "real numbers"),
         ((T, np.ones((1, 1, 100)), ONES), DataError, r"\(signals, N\)"),

@@ -56,17 +56,10 @@ def run_tune(
     *,
     tuned: Mapping[str, Any],
     entered: Mapping[str, Any],
-    chosen: Mapping[str, Any],
-    tests: Mapping[str, Any],
-    record: Mapping[str, Any],
-    require: Sequence[str] | None,
-    run: Run,
+    **given: Any,
 ) -> int:
     """Identify one model of all records, tune, and return the exit code."""
-    return identified(
-        files, folder, chosen=chosen, joint=True, tests=tests, record=record, require=require,
-        run=run, tuning=Tuning(tuned, entered),
-    )  # fmt: skip
+    return identified(files, folder, joint=True, tuning=Tuning(tuned, entered), **given)
 
 
 def identified(

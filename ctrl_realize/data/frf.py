@@ -10,14 +10,23 @@ import control as ct
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .._checks import complex_numbers, numbers, positive, real, system_name, system_names
+from .._checks import (
+    check_finite,
+    complex_numbers,
+    finite,
+    numbers,
+    positive,
+    real,
+    system_name,
+    system_names,
+)
 from .._shown import as_asked, as_code
 from ..errors import DataError, OptionError
 from ..numerics.arrays import ComplexArray, FloatArray, read_only
 from ..numerics.statistics import circle_quantile
 from .frf_algebra import FRFAlgebra
 from .frf_operands import SAME
-from .record_checks import check_finite, check_size
+from .record_checks import check_size
 
 
 class MeasuredFRF(FRFAlgebra):
@@ -100,7 +109,7 @@ class MeasuredFRF(FRFAlgebra):
         outputs: Any = None,
     ) -> None:
         values = complex_numbers(response, "response")
-        grid = numbers(frequency_hz, "frequency_hz")
+        grid = finite(frequency_hz, "frequency_hz")
         if grid.ndim != 1 or grid.size == 0:
             raise DataError(f"frequency_hz has shape {grid.shape}; expected (K,), K >= 1")
         if values.ndim not in (1, 3) or values.shape[-1] != grid.size:
@@ -108,7 +117,6 @@ class MeasuredFRF(FRFAlgebra):
                 f"response has shape {values.shape}, frequency_hz has {grid.size} points; "
                 "expected (K,) or (outputs, inputs, K)"
             )
-        check_finite(grid, "frequency_hz")
         check_finite(values, "response")
         check_size(grid, "frequency_hz")
         # not the absolute value, which may overflow
@@ -304,9 +312,8 @@ def _beside(
 ) -> FloatArray | None:
     if values is None:
         return None
-    array = numbers(values, what)
+    array = finite(values, what)
     if array.shape != response.shape:
         raise DataError(f"{what} has shape {array.shape}, response has {response.shape}")
-    check_finite(array, what)
     check_size(array, what)
     return read_only(array[..., order])

@@ -9,13 +9,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.signal import sosfreqz
 
-from .._checks import numbers, one_of, positive
+from .._checks import finite, numbers, one_of, positive
 from ..errors import DataError
 from ..numerics.arrays import ComplexArray, FloatArray, read_only
 from ..numerics.constants import LARGEST
 from ..numerics.signals.filters import butterworth, butterworth_group_delay
 from ..results import Drawable
-from .record_checks import check_finite
 from .step import StepResponse
 
 Sampling = Literal["step-invariant", "impulse-invariant"]
@@ -126,7 +125,7 @@ class ImpulseResponse(Drawable):
         name: str = "",
         step: StepResponse | None = None,
     ) -> None:
-        values = _finite(markov, "markov")
+        values = finite(markov, "markov")
         if values.ndim not in (1, 3) or values.shape[-1] < 2 or values.size == 0:
             raise DataError(
                 f"markov has shape {values.shape}; expected (N,) or (outputs, inputs, N) with "
@@ -144,7 +143,7 @@ class ImpulseResponse(Drawable):
         fix(self, "markov", read_only(values))
         fix(self, "dt", seconds)
         fix(self, "filter", filter)
-        fix(self, "noise", None if noise is None else read_only(_finite(noise, "noise")))
+        fix(self, "noise", None if noise is None else read_only(finite(noise, "noise")))
         fix(self, "sampling", sampling)
         fix(self, "name", str(name))
         fix(self, "step", step)
@@ -181,9 +180,3 @@ class ImpulseResponse(Drawable):
         return (
             f"<ImpulseResponse{name}: {self.n_samples} samples of {self.dt:g} s{channels}{still}>"
         )
-
-
-def _finite(values: ArrayLike, what: str) -> FloatArray:
-    array = numbers(values, what)
-    check_finite(array, what)
-    return array

@@ -5,10 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from .._wording import in_time
-from ..numerics.arrays import FloatArray, read_only
+from ..numerics.arrays import FloatArray, lock_fields
 from ..results import Flag, Result
 from .impulse import ImpulseResponse
 
@@ -50,30 +49,12 @@ class ImpulseEstimate(ImpulseResponse, Result):
     noise_std: FloatArray
     method: str
     rows: int
-    choices: tuple[str, ...]
-    flags: tuple[Flag, ...]
+    choices: tuple[str, ...] = ()
+    flags: tuple[Flag, ...] = ()
 
-    def __init__(
-        self,
-        markov: ArrayLike,
-        dt: float,
-        *,
-        std: FloatArray,
-        noise_std: FloatArray,
-        method: str,
-        rows: int,
-        choices: tuple[str, ...] = (),
-        flags: tuple[Flag, ...] = (),
-        name: str = "",
-    ) -> None:
-        super().__init__(markov, dt, name=name)
-        fix = object.__setattr__
-        fix(self, "std", read_only(std))
-        fix(self, "noise_std", read_only(noise_std))
-        fix(self, "method", method)
-        fix(self, "rows", rows)
-        fix(self, "choices", choices)
-        fix(self, "flags", flags)
+    def __post_init__(self) -> None:
+        super().__init__(self.markov, self.dt, name=self.name)
+        lock_fields(self, "std", "noise_std")
 
     def _title(self) -> str:
         return f"Impulse response {self.name!r}" if self.name else "Impulse response"

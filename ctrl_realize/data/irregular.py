@@ -5,12 +5,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .._checks import numbers, positive
+from .._checks import positive
 from ..errors import DataError, OptionError, TimeAxisError
 from ..numerics.arrays import FloatArray, IntArray
 from ..numerics.signals.sample_grid import grid_rows, grid_step, regular_step, usual_step
-from ..numerics.signals.time_axis import axis_fault
-from .record_checks import axis_words, check_finite, check_shape, check_size
+from .record_checks import checked_signal, increasing_stamps
 from .resampling import MAX_DENSER, MIN_SAMPLES
 
 _AS_IT_IS = 1.5
@@ -30,13 +29,10 @@ def on_one_axis(
 
     See `Record.from_samples`.
     """
-    stamps = _stamps(time, "time", MIN_SAMPLES)
-    moves = stamps if input_time is None else _stamps(input_time, "input_time", 1)
-    u, y = numbers(input, "input"), numbers(output, "output")
-    for what, values, count in (("input", u, moves.size), ("output", y, stamps.size)):
-        check_shape(values, what, count)
-        check_finite(values, what, allow_nan=True)
-        check_size(values, what)
+    stamps = increasing_stamps(time, "time", MIN_SAMPLES)
+    moves = stamps if input_time is None else increasing_stamps(input_time, "input_time", 1)
+    u = checked_signal(input, "input", moves.size, allow_nan=True)
+    y = checked_signal(output, "output", stamps.size, allow_nan=True)
     known = ~np.isnan(np.atleast_2d(u))
     if not known.any(axis=1).all():
         raise DataError("the input has no samples: all of its values are NaN")
@@ -79,18 +75,6 @@ def on_one_axis(
     usual = step if regular else usual_step(measured)
     signals = axis, held[0] if u.ndim == 1 else held, spread
     return signals, usual if usual > _AS_IT_IS * step else step
-
-
-def _stamps(time: ArrayLike, what: str, least: int) -> FloatArray:
-    stamps = numbers(time, what)
-    if stamps.ndim != 1 or stamps.size < least:
-        raise DataError(f"{what} has shape {stamps.shape}; expected (N,), N >= {least}")
-    check_finite(stamps, what)
-    check_size(stamps, what)
-    fault = axis_fault(stamps) if np.any(np.diff(stamps) <= 0) else None
-    if fault is not None:
-        raise TimeAxisError(f"{axis_words(fault)}; {what} must increase from row to row")
-    return stamps
 
 
 def _means(values: FloatArray, rows: IntArray) -> FloatArray:

@@ -3,25 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import partial
 from types import MappingProxyType
 from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .._checks import numbers, one_of, positive, real, spelled_out
+from .._checks import check_finite, numbers, one_of, positive, real, spelled_out
 from .._shown import html_card, text_card
 from .._wording import ASSUMED, in_time, shown_unit, times_in
 from ..errors import DataError, OptionError, TimeAxisError
-from ..numerics.arrays import BoolArray, FloatArray, read_only
+from ..numerics.arrays import BoolArray, read_only
 from ..numerics.signals.time_axis import axis_fault
 from ..numerics.signals.time_axis import sample_time as mean_step
 from .record_checks import (
     axis_words,
-    check_finite,
-    check_shape,
-    check_size,
     checked_reference,
+    checked_signal,
     checked_units,
     labelled,
 )
@@ -106,15 +105,6 @@ class Record(RecordConversions):
         "units",
     )
 
-    time: FloatArray
-    input: FloatArray
-    output: FloatArray
-    reference: FloatArray | None
-    dt: float
-    sample_time: float
-    name: str
-    input_labels: tuple[str, ...]
-    output_labels: tuple[str, ...]
     missing: str
     units: Mapping[str, str]
 
@@ -138,14 +128,12 @@ class Record(RecordConversions):
                 f"time has shape {stamps.shape}; a record needs shape (N,) with N >= {MIN_SAMPLES}"
                 + "; numpy.ravel makes one of a column" * (stamps.ndim == 2 and 1 in stamps.shape)
             )
-        signals = {"input": numbers(input, "input"), "output": numbers(output, "output")}
-        for what, values in signals.items():
-            check_shape(values, what, stamps.size)
-        check_finite(stamps, "time")
         missing = one_of(missing, "missing", MISSING)
-        for what, values in signals.items():
-            check_finite(values, what, allow_nan=missing == "keep")
-            check_size(values, what)
+        u, y = (
+            checked_signal(values, what, stamps.size, allow_nan=missing == "keep")
+            for what, values in (("input", input), ("output", output))
+        )
+        check_finite(stamps, "time")
         fault = axis_fault(stamps)
         if fault is not None:
             raise TimeAxisError(
@@ -155,9 +143,9 @@ class Record(RecordConversions):
             )
         fix = object.__setattr__
         fix(self, "time", read_only(stamps))
-        fix(self, "input", read_only(signals["input"]))
-        fix(self, "output", read_only(signals["output"]))
-        fix(self, "reference", checked_reference(reference, signals["output"]))
+        fix(self, "input", read_only(u))
+        fix(self, "output", read_only(y))
+        fix(self, "reference", checked_reference(reference, y))
         fix(self, "dt", mean_step(stamps))
         fix(self, "sample_time", self._longer(sample_time))
         fix(self, "name", spelled_out(str(name)))
@@ -173,7 +161,7 @@ class Record(RecordConversions):
         )
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return _rebuild, (self._arguments(),)
+        return partial(Record, **self._arguments()), ()
 
     def __replace__(self, **changes: Any) -> Record:
         """Return a record with some arguments changed (`copy.replace`, from Python 3.13 on)."""
@@ -367,7 +355,7 @@ class Record(RecordConversions):
         levels = []
         for what, given, signal in (("input", input, self.input), ("output", output, self.output)):
             level = numbers(given, f"the baseline of the {what}")
-            check_finite(np.atleast_1d(level), f"the baseline of the {what}")
+            check_finite(level, f"the baseline of the {what}")
             if level.size != np.atleast_2d(signal).shape[0]:
                 raise DataError(
                     f"the baseline of the {what} has {level.size} values; expected one for each "
@@ -382,10 +370,6 @@ class Record(RecordConversions):
             if self.reference is None
             else np.concatenate([self.reference[..., :1], self.reference], axis=-1),
         )
-
-
-def _rebuild(arguments: dict[str, Any]) -> Record:
-    return Record(**arguments)
 
 
 def _count(number: int, noun: str) -> str:

@@ -6,12 +6,13 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from .._checks import numbers, spelled_out
-from ..errors import DataError, OptionError
-from ..numerics.arrays import BoolArray, ComplexArray, FloatArray, read_only
+from .._checks import check_finite, first_index, numbers, spelled_out
+from ..errors import DataError, OptionError, TimeAxisError
+from ..numerics.arrays import FloatArray, read_only
 from ..numerics.constants import LARGEST
-from ..numerics.signals.time_axis import UNIFORM_WITHIN, AxisFault
+from ..numerics.signals.time_axis import UNIFORM_WITHIN, AxisFault, axis_fault
 
 
 def check_shape(values: FloatArray, what: str, samples: int) -> None:
@@ -24,17 +25,28 @@ def check_shape(values: FloatArray, what: str, samples: int) -> None:
         raise DataError(f"{what} has {values.shape[-1]} samples, time has {samples}{hint}")
 
 
-def check_finite(values: FloatArray | ComplexArray, what: str, *, allow_nan: bool = False) -> None:
-    """Refuse infinities, and NaN unless it marks a missing sample; the last axis is time."""
-    bad = np.isinf(values) if allow_nan else ~np.isfinite(values)
-    if bad.any():
-        count = int(bad.sum())
-        missing = not allow_nan and np.isnan(values).any() and what in ("input", "output")
-        hint = "; missing='keep' takes NaN as missing samples" if missing else ""
-        raise DataError(
-            f"{what} has {count} non-finite sample{'s' if count > 1 else ''}, "
-            f"the first at index {_first(bad)}{hint}"
-        )
+def checked_signal(
+    given: ArrayLike, what: str, samples: int, *, allow_nan: bool = False
+) -> FloatArray:
+    """Return a signal (samples,) or (signals, samples) of plausible numbers."""
+    values = numbers(given, what)
+    check_shape(values, what, samples)
+    check_finite(values, what, allow_nan=allow_nan)
+    check_size(values, what)
+    return values
+
+
+def increasing_stamps(time: ArrayLike, what: str, least: int) -> FloatArray:
+    """Return time stamps (N,), at least so many, that increase from row to row."""
+    stamps = numbers(time, what)
+    if stamps.ndim != 1 or stamps.size < least:
+        raise DataError(f"{what} has shape {stamps.shape}; expected (N,), N >= {least}")
+    check_finite(stamps, what)
+    check_size(stamps, what)
+    fault = axis_fault(stamps) if np.any(np.diff(stamps) <= 0) else None
+    if fault is not None:
+        raise TimeAxisError(f"{axis_words(fault)}; {what} must increase from row to row")
+    return stamps
 
 
 def check_size(values: FloatArray, what: str) -> None:
@@ -43,7 +55,7 @@ def check_size(values: FloatArray, what: str) -> None:
     large = np.abs(values) > LARGEST
     if large.any():
         raise DataError(
-            f"{what} is larger than {LARGEST:g} at index {_first(large)}; check the file and "
+            f"{what} is larger than {LARGEST:g} at index {first_index(large)}; check the file and "
             "the unit"
         )
 
@@ -61,11 +73,6 @@ def checked_reference(given: Any, output: FloatArray) -> FloatArray | None:
     check_finite(values, "reference", allow_nan=True)
     check_size(values, "reference")
     return read_only(values)
-
-
-def _first(marked: BoolArray) -> int:
-    """Return the first sample that is marked in any channel."""
-    return int(np.flatnonzero(marked.reshape(-1, marked.shape[-1]).any(axis=0))[0])
 
 
 def labelled(

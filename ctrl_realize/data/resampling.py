@@ -6,10 +6,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .._checks import not_negative, numbers, positive
-from ..errors import DataError, OptionError, TimeAxisError
+from ..errors import OptionError, TimeAxisError
 from ..numerics.arrays import FloatArray
-from ..numerics.signals.time_axis import axis_fault, sample_time
-from .record_checks import axis_words, check_finite, check_shape, check_size
+from ..numerics.signals.time_axis import sample_time
+from .record_checks import check_shape, checked_signal, increasing_stamps
 
 MIN_SAMPLES = 3
 MAX_DENSER = 100
@@ -22,15 +22,8 @@ def resampled(
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Interpolate time, input and output; see `Record.resampled`."""
     not_negative(max_jitter, "max_jitter", "in sample steps")
-    stamps = numbers(time, "time")
-    if stamps.ndim != 1 or stamps.size < MIN_SAMPLES:
-        raise DataError(f"time has shape {stamps.shape}; expected (N,), N >= {MIN_SAMPLES}")
-    check_finite(stamps, "time")
-    check_size(stamps, "time")
+    stamps = increasing_stamps(time, "time", MIN_SAMPLES)
     steps = np.diff(stamps)
-    fault = axis_fault(stamps) if np.any(steps <= 0) else None
-    if fault is not None:
-        raise TimeAxisError(f"{axis_words(fault)}; resampling needs increasing time stamps")
     usual = float(np.median(steps))
     worst = int(np.argmax(steps))
     if steps[worst] > (1 + max_jitter) * usual:
@@ -49,9 +42,7 @@ def resampled(
     uniform = stamps[0] + step * np.arange(count)
     moved = []
     for what, given in (("input", input), ("output", output)):
-        values = numbers(given, what)
-        check_shape(values, what, stamps.size)
-        check_finite(values, what)
+        values = checked_signal(given, what, stamps.size)
         rows = np.atleast_2d(values)
         fresh = np.stack([_at(uniform, stamps, row, held=what == "input") for row in rows])
         moved.append(fresh[0] if values.ndim == 1 else fresh)

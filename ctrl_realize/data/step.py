@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from ..numerics.arrays import FloatArray, read_only
+from ..numerics.arrays import FloatArray, lock_fields
 from ..numerics.signals.edges import Edge
 from ..results import Drawable
 from .record import Record
@@ -104,10 +104,7 @@ class StepResponse(Drawable):
     record: Record | None = field(default=None, repr=False)
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "time", read_only(self.time))
-        object.__setattr__(self, "output", read_only(self.output))
-        object.__setattr__(self, "input", read_only(self.input))
-        object.__setattr__(self, "pre_step", read_only(self.pre_step))
+        lock_fields(self, "time", "output", "input", "pre_step")
 
     @property
     def n_samples(self) -> int:

@@ -14,7 +14,7 @@ from .._checks import numbers
 from ..data import Record
 from ..errors import DataError
 from ..io.atomic import replaced_when_complete
-from ..numerics.arrays import FloatArray, read_only
+from ..numerics.arrays import FloatArray, lock_fields
 from ..results import Result
 
 
@@ -34,8 +34,7 @@ class PlannedInput(Result):
     command: FloatArray
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "time", read_only(self.time))
-        object.__setattr__(self, "command", read_only(self.command))
+        lock_fields(self, "time", "command")
 
     def __repr__(self) -> str:
         words = duration_in_words(self.duration)

@@ -20,6 +20,12 @@ def read_only(values: FloatArray) -> FloatArray:
     return locked(np.asarray(values, dtype=np.float64))
 
 
+def lock_fields(result: object, *names: str) -> None:
+    """Make fields of a frozen dataclass, real numbers, read-only copies of what was given."""
+    for name in names:
+        object.__setattr__(result, name, read_only(getattr(result, name)))
+
+
 def without_gaps(values: FloatArray) -> FloatArray:
     """Interpolate missing values (NaN) of a signal (N,), for starting values and displays only."""
     missing = np.isnan(values)

@@ -9,7 +9,7 @@ import numpy as np
 from scipy.special import ndtri
 
 from ..data import Record
-from ..numerics.arrays import FloatArray, read_only
+from ..numerics.arrays import FloatArray, lock_fields
 from ..numerics.constants import Z_95
 from ..numerics.valve_test.play import fit_play, slope_of
 from ..numerics.valve_test.response import Noise
@@ -65,8 +65,7 @@ class StaticCurve:
     origin: str
 
     def __post_init__(self) -> None:
-        for name in ("command", "opening", "closing"):
-            object.__setattr__(self, name, read_only(getattr(self, name)))
+        lock_fields(self, "command", "opening", "closing")
 
 
 def dead_band_and_resolution(

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ..data import Record
-from ..numerics.arrays import FloatArray, read_only
+from ..numerics.arrays import FloatArray, lock_fields
 from ..numerics.signals.edges import Edge
 from ..numerics.signals.noise import quantisation_step
 from ..numerics.valve_test.response import UNKNOWN, Estimate, Noise, UnitResponse, steady_noise
@@ -135,7 +135,7 @@ class StepMetrics:
     response: FloatArray = field(repr=False)
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "response", read_only(self.response))
+        lock_fields(self, "response")
 
     @property
     def direction(self) -> str:

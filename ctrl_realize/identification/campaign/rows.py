@@ -123,19 +123,15 @@ class RowStore(Protocol):
 
     def opened(self) -> AbstractContextManager[None]:
         """Keep the file open for the duration of a block, which is faster."""
-        ...
 
     def load(self, key: str) -> CampaignRow | None:
         """Return the row stored under `key`; None if there is none."""
-        ...
 
     def packed(self, row: CampaignRow) -> CampaignRow:
         """Reduce the model of a row to what is stored."""
-        ...
 
     def save(self, rows: Sequence[tuple[str, CampaignRow]], settings: str) -> list[CampaignRow]:
         """Store packed rows under their keys, all or none; return them, with a warning if none."""
-        ...
 
 
 def identify_row(

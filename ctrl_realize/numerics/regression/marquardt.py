@@ -29,7 +29,6 @@ class Point(Protocol):
     @property
     def cost(self) -> float:
         """What is minimised."""
-        ...
 
 
 P = TypeVar("P", bound=Point)
