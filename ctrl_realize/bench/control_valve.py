@@ -27,8 +27,14 @@ _MOST_MA = 25.0
 """Largest current of the drive."""
 _STATIC_DECIMATION = 16
 """Sample time of the static test over that of the steps."""
+_STATIC_HOLD = 2.0
+"""Time in s at each of its levels."""
 _SINE_SAMPLES = 640
 _SINE_MEAN_MA = 12.0
+_SINE_PERIODS = 4.0
+"""Smallest number of periods of a sine that are recorded."""
+_SINE_ERROR_HZ = paper.STEPPED_SINE.frequency_accuracy_hz
+"""Largest error of its frequency, at most 1 %: the printed 0.1 Hz cannot apply at 0.1 Hz."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,8 +72,6 @@ class Valve:
     anti_aliasing: Literal["linear-phase", "analog"] | None
     drift: float
     hum: float
-    slew_limit: float | None
-    hysteresis: float
     actuator: tuple[Actuator, ...]
     actuator_at: Literal["stem", "input"]
     dead_time_scatter: float
@@ -207,16 +211,14 @@ class Valve:
         rng: Seed = None,
         *,
         levels: int = 11,
-        hold: float = 2.0,
         cycles: int = 3,
         ramp: float | None = 120.0,
-        name: str = "valve_static",
     ) -> Record:
         """Record the test of linearity and hysteresis: levels and a ramp over the whole range.
 
         Section 2.2 of the paper reports that the static relation is linear and hysteresis
-        negligible. Here the current rests at each level until the valve has settled, first from the
-        lowest to the highest level, then back, and again; a slow ramp up and down follows.
+        negligible. Here the current rests at each level for 2 s, until the valve has settled, first
+        from the lowest to the highest level, then back, and again; a slow ramp up and down follows.
         `ctrl_realize.valves.valve_report` evaluates the record: the steps between the levels give
         the lag along the ramp, and the ramp linearity, hysteresis and dead band.
 
@@ -226,14 +228,10 @@ class Valve:
             Generator or seed.
         levels : int, default 11
             Number of levels from 4 to 20 mA.
-        hold : float, default 2
-            Time in s at each level.
         cycles : int, default 3
             Number of times up and down.
         ramp : float or None, default 120
             Duration in s of the ramp in each direction; None for levels alone.
-        name : str, default "valve_static"
-            Of the record.
 
         Returns
         -------
@@ -243,18 +241,18 @@ class Valve:
         Raises
         ------
         OptionError
-            Less than three levels, no cycle, or a hold or ramp that is not a positive time.
+            Less than three levels, no cycle, or a ramp that is not a positive time.
 
         Examples
         --------
         >>> import ctrl_realize as cr
-        >>> cr.bench.valve(hysteresis=0.01).static_test(rng=1)
+        >>> cr.bench.valve().static_test(rng=1)
         <Record 'valve_static': 29440 samples of 0.0125 s, 1 input, 1 output>
         """
         integer(levels, "levels", 3)
         integer(cycles, "cycles", 1)
         dt = _STATIC_DECIMATION * self.dt
-        each = round(positive(hold, "hold", "time in s") / dt)
+        each = round(_STATIC_HOLD / dt)
         up = np.linspace(*paper.SETUP.current_range, levels)
         once = np.concatenate([up[1:], up[-2::-1]])
         held = np.repeat(np.concatenate([up[:1], np.tile(once, cycles)]), each)
@@ -266,7 +264,8 @@ class Valve:
         generator = np.random.default_rng(rng)
         moved = self._motion.of_held(held, dt, self._dead_time(generator))
         time = dt * np.arange(held.size, dtype=np.float64)
-        return recorded(self, time, held, moved + self._rest, generator, name, spikes=False)
+        level = moved + self._rest
+        return recorded(self, time, held, level, generator, "valve_static", spikes=False)
 
     def stepped_sine(
         self,
@@ -275,10 +274,7 @@ class Valve:
         points: int = paper.STEPPED_SINE.points,
         repeats: int = paper.STEPPED_SINE.repeats,
         band_hz: tuple[float, float] = paper.STEPPED_SINE.band_hz,
-        amplitude: float | None = None,
-        periods: float = 4.0,
         settle: float = 1.0,
-        frequency_error_hz: float = paper.STEPPED_SINE.frequency_accuracy_hz,
     ) -> tuple[tuple[Record, ...], ...]:
         """Record the paper's stepped sine: 500 frequencies from 0.1 to 50 Hz, 5 times each.
 
@@ -290,15 +286,9 @@ class Valve:
             Frequencies, spaced logarithmically, and records of each.
         band_hz : tuple of float
             Lowest and highest frequency.
-        amplitude : float, optional
-            Amplitude of the current in mA, about 12 mA. Default: `sine_amplitude` of the valve.
-        periods : float, default 4
-            Smallest number of periods to record.
         settle : float, default 1
-            Time in s recorded before those periods; the sine starts at t = 0, so that the record
-            contains the transient.
-        frequency_error_hz : float, default 0.1
-            Largest frequency error, at most 1 %: the printed 0.1 Hz cannot apply at 0.1 Hz.
+            Time in s recorded before at least four periods; the sine starts at t = 0, so that the
+            record contains the transient.
 
         Returns
         -------
@@ -309,7 +299,7 @@ class Valve:
         Raises
         ------
         OptionError
-            Invalid frequencies, counts or amplitude.
+            Invalid frequencies or counts.
 
         Examples
         --------
@@ -320,23 +310,21 @@ class Valve:
         """
         integer(points, "points", 1)
         integer(repeats, "repeats", 1)
-        if amplitude is None:
-            amplitude = self.sine_amplitude
-        positive(amplitude, "amplitude", "amplitude in mA")
-        positive(periods, "periods", "number of periods")
         low, high = (positive(edge, "band_hz", "frequency in Hz") for edge in band_hz)
         generator = np.random.default_rng(rng)
         mean_mm = _REST_MM + self.truth.gain * (_SINE_MEAN_MA - paper.SETUP.current_range[0])
         sweep = []
         for point, nominal in enumerate(np.geomspace(low, high, points), start=1):
-            error = min(abs(frequency_error_hz), 0.01 * nominal)
+            error = min(_SINE_ERROR_HZ, 0.01 * nominal)
             frequency_hz = nominal + generator.uniform(-error, error)
-            time = self._sine_time(frequency_hz, settle + periods / nominal)
+            time = self._sine_time(frequency_hz, settle + _SINE_PERIODS / nominal)
             omega = 2 * np.pi * frequency_hz
-            current = _SINE_MEAN_MA + amplitude * np.sin(omega * time)
+            current = _SINE_MEAN_MA + self.sine_amplitude * np.sin(omega * time)
             differing = repeats if self.dead_time_scatter else 1
             dead_times = [self._dead_time(generator) for _ in range(differing)]
-            moved = self._motion.of_sine(omega, amplitude, _SINE_MEAN_MA, time, dead_times)
+            moved = self._motion.of_sine(
+                omega, self.sine_amplitude, _SINE_MEAN_MA, time, dead_times
+            )
             sweep.append(
                 tuple(
                     recorded(
@@ -359,7 +347,7 @@ class Valve:
         if frequency_hz > 0.4 / dt:
             raise OptionError(
                 f"{frequency_hz:.4g} Hz for {span:.4g} s does not fit into {_SINE_SAMPLES} "
-                f"samples of {dt:g} s; use fewer periods or a shorter settle"
+                f"samples of {dt:g} s; use a shorter settle"
             )
         return dt * np.arange(_SINE_SAMPLES, dtype=np.float64)
 

@@ -7,7 +7,7 @@ from typing import Any, Literal
 
 from .. import paper
 from .._checks import integer, not_negative, one_of, positive, real
-from ..actuators import Actuator, Backlash, SlewRateLimit
+from ..actuators import Actuator, Backlash
 from ..actuators.base import actuators_of
 from .control_valve import Valve
 from .instruments import STROKE_MM
@@ -30,8 +30,6 @@ def valve(
     anti_aliasing: Literal["linear-phase", "analog"] | None = "linear-phase",
     drift: float = 0.0,
     hum: float = 0.0,
-    slew_limit: float | None = None,
-    hysteresis: float = 0.0,
     actuator: Actuator | Sequence[Actuator] | None = None,
     actuator_at: Literal["stem", "input"] = "stem",
     dead_time_scatter: float = 0.0,
@@ -76,14 +74,9 @@ def valve(
         Drift of the output per second, as a fraction of the stroke.
     hum : float, default 0
         Amplitude of 50 Hz hum, as a fraction of the stroke.
-    slew_limit : float, optional
-        Fastest motion of the stem, in strokes per second.
-    hysteresis : float, default 0
-        Backlash of the stem, as a fraction of the stroke.
     actuator : Actuator, or sequence of Actuator, optional
         Stiction, backlash, slew limits and so on of `ctrl_realize.actuators`, in % of the stroke (0
-        % at 4 mA, 100 % at 20 mA). `slew_limit` and `hysteresis` are short for the first two of
-        them.
+        % at 4 mA, 100 % at 20 mA).
     actuator_at : {"stem", "input"}
         Where they act: between the lags of the drive and the sensor, or before all dynamics.
     dead_time_scatter : float, default 0
@@ -124,9 +117,7 @@ def valve(
       total delay at DC  134.42 ms
     """
     given = {name: _checked(name, value) for name, value in locals().items()}
-    thin: list[Actuator] = [] if slew_limit is None else [SlewRateLimit(100.0 * slew_limit)]
-    thin += [Backlash(100.0 * hysteresis)] if hysteresis else []
-    parts = given["actuator"] = (*thin, *actuators_of(actuator))
+    parts = given["actuator"] = actuators_of(actuator)
     before = [
         lag(paper.SETUP.converter_cutoff_hz), lag(lag_hz), second_order_lag(actuator_hz, damping)
     ]  # fmt: skip
@@ -163,16 +154,15 @@ _CHECKS: dict[str, tuple[Callable[..., float], str]] = {
     "lag_hz": (positive, _FREQUENCY), "actuator_hz": (positive, _FREQUENCY),
     "lvdt_hz": (positive, _FREQUENCY), "damping": (positive, "damping ratio"),
     "noise": (not_negative, _FRACTION), "input_noise": (not_negative, _FRACTION),
-    "spikes": (not_negative, _FRACTION), "hysteresis": (not_negative, _FRACTION),
-    "hum": (not_negative, _FRACTION), "drift": (real, "fraction of the stroke per second"),
-    "slew_limit": (positive, "speed in strokes per second"),
+    "spikes": (not_negative, _FRACTION), "hum": (not_negative, _FRACTION),
+    "drift": (real, "fraction of the stroke per second"),
     "sine_amplitude": (positive, "amplitude in mA"),
 }  # fmt: skip
 _CHOICES = {
     "anti_aliasing": ("linear-phase", "analog"), "actuator_at": ("stem", "input"),
     "scatter_shape": ("normal", "exponential"),
 }  # fmt: skip
-_MAY_BE_NONE = ("lvdt_hz", "slew_limit", "bits", "anti_aliasing")
+_MAY_BE_NONE = ("lvdt_hz", "bits", "anti_aliasing")
 
 
 def _checked(name: str, value: Any) -> Any:
@@ -224,6 +214,6 @@ def paper_valve() -> Valve:
         dead_time_scatter=1.8 * sample,
         scatter_shape="exponential",
         noise=3e-5,
-        hysteresis=1e-4,
+        actuator=Backlash(0.01),
         sine_amplitude=0.12,
     )

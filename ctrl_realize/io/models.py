@@ -42,7 +42,6 @@ def save_model(
     path: str | os.PathLike[str],
     system: ct.StateSpace,
     *,
-    created: str | None = None,
     settings: Mapping[str, Any] | None = None,
     note: str = "",
 ) -> None:
@@ -58,8 +57,6 @@ def save_model(
         File to write; an existing one is replaced.
     system : DelayedStateSpace, DelaySystem or control.StateSpace
         A plain model must be discrete, with a sample time, and is stored with delay 0.
-    created : str, optional
-        Date to store; default: none, so that equal models give equal files.
     settings : mapping, optional
         Numbers, text and lists of them to store, such as how the model was found.
     note : str, optional
@@ -86,7 +83,7 @@ def save_model(
     ...     cr.load_model(Path(folder) / "valve.json")
     <DelayedStateSpace 'valve': u -> y, order 1, z^-37 (0.37 s), dt = 0.01 s>
     """
-    write_text(path, model_to_text(system, created=created, settings=settings, note=note))
+    write_text(path, model_to_text(system, settings=settings, note=note))
 
 
 def load_model(path: str | os.PathLike[str], *, max_states: int | None = None) -> Model:
@@ -144,7 +141,6 @@ def load_model(path: str | os.PathLike[str], *, max_states: int | None = None) -
 def model_to_text(
     system: ct.StateSpace,
     *,
-    created: str | None = None,
     settings: Mapping[str, Any] | None = None,
     note: str = "",
 ) -> str:
@@ -163,7 +159,6 @@ def model_to_text(
         "provenance": {
             "versions": {"python": platform.python_version()}
             | {package: version_of(package) for package in _PACKAGES},
-            "created": created,
             "note": note,
             "settings": dict(settings or {}),
         },

@@ -40,7 +40,7 @@ class TrimmedStatistics:
     std_error : float
         Standard error of `mean` as an estimate of the trimmed mean of the population.
     interval : tuple of float
-        Confidence interval of the trimmed mean.
+        95 % interval of the trimmed mean.
     count : int
         Number of remaining values.
     dropped : int
@@ -62,9 +62,7 @@ class TrimmedStatistics:
     dropped: int
 
 
-def trimmed_statistics(
-    values: FloatArray, trim: int, *, ddof: int = 1, confidence: float = 0.95
-) -> TrimmedStatistics:
+def trimmed_statistics(values: FloatArray, trim: int, *, ddof: int = 1) -> TrimmedStatistics:
     """Leave out the `trim` smallest and the `trim` largest values and summarize the rest.
 
     Parameters
@@ -75,8 +73,6 @@ def trimmed_statistics(
         Number of values to leave out at each end, ``0 <= 2 trim < size``.
     ddof : int, default 1
         Divisor of the variance is ``count - ddof``.
-    confidence : float, default 0.95
-        Confidence level of the interval.
 
     Returns
     -------
@@ -111,7 +107,7 @@ def trimmed_statistics(
     half_width = float("nan")
     if kept.size > 1:
         std_error = float(winsorized.std(ddof=1) / ((kept.size / n) * np.sqrt(n)))
-        half_width = float(special.stdtrit(kept.size - 1, 0.5 + confidence / 2)) * std_error
+        half_width = float(special.stdtrit(kept.size - 1, 0.975)) * std_error
     variance = float(kept.var(ddof=ddof)) if kept.size > ddof else float("nan")
     return TrimmedStatistics(
         mean=mean,

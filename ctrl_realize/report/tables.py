@@ -37,7 +37,7 @@ _IN_THE_HEADLINE = frozenset(
 """Rows of a fit with parameters that are in the headline of a report, or in their table."""
 
 
-def fit_tables(fit: ModelFit | None, title: str = "Details of the fit") -> list[Table]:
+def fit_tables(fit: ModelFit | None) -> list[Table]:
     """List how a model was found, and what was chosen and why."""
     if fit is None:
         return []
@@ -45,7 +45,11 @@ def fit_tables(fit: ModelFit | None, title: str = "Details of the fit") -> list[
     if fit.parameters:
         above |= {*_IN_THE_HEADLINE, fit.interval_label}
     choices = [("choice", choice) for choice in fit._choices()]
-    return [pairs(title, [*[row for row in fit._rows() if row[0] not in above], *choices])]
+    return [
+        pairs(
+            "Details of the fit", [*[row for row in fit._rows() if row[0] not in above], *choices]
+        )
+    ]
 
 
 def parameter_table(fit: ModelFit) -> Table:
@@ -78,10 +82,9 @@ def _parameter_row(one: Parameter, where: str = "") -> Row:
     return Row((label, value, error, interval, holds if interval else ""))
 
 
-def comparison_tables(
-    comparison: FRFComparison | None, title: str = "Comparison with the measured frequency response"
-) -> list[Table]:
+def comparison_tables(comparison: FRFComparison | None) -> list[Table]:
     """List the errors of a model with respect to a measurement, if there is one."""
+    title = "Comparison with the measured frequency response"
     return [] if comparison is None else [pairs(title, comparison._rows())]
 
 
@@ -90,10 +93,7 @@ def model_table(system: DelayedStateSpace) -> Table:
     core = system.delay_free
     rows = [
         ("x[k+1] = A x[k] + B u[k-d]", f"d = {system.delay}, dt = {system.dt!r} s"),
-        ("A", _matrix(core.A)),
-        ("B", _matrix(core.B)),
-        ("C", _matrix(core.C)),
-        ("D", _matrix(core.D)),
+        *((letter, _matrix(getattr(core, letter))) for letter in "ABCD"),
     ]
     return pairs(
         "State-space matrices of the model without its delay", rows, mono=True, folded=True

@@ -58,20 +58,13 @@ class Verdict:
     formula: str = ""
 
 
-def verdict_of(
-    system: DelayedStateSpace,
-    more_flags: Sequence[Flag] = (),
-    *,
-    comparison: FRFComparison | None = None,
-) -> Verdict:
+def verdict_of(system: DelayedStateSpace, *, comparison: FRFComparison | None = None) -> Verdict:
     """Judge a model by the flags of its fit.
 
     Parameters
     ----------
     system : DelayedStateSpace
         Model with its `fit`.
-    more_flags : sequence of Flag, optional
-        Further flags.
     comparison : FRFComparison, optional
         Comparison of the model with a measured frequency response, with its flags.
 
@@ -89,7 +82,7 @@ def verdict_of(
     >>> print(verdict.level, "-", verdict.judgement)
     caution - Use with care: see the remarks below.
     """
-    flags = (*_flags_in(comparison), *more_flags, *_flags_of(system))
+    flags = (*_flags_in(comparison), *_flags_of(system))
     return _verdict(system, flags, [*disagreement(comparison), *facts_of(system)])
 
 
@@ -116,15 +109,10 @@ def _verdict(
     return Verdict(level, headline, tuple(facts), _reasons(flags), judgement, formula_of(system))
 
 
-def campaign_verdict(
-    campaign: Campaign,
-    more_flags: Sequence[Flag] = (),
-    *,
-    comparison: FRFComparison | None = None,
-) -> Verdict:
-    """Judge a campaign by its final model, its flags and `more_flags`."""
+def campaign_verdict(campaign: Campaign, *, comparison: FRFComparison | None = None) -> Verdict:
+    """Judge a campaign by its final model, and its flags."""
     system = campaign.system
-    flags = (*_flags_in(comparison), *more_flags, *campaign.flags, *_flags_of(system))
+    flags = (*_flags_in(comparison), *campaign.flags, *_flags_of(system))
     facts = [
         *campaign._rows(),
         *gain_scatter(np.array([row.gain for row in campaign.good], dtype=np.float64)),

@@ -8,7 +8,7 @@ from scipy.linalg import expm
 
 import ctrl_realize as cr
 from ctrl_realize import bench, paper
-from ctrl_realize.actuators import Stiction
+from ctrl_realize.actuators import Backlash, Stiction
 
 CLEAN = {"noise": 0, "input_noise": 0, "spikes": 0, "bits": None}
 DT = 1 / 1280
@@ -84,7 +84,7 @@ def test_a_sine_through_an_actuator_is_that_of_the_simulated_current(place):
 
 
 def test_the_static_test_shows_the_dead_band_and_the_linear_relation():
-    valve = bench.valve(hysteresis=0.01)
+    valve = bench.valve(actuator=Backlash(1.0))
     report = cr.valves.valve_report(
         valve.static_test(rng=1, levels=6, cycles=1, ramp=60.0),
         command_range=(4, 20), travel_range=valve.travel_range, fit=False,

@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 
-from ..._checks import positive
 from ..._wording import in_time
 from ...delayed import DelayedStateSpace, DelaySystem
 from ...errors import ModelWarning, UnsuitableSystemError, warn_caller
@@ -121,9 +120,7 @@ def controller_responses(
 
 
 @single_threaded
-def performance(
-    plant: DelayedStateSpace | DelaySystem, controller: Any, total_time: float | None = None
-) -> Performance:
+def performance(plant: DelayedStateSpace | DelaySystem, controller: Any) -> Performance:
     """Compute the closed-loop responses to steps of set-point and load at the plant input.
 
     Parameters
@@ -132,10 +129,6 @@ def performance(
         Discrete; or a continuous `DelaySystem`, whose delay differential equation is solved.
     controller : system or float
         Of the plant's sample time, with negative feedback.
-    total_time : float, optional
-        Initial guess of the settling time in s; the responses are computed for longer until they
-        have settled. Default: dead time and twice the slowest lag of the plant, or the inverse of
-        the slowest crossover frequency if that is longer.
 
     Returns
     -------
@@ -169,12 +162,11 @@ def performance(
     >>> cr.design.performance(plant, 0.5).setpoint_error
     inf
     """
-    guess = None if total_time is None else positive(total_time, "total_time", "time in s")
     warn_unresolved(plant)
     loop = loop_time(plant, controller)
     if not plant.dt:
-        return continuous_performance(plant, controller, guess or loop)
-    setpoint, load, settled = settled_responses(plant, controller, guess or loop)
+        return continuous_performance(plant, controller, loop)
+    setpoint, load, settled = settled_responses(plant, controller, loop)
     if not settled:
         warnings.warn(
             f"the loop has not settled after {setpoint.size} samples of {plant.dt:g} s; its "

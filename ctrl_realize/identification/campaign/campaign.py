@@ -101,7 +101,7 @@ class Campaign(Result):
         """Delays of all records with a model, in samples."""
         return np.array([row.delay for row in self.good])
 
-    def statistics(self, trim: int | None = None, *, ddof: int = 1) -> TrimmedStatistics:
+    def statistics(self, trim: int | None = None) -> TrimmedStatistics:
         """Trimmed mean and variance of the delays, in samples.
 
         Parameters
@@ -109,8 +109,6 @@ class Campaign(Result):
         trim : int, optional
             Number of values left out at each end; the paper leaves out 3 of 40. Default: 3, or a
             quarter for fewer than twelve records.
-        ddof : int, optional
-            Divisor of the variance is ``count - ddof``.
 
         Raises
         ------
@@ -122,7 +120,7 @@ class Campaign(Result):
         drop = min(3, count // 4) if trim is None else integer(trim, "trim", 0)
         if 2 * drop >= count:
             raise DataError(f"trim={drop} removes all {count} delays")
-        return trimmed_statistics(self.delays, drop, ddof=ddof)
+        return trimmed_statistics(self.delays, drop)
 
     @property
     def best(self) -> CampaignRow:

@@ -12,7 +12,7 @@ from ..._checks import integer, one_of, real
 from ...data import ImpulseResponse
 from ...data.impulse_estimate import ImpulseEstimate
 from ...delayed import DelayedStateSpace
-from ...errors import DataError, DelayRangeError, OptionError
+from ...errors import DataError, OptionError
 from ...numerics.arrays import FloatArray, IntArray, locked, read_only
 from ...numerics.blas_threads import single_threaded
 from ...numerics.signals.edges import difference_noise
@@ -21,12 +21,10 @@ from ...results import Flag, ModelFit
 from .impulses import as_impulse, channels
 from .mimo_cores import (
     Assembly,
-    RealizationOptions,
     aligned_core,
     channel_iae,
     cores_one_by_one,
 )
-from .realize import HANKEL
 
 Structure = Literal["auto", "common", "rows", "columns"]
 NOISE_STDS = 5.0
@@ -178,12 +176,9 @@ def realize_mimo(
     impulse: ImpulseResponse | ArrayLike,
     order: int,
     *,
-    delays: ArrayLike | None = None,
     level: float = 0.1,
     structure: Structure = "auto",
     samples: int | None = None,
-    feedthrough: bool | None = None,
-    hankel: str = "square",
     dt: float | None = None,
 ) -> DelayedStateSpace:
     """Realize a MIMO response with few states, and a delay for each input-output pair.
@@ -199,16 +194,14 @@ def realize_mimo(
     order : int
         States of each model that the core consists of, without delays; fewer if the data have a
         lower rank.
-    delays : array_like of int, shape (p, m), optional
-        Delay of every channel, -1 if there is no response. Default: `delay_matrix`.
     level : float, default 0.1
         For `delay_matrix`.
     structure : {"auto", "common", "rows", "columns"}
         ``"common"`` uses one A even if delays remain inside the core; they then count in `order`.
     samples : int, optional
         Markov parameters after the delays to use; default: as many as all channels have.
-    feedthrough, hankel, dt : optional
-        As for `realize`.
+    dt : float, optional
+        Sample time in s, if `impulse` is an array.
 
     Returns
     -------
@@ -217,8 +210,6 @@ def realize_mimo(
 
     Raises
     ------
-    DelayRangeError
-        Delays of the wrong shape or longer than the data.
     DataError
         No channel has a response.
     OrderError, OptionError
@@ -254,27 +245,24 @@ def realize_mimo(
     data = as_impulse(impulse, dt)
     count = integer(order, "order", 1)
     choice = one_of(structure, "structure", ("auto", "common", "rows", "columns"))
-    hankel = one_of(hankel, "hankel", HANKEL)
-    markov = channels(data)
-    found = delay_matrix(data, level=level) if delays is None else given_delays(delays, markov)
+    found = delay_matrix(data, level=level)
     known = found >= 0
     if not known.any():
         raise DataError("no channel has a response; check that the input is connected")
     splits = split_delays(found, known)
     if choice == "auto" and not np.any(known & (found != np.add.outer(*splits[0]))):
         choice = "common"
-    options = RealizationOptions(samples, feedthrough, hankel)
     models: dict[str, Assembly] = {}
     if choice in ("common", "auto"):
-        candidates = [aligned_core(data, count, *split, options) for split in splits]
+        candidates = [aligned_core(data, count, *split, samples) for split in splits]
         models["common"] = min(candidates, key=lambda c: float(channel_iae(c, data).sum()))
     if choice in ("rows", "auto"):
-        models["rows"] = cores_one_by_one(data, count, found, options, 0)
+        models["rows"] = cores_one_by_one(data, count, found, samples, 0)
     if choice in ("columns", "auto"):
-        models["columns"] = cores_one_by_one(data, count, found, options, 1)
+        models["columns"] = cores_one_by_one(data, count, found, samples, 1)
     errors = {way: channel_iae(pieces, data) for way, pieces in models.items()}
     # The fewest states among those that explain the data about as well as the best.
-    enough = max(ALIKE * min(m.sum() for m in errors.values()), EXACT * len(markov))
+    enough = max(ALIKE * min(m.sum() for m in errors.values()), EXACT * data.noutputs)
     way = min(
         (way for way in models if errors[way].sum() <= enough), key=lambda w: models[w].states
     )
@@ -295,17 +283,3 @@ def realize_mimo(
             flags=pieces.flags,
         ),
     )
-
-
-def given_delays(delays: ArrayLike, markov: FloatArray) -> IntArray:
-    """Check given delays against the data."""
-    found = np.asarray(delays)
-    p, m, N = markov.shape
-    if found.shape != (p, m) or found.dtype.kind not in "iu" or np.any(found < -1):
-        raise DelayRangeError(
-            f"delays has shape {found.shape} and dtype {found.dtype}; expected whole numbers "
-            f">= -1 of shape {(p, m)}"
-        )
-    if found.max() > N - 3:
-        raise DelayRangeError(f"a delay of {found.max()} leaves none of the {N} samples to realize")
-    return found.astype(np.int64)

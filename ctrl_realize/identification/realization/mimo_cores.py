@@ -20,19 +20,6 @@ from .impulses import channels, check_samples
 from .realize import realize
 
 
-@dataclass(frozen=True)
-class RealizationOptions:
-    """Arguments of `realize` that are the same for all channels."""
-
-    samples: int | None
-    feedthrough: bool | None
-    hankel: str
-
-    def realize(self, impulse: ImpulseResponse, order: int) -> DelayedStateSpace:
-        """Realize with these options."""
-        return realize(impulse, order, **vars(self))
-
-
 @dataclass(frozen=True, eq=False)
 class Assembly:
     """Core of all channels, with the delays outside it and the orders of its models."""
@@ -79,22 +66,20 @@ def _aligned(markov: FloatArray, delays: IntArray) -> FloatArray:
 
 
 def _realized(
-    data: ImpulseResponse, markov: FloatArray, order: int, options: RealizationOptions
+    data: ImpulseResponse, markov: FloatArray, order: int, samples: int | None
 ) -> tuple[Matrices, tuple[Flag, ...]]:
     """Realize aligned data with at most `order` states."""
     moved: ImpulseResponse = ImpulseResponse(markov, data.dt, filter=data.filter, name=data.name)
-    padded = options.hankel == "padded"
-    samples = check_samples(moved, options.samples, order, 0, padded=padded, what="delays")
+    used = check_samples(moved, samples, order, 0, padded=False, what="delays")
     try:
-        system = options.realize(moved, order)
+        system = realize(moved, order, samples=samples)
     except OrderError:
-        found = realize_at(markov, 0, samples, order, padded=padded).singular_values[:order]
+        found = realize_at(markov, 0, used, order, padded=False).singular_values[:order]
         rank = int(np.count_nonzero(found))
         if rank == 0:
             p, m, _ = markov.shape
-            direct = np.zeros((p, m)) if options.feedthrough is False else markov[:, :, 0]
-            return (np.zeros((0, 0)), np.zeros((0, m)), np.zeros((p, 0)), direct), ()
-        system = options.realize(moved, rank)
+            return (np.zeros((0, 0)), np.zeros((0, m)), np.zeros((p, 0)), markov[:, :, 0]), ()
+        system = realize(moved, rank, samples=samples)
     core = system.delay_free
     return (core.A, core.B, core.C, core.D), fit_of(system, Realization).flags
 
@@ -104,24 +89,24 @@ def aligned_core(
     order: int,
     outputs: IntArray,
     inputs: IntArray,
-    options: RealizationOptions,
+    samples: int | None,
 ) -> Assembly:
     """Align all channels by delays of inputs and outputs, and realize them with one A."""
     moved = _aligned(channels(data), np.add.outer(outputs, inputs))
-    core, flags = _realized(data, moved, order, options)
+    core, flags = _realized(data, moved, order, samples)
     before, behind = (tuple(int(d) for d in share) for share in (inputs, outputs))
     return Assembly(core, before, behind, (core[0].shape[0],), flags)
 
 
 def cores_one_by_one(
-    data: ImpulseResponse, order: int, found: IntArray, options: RealizationOptions, axis: int
+    data: ImpulseResponse, order: int, found: IntArray, samples: int | None, axis: int
 ) -> Assembly:
     """Realize every output (`axis` 0) or input (1) separately, with tapped delay lines."""
     markov = channels(data)
     first, full = _first_taps(found, axis)
     count = full.shape[axis]
     aligned = [_aligned(markov.take([k], axis), full.take([k], axis)) for k in range(count)]
-    realized = [_realized(data, part, order, options) for part in aligned]
+    realized = [_realized(data, part, order, samples) for part in aligned]
     parts = [core for core, _ in realized]
     join = joined_columns if axis else joined_rows
     core = join(parts, full - np.expand_dims(first, axis))

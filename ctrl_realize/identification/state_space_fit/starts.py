@@ -12,13 +12,13 @@ from numpy.typing import ArrayLike
 from ..._flags import Flag, flagged
 from ...data import Record
 from ...delayed import DelayedStateSpace, fit_of
-from ...errors import DataError, DataWarning
-from ...numerics.arrays import IntArray
+from ...errors import DataError, DataWarning, DelayRangeError
+from ...numerics.arrays import FloatArray, IntArray
 from ...numerics.constants import VERY_STRONG
 from ...numerics.output_error.margins import CLOSE
 from ...numerics.state_space.delay_split import split_delays
 from ..impulse.from_io import Method, Start, impulse_from_io
-from ..realization.mimo import delay_matrix, given_delays
+from ..realization.mimo import delay_matrix
 from .result import StateSpaceFit, fitted_system
 from .search import ENOUGH_SAMPLES, ORDERS, Candidate, Search, Shares
 
@@ -106,7 +106,7 @@ def _from_start(
         )
     search = Search(group, markov, max(asked or ORDERS), enough)
     orders = search.orders(asked)
-    found = delay_matrix(impulse, level=LEVEL) if delays is None else given_delays(delays, markov)
+    found = delay_matrix(impulse, level=LEVEL) if delays is None else _given_delays(delays, markov)
     shares = _split(found)
     fits = search.by_order(orders, shares, feedthrough=feedthrough is not False)
     best = min(fits, key=lambda c: c.bic)
@@ -168,3 +168,17 @@ def _split(delays: IntArray) -> Shares:
     """Split delays into inputs and outputs; channels without response follow the others."""
     outputs, inputs = split_delays(delays, delays >= 0)[0]
     return tuple(int(d) for d in inputs), tuple(int(d) for d in outputs)
+
+
+def _given_delays(delays: ArrayLike, markov: FloatArray) -> IntArray:
+    """Check given delays against the data."""
+    found = np.asarray(delays)
+    p, m, N = markov.shape
+    if found.shape != (p, m) or found.dtype.kind not in "iu" or np.any(found < -1):
+        raise DelayRangeError(
+            f"delays has shape {found.shape} and dtype {found.dtype}; expected whole numbers "
+            f">= -1 of shape {(p, m)}"
+        )
+    if found.max() > N - 3:
+        raise DelayRangeError(f"a delay of {found.max()} leaves none of the {N} samples to realize")
+    return found.astype(np.int64)

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..._checks import check_type, integer, real
+from ..._checks import check_type
 from ..._wording import named
 from ...data import Record, StepEdge, StepResponse
 from ...data.given import as_record, check_complete, check_input
@@ -16,24 +16,22 @@ from ...numerics.constants import SMALLEST
 from ...numerics.signals.baseline import rest_line
 from ...numerics.signals.edges import difference_noise, find_edges
 
+_MIN_SHARE = 0.1
+"""Smallest edge to detect, as a fraction of the range of the input."""
 
-def detect_step(
-    record: Record, *, spike_samples: int | None = None, min_share: float = 0.1
-) -> StepEdge:
+
+def detect_step(record: Record) -> StepEdge:
     """Find the step in the input of a record.
 
-    Spikes, noise, slow drift and an offset of the input do not affect the result, and no samples
-    before the step are needed. Of several edges the first large one is returned (at least half as
-    high as the highest); `edges` lists all of them.
+    Spikes (of up to 0.1 % of the record, between 3 and 50 samples), noise, slow drift and an offset
+    of the input do not affect the result, and no samples before the step are needed. Of several
+    edges the first large one is returned (at least half as high as the highest); `edges` lists all
+    that are at least a tenth of the input's range.
 
     Parameters
     ----------
     record : Record
         One input signal.
-    spike_samples : int, optional
-        Longest spike to ignore, in samples. Default: 0.1 % of the record, between 3 and 50.
-    min_share : float, optional
-        Smallest edge to detect, as a fraction of the range of the input.
 
     Returns
     -------
@@ -66,27 +64,16 @@ def detect_step(
     >>> edge.index, edge.baseline, edge.amplitude
     (100, 4.0, 16.0)
     """
-    return found_step(record, spike_samples, min_share)
+    return found_step(record)
 
 
-def found_step(
-    record: Record,
-    spike_samples: int | None = None,
-    min_share: float = 0.1,
-    most: int | None = None,
-) -> StepEdge:
+def found_step(record: Record, most: int | None = None) -> StepEdge:
     """As `detect_step`, with at most `most` + 1 edges, because there may be millions."""
     signal = _single(as_record(record).input, "input", record)
-    if spike_samples is None:
-        spikes = int(np.clip(record.n_samples // 1000, 3, 50))
-        # A short record does not contain a window of that length on both sides of its step.
-        spikes = min(spikes, max((record.n_samples - 3) // 6, 0))
-    else:
-        spikes = integer(spike_samples, "spike_samples", 0, record.n_samples // 3)
-    share = real(min_share, "min_share", "part of the input's range, above 0 and below 1")
-    if not 0 < share < 1:
-        raise OptionError(f"min_share={share:g}; expected a value above 0 and below 1")
-    found = find_edges(signal, spikes, share, most)
+    # A short record does not contain a window of that length on both sides of its step.
+    spikes = int(np.clip(record.n_samples // 1000, 3, 50))
+    spikes = min(spikes, max((record.n_samples - 3) // 6, 0))
+    found = find_edges(signal, spikes, _MIN_SHARE, most)
     if not found and np.ptp(signal) == 0:
         raise NoStepError(
             f"no step in the input {_of(record)}: it is {signal[0]:.6g} throughout. If the "

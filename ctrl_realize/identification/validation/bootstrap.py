@@ -150,7 +150,6 @@ def bootstrap(
     estimator: Estimator = fit_output_error,
     *,
     repeats: int = 200,
-    block: int | None = None,
     seed: int = 0,
     n_jobs: int = 1,
 ) -> Bootstrap:
@@ -168,9 +167,6 @@ def bootstrap(
         ``functools.partial(identify, method="scan")``.
     repeats : int, optional
         Number of draws.
-    block : int, optional
-        Length of the blocks in samples. Default: three times the correlation time of the residual,
-        so that coloured noise stays coloured.
     seed : int, optional
         Seed or generator; the draws do not depend on `n_jobs`.
     n_jobs : int, optional
@@ -231,7 +227,7 @@ def bootstrap(
     else:
         kind = "residuals"
         parts = [_model_and_residual(system, record) for record in several]
-        length = _block(parts, block)
+        length = _block(parts)
         parts = _scaled(parts, length, system)
         draws = [
             [
@@ -298,10 +294,9 @@ def _model_and_residual(system: DelayedStateSpace, record: Record) -> tuple[Floa
     return model, output - model
 
 
-def _block(parts: list[tuple[FloatArray, FloatArray]], block: int | None) -> int:
+def _block(parts: list[tuple[FloatArray, FloatArray]]) -> int:
+    """Length of the blocks in samples, so that coloured noise stays coloured."""
     shortest = min(residual.size for _, residual in parts)
-    if block is not None:
-        return integer(block, "block", 1, shortest)
     time = max(correlation_time(residual) for _, residual in parts)
     return int(np.clip(round(_BLOCK_OVER_CORRELATION * time), 1, max(shortest // 4, 1)))
 

@@ -13,7 +13,6 @@ from ..._wording import in_percent
 from ...data import Record
 from ...data.given import as_record
 from ...delayed import DelayedStateSpace
-from ...delayed.simulation import Start
 from ...errors import DataError
 from ...numerics.blas_threads import single_threaded
 from ...results import Result
@@ -118,10 +117,6 @@ class ModelComparison(Result):
 def compare(
     models: Mapping[str, ct.StateSpace] | Sequence[ct.StateSpace] | ct.StateSpace,
     record: Record,
-    *,
-    lags: int = 25,
-    confidence: float = 0.99,
-    start: Start = "estimate",
 ) -> ModelComparison:
     """Compare models with a record, best one that they were not fitted to.
 
@@ -131,8 +126,6 @@ def compare(
         Discrete models with the sample time of the record. Those of a sequence are called by their
         names, numbered where these are equal.
     record : Record
-    lags, confidence, start
-        As for `analyse_residuals`.
 
     Returns
     -------
@@ -182,10 +175,7 @@ def compare(
         raise DataError("no models; expected at least one, such as [model] or {'mine': model}")
     return ModelComparison(
         names=tuple(name for name, _ in named),
-        checks=tuple(
-            analyse_residuals(model, given, lags=lags, confidence=confidence, start=start)
-            for _, model in named
-        ),
+        checks=tuple(analyse_residuals(model, given) for _, model in named),
         estimation_data=tuple(_was_fitted(model, given) for _, model in named),
         record=given,
     )

@@ -9,7 +9,7 @@ import numpy as np
 
 from ...data import Record
 from ...data.given import as_records
-from ...delayed.simulation import Start, simulate_record
+from ...delayed.simulation import simulate_record
 from ...errors import DataError
 from ...numerics.blas_threads import single_threaded
 from ...numerics.signals.correlation import fit_percent
@@ -21,10 +21,7 @@ if TYPE_CHECKING:
 
 @single_threaded
 def cross_validate(
-    systems: Mapping[str, Any] | ct.StateSpace,
-    records: Record | Sequence[Record],
-    *,
-    start: Start = "estimate",
+    systems: Mapping[str, Any] | ct.StateSpace, records: Record | Sequence[Record]
 ) -> pd.DataFrame:
     """Tabulate the fit in percent of several models on several records.
 
@@ -34,8 +31,6 @@ def cross_validate(
         Models by name, or a single one; any that `analyse_residuals` accepts.
     records : Record or sequence of Record
         Preferably records that no model was fitted to. Equal names are numbered.
-    start : {"estimate", "rest"}
-        As for `analyse_residuals`.
 
     Returns
     -------
@@ -78,7 +73,7 @@ def cross_validate(
         raise DataError("no models; expected at least one, such as {'mine': model}")
 
     def mean_fit(system: Any, record: Record) -> float:
-        simulated = simulate_record(system, record, start, gaps=True)
+        simulated = simulate_record(system, record, "estimate", gaps=True)
         measured = np.atleast_2d(record.output)
         return float(fit_percent(measured[:, record.seen], simulated[:, record.seen]).mean())
 
