@@ -10,7 +10,7 @@ from typing import Any, TypeVar, cast
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .errors import DataError, OptionError
+from .errors import DataError, OptionError, UnsuitableSystemError
 
 Choice = TypeVar("Choice")
 
@@ -68,6 +68,17 @@ def integer(value: Any, name: str, low: int, high: int | None = None) -> int:
     if number < low or (high is not None and number > high):
         raise OptionError(f"{name}={number}; expected a whole number {limits}")
     return number
+
+
+def integers(
+    given: int | Iterable[int], name: str, low: int, high: int | None = None
+) -> tuple[int, ...]:
+    """Return a whole number, or several different ones in rising order, in low...high."""
+    several = given if isinstance(given, Iterable) else (given,)
+    found = tuple(sorted({integer(one, name, low, high) for one in several}))
+    if not found:
+        raise OptionError(f"{name} is empty; expected at least one number")
+    return found
 
 
 def numbers(values: ArrayLike, what: str) -> NDArray[np.float64]:
@@ -163,6 +174,21 @@ def check_type(
     """Refuse a value that is not of a type, or of one of several."""
     if not isinstance(value, kind):
         raise error(f"{name} is a {type(value).__name__}; expected {expected}")
+
+
+def sample_time_of(system: Any) -> float | None:
+    """Sample time of a system in s, 0 if it is continuous; None for a gain of any time base.
+
+    Raises
+    ------
+    UnsuitableSystemError
+        ``dt=True``: discrete, without a sample time.
+    """
+    if system.dt is True:
+        raise UnsuitableSystemError(
+            f"{system.name!r} is discrete without a sample time (dt=True); set its dt in s"
+        )
+    return None if system.dt is None else float(system.dt)
 
 
 def spelled_out(text: str) -> str:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import ClassVar, NamedTuple
 
 from .._checks import positive, real
 from ..errors import OptionError
@@ -23,6 +24,14 @@ from .base import Actuator, State
 from .limits import within_start
 
 
+class _Model(NamedTuple):
+    """One sample, the state at rest, and the positions of a whole command."""
+
+    step: Callable[[StemState, float, float, float], tuple[StemState, float]]
+    at_rest: Callable[[float, float, float, float], StemState]
+    simulated: Callable[[FloatArray, float, float, float], FloatArray]
+
+
 @dataclass(frozen=True)
 class _StickAndJump(Actuator):
     """A model with the two parameters S and J, and the state of a stem with a memory."""
@@ -32,6 +41,8 @@ class _StickAndJump(Actuator):
     start: float = 0.0
 
     _states: ClassVar[tuple[str, ...]] = StemState._fields
+    _author: ClassVar[str]
+    _model: ClassVar[_Model]
 
     def __post_init__(self) -> None:
         positive(self.S, "S", "width of dead band plus stick band")
@@ -39,17 +50,20 @@ class _StickAndJump(Actuator):
             raise OptionError(f"J={self.J!r}; expected a slip jump >= 0, and usually at most S")
         within_start(self.start)
 
+    def __str__(self) -> str:
+        return f"stiction ({self._author}): S = {self.S:g}, J = {self.J:g}"
+
     def _rest(self, command: float) -> State:
-        return tuple(float(part) for part in self._at_rest(command))
+        return tuple(map(float, self._model.at_rest(command, self.S, self.J, self.start)))
 
-    def _at_rest(self, command: float) -> StemState:
-        return stem_at_rest(command, self.S, self.J, self.start)
+    def _advance(self, state: State, command: float, dt: float) -> tuple[State, float]:
+        last, position, way, rest, moving, paused, slope = state
+        stem = StemState(last, position, way, rest, moving > 0.5, paused > 0.5, slope)
+        after, position = self._model.step(stem, command, self.S, self.J)
+        return tuple(map(float, after)), position
 
-
-def _stem(state: State) -> StemState:
-    """Return a state of plain numbers as that of a stem."""
-    command, position, direction, rest, moving, paused, slope = state
-    return StemState(command, position, direction, rest, moving > 0.5, paused > 0.5, slope)
+    def _simulated(self, command: FloatArray, dt: float) -> FloatArray:
+        return self._model.simulated(command, self.S, self.J, self.start)
 
 
 @dataclass(frozen=True)
@@ -93,18 +107,8 @@ class Stiction(_StickAndJump):
     [-1.0, 3.0, 7.0, 7.0, 7.0, 4.0, 3.0]
     """
 
-    def __str__(self) -> str:
-        return f"stiction (Choudhury): S = {self.S:g}, J = {self.J:g}"
-
-    def _advance(self, state: State, command: float, dt: float) -> tuple[State, float]:
-        after, position = choudhury_step(_stem(state), command, self.S, self.J)
-        return tuple(float(part) for part in after), position
-
-    def _at_rest(self, command: float) -> StemState:
-        return choudhury_at_rest(command, self.S, self.J, self.start)
-
-    def _simulated(self, command: FloatArray, dt: float) -> FloatArray:
-        return choudhury(command, self.S, self.J, self.start)
+    _author = "Choudhury"
+    _model = _Model(choudhury_step, choudhury_at_rest, choudhury)
 
 
 @dataclass(frozen=True)
@@ -141,15 +145,8 @@ class KanoStiction(_StickAndJump):
     [-1.0, 3.0, 7.0, 7.0, 7.0, 7.0, 4.0, 3.0]
     """
 
-    def __str__(self) -> str:
-        return f"stiction (Kano): S = {self.S:g}, J = {self.J:g}"
-
-    def _advance(self, state: State, command: float, dt: float) -> tuple[State, float]:
-        after, position = kano_step(_stem(state), command, self.S, self.J)
-        return tuple(float(part) for part in after), position
-
-    def _simulated(self, command: FloatArray, dt: float) -> FloatArray:
-        return kano(command, self.S, self.J, self.start)
+    _author = "Kano"
+    _model = _Model(kano_step, stem_at_rest, kano)
 
 
 @dataclass(frozen=True)

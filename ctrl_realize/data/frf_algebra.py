@@ -25,6 +25,7 @@ from typing import Any
 import control as ct
 import numpy as np
 
+from .._checks import sample_time_of
 from ..errors import DataError, DataWarning, warn_caller
 from ..numerics.arrays import ComplexArray, FloatArray
 from .frf_operands import (
@@ -33,13 +34,12 @@ from .frf_operands import (
     blocks,
     check_shapes,
     common_hold,
-    in_z,
     is_number,
     last_axis,
     matmul,
     one_hold,
     power,
-    same_hold,
+    same_time,
     warn_of_hold,
 )
 
@@ -73,7 +73,8 @@ class FRFAlgebra(ct.FrequencyResponseData):  # type: ignore[misc]  # control is 
             self._check_same_frequencies(other)
             return Operand(np.asarray(other.frdata))
         if isinstance(other, (ct.StateSpace, ct.TransferFunction)):
-            points = np.exp(1j * self.omega * other.dt) if in_z(other) else 1j * self.omega
+            dt = sample_time_of(other)
+            points = np.exp(1j * self.omega * dt) if dt else 1j * self.omega
             return Operand(np.asarray(other(points, squeeze=False)))
         if isinstance(other, (int, float, complex, np.number)):
             return Operand(np.full((1, 1, 1), complex(other)))
@@ -224,7 +225,7 @@ class FRFAlgebra(ct.FrequencyResponseData):  # type: ignore[misc]  # control is 
         if one.measured != two.measured and (one.measured or one.is_scalar):
             coherence = one.coherence if one.measured else two.coherence
         hold = one.hold if two.hold is None else None
-        if two.hold is not None and (one.hold is None or not same_hold(one.hold, two.hold)):
+        if two.hold is not None and (one.hold is None or not same_time(one.hold, two.hold)):
             warn_of_hold("a quotient", two.hold)
         return self._made("a quotient", values, variance, (one, two), hold, coherence)
 

@@ -41,16 +41,6 @@ def is_number(value: Any) -> bool:
     return isinstance(value, (int, float, complex, np.number))
 
 
-def in_z(system: Any) -> bool:
-    """Whether a system is sampled, with a sample time that is known."""
-    if system.dt is True:
-        raise DataError(
-            f"{system.name!r} is discrete with dt=True; set its sample time in s, so that it "
-            "can be evaluated at these frequencies"
-        )
-    return bool(system.isdtime(strict=True))
-
-
 def power(values: ComplexArray) -> FloatArray:
     """Square of the magnitude."""
     return np.asarray(values.real**2 + values.imag**2)
@@ -85,7 +75,7 @@ def check_shapes(one: Operand, two: Operand, *, same: bool) -> None:
     raise DataError(f"{p} outputs, {m} inputs and {q} outputs, {n} inputs; {how}")
 
 
-def same_hold(one: float, two: float) -> bool:
+def same_time(one: float, two: float) -> bool:
     """Whether two sample times are equal."""
     return abs(one - two) <= 1e-6 * two
 
@@ -102,7 +92,7 @@ def warn_of_hold(what: str, hold: float) -> None:
 def common_hold(one: Operand, two: Operand, what: str) -> float | None:
     """Hold of a sum: that of both operands."""
     known = [side.hold for side in (one, two) if side.hold is not None]
-    if len(known) == 2 and same_hold(*known):
+    if len(known) == 2 and same_time(*known):
         return known[0]
     if known:
         warn_of_hold(what, known[0])

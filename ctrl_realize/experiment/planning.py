@@ -298,10 +298,7 @@ def _relay(setting: _Setting, count: int, middle: float, half: float) -> FloatAr
 
 def _curve(setting: _Setting, count: int, kind: str) -> ErrorCurve:
     """Errors of tests of several lengths, and today's."""
-    own = _Setting(
-        setting.bounds[:1], setting.gradients[:1], setting.noise, setting.limits,
-        setting.output_limit, (), setting.dt,
-    )  # fmt: skip
+    own = replace(setting, bounds=setting.bounds[:1], gradients=setting.gradients[:1], records=())
     lengths = [n for n in (round(part * count) for part in _LENGTHS)
                if 4 * _FEWEST <= n <= _MOST_SAMPLES]  # fmt: skip
     found = [{one.kind: one.std for one in _candidates(own, n)} for n in lengths]

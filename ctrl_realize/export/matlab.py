@@ -83,20 +83,15 @@ def to_matlab(
         text = _pid(system, identifier(name or str(system.name), "C", CALLED))
     elif isinstance(system, ProcessModel):
         text = _process(system, identifier(name or "plant", "plant", CALLED))
-    elif isinstance(system, ContinuousModel):
-        variable = identifier(name or str(system.core.name), "plant", CALLED)
-        delays = list(system.input_delays), list(system.output_delays)
-        text = _state_space(system.core, str(system.core.name), variable, "0", *delays)
-    elif isinstance(system, DelayedStateSpace):
-        variable = identifier(name or str(system.name), "plant", CALLED)
-        text = _state_space(
-            system.delay_free,
-            str(system.name),
-            variable,
-            _number(float(system.dt)),
-            list(system.input_delays),
-            list(system.output_delays),
+    elif isinstance(system, ContinuousModel | DelayedStateSpace):
+        core, named, dt = (
+            (system.core, system.core, "0")
+            if isinstance(system, ContinuousModel)
+            else (system.delay_free, system, _number(float(system.dt)))
         )
+        variable = identifier(name or str(named.name), "plant", CALLED)
+        delays = list(system.input_delays), list(system.output_delays)
+        text = _state_space(core, str(named.name), variable, dt, *delays)
     elif isinstance(system, DelaySystem):
         text = _internal_delays(system, identifier(name or str(system.name), "plant", CALLED))
     else:

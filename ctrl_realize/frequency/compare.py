@@ -8,17 +8,19 @@ from typing import Any, Literal
 import control as ct
 import numpy as np
 
-from .._checks import check_type, one_of
+from .._checks import check_type, one_of, sample_time_of
 from .._flags import Flag, flagged
+from ..data.frf_operands import same_time
 from ..delayed import DelayedStateSpace
 from ..errors import DataError, OptionError, UnsuitableSystemError
 from ..numerics.arrays import ComplexArray, FloatArray, locked, read_only
 from ..numerics.blas_threads import single_threaded
 from ..numerics.constants import SMALLEST
-from ..numerics.rational.spectra import hold_response, unwrapped_phase
+from ..numerics.rational.phase import unwrap_with_dead_time
+from ..numerics.rational.spectra import hold_response
 from .comparison import FRFComparison, decibels, hertz
 from .disagreement import disagreement
-from .points import MeasuredPoints, check_single_channel, measured_points, same_time, sampled_every
+from .points import MeasuredPoints, check_single_channel, measured_points, sampled_every
 from .trusted_band import trusted_points
 
 
@@ -102,7 +104,7 @@ def compare_frf(
     expected = "a system of python-control"
     check_type(system, ct.LTI, "system", expected, UnsuitableSystemError)
     check_single_channel(system, "system")
-    dt = _sample_time(system)
+    dt = sample_time_of(system) or None
     points, flags = _comparable(measured_points(frf), dt)
     used_hold = _hold(system, dt, hold)
     omega = points.omega
@@ -122,7 +124,7 @@ def compare_frf(
             "whether a pole or zero lies on the frequency grid"
         )
     delay = float(system.dead_time) if isinstance(system, DelayedStateSpace) else 0.0
-    model_phase = unwrapped_phase(model, omega, delay)
+    model_phase = unwrap_with_dead_time(omega, model, delay)
     error = _unwrapped_error(ratio, int(np.argmax(good)))
     trusted_hz = points.frequency_hz[good]
     found = FRFComparison(
@@ -185,17 +187,6 @@ def _unwrapped_error(ratio: ComplexArray, first: int) -> FloatArray:
     """Unwrap the phase of model over measured; at the `first` trusted point it is within +-pi."""
     error = np.unwrap(np.angle(ratio))
     return np.asarray(error - 2 * np.pi * np.round(error[first] / (2 * np.pi)), dtype=np.float64)
-
-
-def _sample_time(system: Any) -> float | None:
-    """Return the sample time of a discrete system in s; None for a continuous one."""
-    if system.dt is None or system.dt == 0:
-        return None
-    if system.dt is True:
-        raise UnsuitableSystemError(
-            "the system is discrete without a sample time (dt=True); set its dt in s"
-        )
-    return float(system.dt)
 
 
 def _hold(system: Any, dt: float | None, hold: str | None) -> Literal["zoh"] | None:

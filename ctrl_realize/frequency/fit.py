@@ -9,7 +9,7 @@ from typing import Literal
 import control as ct
 import numpy as np
 
-from .._checks import integer, positive
+from .._checks import integers, positive
 from ..delayed import DelayedStateSpace
 from ..errors import DataError, OptionError, OrderError
 from ..numerics.arrays import FloatArray
@@ -145,8 +145,10 @@ def fit_frf(
             # Aliases from beyond the Nyquist frequency, which a continuous model cannot describe,
             # have about this size for a plant that falls with 1/omega.
             sigma = np.hypot(sigma, np.abs(response) * (frequency / (1 / held - frequency)) ** 2)
-    orders = _candidates(order, "order", 1)
-    degrees = _candidates(relative_degree, "relative_degree", 0)
+    orders = None if order is None else integers(order, "order", 1, 30)
+    degrees = (
+        None if relative_degree is None else integers(relative_degree, "relative_degree", 0, 30)
+    )
     orders = _within_points(orders, degrees, frequency.size)
     shortest = 1 / (_SAMPLES_PER_SHORTEST_PERIOD * float(frequency[-1]))
     sample_time = step or sampled_every(frf) or shortest
@@ -189,22 +191,6 @@ def _searchable(max_dead_time: float, omega: FloatArray) -> float:
             f"at least {least:.3g} s, which is practically zero"
         )
     return max_dead_time
-
-
-def _candidates(given: int | Sequence[int] | None, name: str, low: int) -> tuple[int, ...] | None:
-    """Return the whole numbers to try."""
-    if given is None:
-        return None
-    try:
-        values = tuple(given)  # type: ignore[arg-type]
-    except TypeError:
-        values = (given,)  # type: ignore[assignment]
-    if not values:
-        raise OrderError(f"{name}={given!r} is empty; expected at least one number")
-    try:
-        return tuple(sorted({integer(value, name, low, 30) for value in values}))
-    except OptionError as error:
-        raise OrderError(str(error)) from error
 
 
 def _within_points(

@@ -10,6 +10,7 @@ import numpy as np
 
 from .._checks import integer, one_of, positive
 from .._flags import Flag, flagged
+from ..data.frf_operands import same_time
 from ..data.impulse_estimate import ImpulseEstimate
 from ..errors import DataError
 from ..numerics.arrays import ComplexArray, FloatArray
@@ -17,7 +18,7 @@ from ..numerics.blas_threads import single_threaded
 from ..numerics.rational.spectra import hold_response
 from ..numerics.regression.fir import cautious_std, fit_kernel
 from ..numerics.regression.normal_equations import NormalEquations
-from .points import FRFPoints, frf_points, held_every, same_time
+from .points import FRFPoints, frf_points, held_every
 
 _BLOCK = 256
 """Number of points whose rows are in memory at the same time."""

@@ -179,10 +179,6 @@ def check_single_channel(system: Any, what: str) -> None:
         )
 
 
-SAME = 1e-6
-"""Relative difference up to which two sample times count as equal."""
-
-
 def sampled_every(frf: Any) -> float | None:
     """Sample time of the records behind a response, in s; None if not known."""
     return frf.sample_time if isinstance(frf, MeasuredFRF) else None
@@ -205,8 +201,3 @@ def held_every(frf: Any, hold: str | None, dt: float | None) -> float | None:
     if known is None and hold == "zoh" and dt is None:
         raise OptionError("hold='zoh' needs dt, the sample time of the held input in s")
     return dt if known is None and hold == "zoh" else known
-
-
-def same_time(one: float, other: float) -> bool:
-    """Whether two sample times are equal."""
-    return abs(one - other) <= SAME * other

@@ -18,7 +18,7 @@ from ..frequency.comparison import FRFComparison
 from ..frequency.points import check_single_channel, measured_points
 from ..frequency.trusted_band import trusted_points
 from ..numerics.arrays import BoolArray, ComplexArray, FloatArray
-from ..numerics.rational.spectra import unwrapped_phase
+from ..numerics.rational.phase import unwrap_with_dead_time
 from . import style
 from .shared_docs import documented
 from .style import frequency_axis
@@ -121,8 +121,8 @@ def _phase(
     Noise has no phase that could be unwrapped, and must not turn that of points beyond it.
     """
     if good is None or good.all():
-        return unwrapped_phase(response, omega, delay)
-    known = unwrapped_phase(response[good], omega[good], delay)
+        return unwrap_with_dead_time(omega, response, delay)
+    known = unwrap_with_dead_time(omega[good], response[good], delay)
     near = np.interp(omega, omega[good], known + omega[good] * delay) - omega * delay
     angle = np.angle(response)
     phase = angle + 2 * np.pi * np.round((near - angle) / (2 * np.pi))

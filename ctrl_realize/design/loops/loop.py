@@ -16,6 +16,7 @@ from typing import Any
 import control as ct
 import numpy as np
 
+from ..._checks import sample_time_of
 from ...delayed.parts import check_entries
 from ...errors import UnsuitableSystemError
 from ...numerics.arrays import ComplexArray, FloatArray
@@ -192,8 +193,4 @@ def _time_base(system: Any) -> float | None:
             f"{system.name!r} has {system.ninputs} inputs and {system.noutputs} outputs; "
             "expected one of each. Take one channel, or use control.singular_values_response"
         )
-    if system.dt is True:
-        raise UnsuitableSystemError(
-            f"{system.name!r} is discrete without a sample time (dt=True); give dt in s"
-        )
-    return None if system.dt is None else float(system.dt)
+    return sample_time_of(system)

@@ -98,11 +98,6 @@ class ProcessModel(Result):
         return self.gain * shape
 
     @property
-    def normalized_dead_time(self) -> float:
-        """Dead time divided by dead time plus lag: near 0 lag-, near 1 delay-dominated."""
-        return self.dead_time / (self.dead_time + self.lag) if self.dead_time else 0.0
-
-    @property
     def total_time(self) -> float:
         """Dead time plus lags, in s."""
         return self.lag + self.second_lag + self.dead_time

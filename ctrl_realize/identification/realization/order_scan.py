@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..._checks import integer
+from ..._checks import integer, integers
 from ...data import ImpulseResponse
 from ...delayed import DelayedStateSpace
 from ...errors import OptionError
@@ -234,7 +234,9 @@ def scan_orders(
     >>> scan.order, scan.delay
     (2, 21)
     """
-    surface = scan_surface(impulse, _orders(orders), max_delay, samples, feedthrough, hankel, dt)
+    every = orders if isinstance(orders, Iterable) else range(1, integer(orders, "orders", 1) + 1)
+    tried = integers(every, "orders", 1)
+    surface = scan_surface(impulse, tried, max_delay, samples, feedthrough, hankel, dt)
     rounding = surface.rounding
     delays = tuple(best_delay(row, rounding) for row in surface.iae)
     last = [surface.singular_value(k, d) for k, d in zip(surface.orders, delays, strict=True)]
@@ -259,12 +261,3 @@ def scan_orders(
         ),
         _surface=surface,
     )
-
-
-def _orders(orders: int | Iterable[int]) -> tuple[int, ...]:
-    if isinstance(orders, Iterable):
-        tried = sorted({integer(order, "orders", 1) for order in orders})
-        if not tried:
-            raise OptionError("orders is empty; expected at least one order")
-        return tuple(tried)
-    return tuple(range(1, integer(orders, "orders", 1) + 1))

@@ -2,21 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 import control as ct
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..._checks import integer
+from ..._checks import integers
 from ..._wording import chosen, in_time
 from ...data import Record
 from ...data.given import as_records
 from ...data.shown_units import in_shown_units
 from ...delayed import DelayedStateSpace, fit_of
 from ...delayed.simulation import as_delayed
-from ...errors import DataError, OptionError, OrderError, UnsuitableSystemError
+from ...errors import DataError, OptionError, UnsuitableSystemError
 from ...numerics.blas_threads import single_threaded
 from ...numerics.constants import SMALLEST
 from ...numerics.state_space.section_fit import fit_sections
@@ -107,7 +107,7 @@ def fit_state_space(
     """
     given = as_records(records)
     group = as_group([one.at_equal_distances() for one in given])
-    asked = _orders(order)
+    asked = None if order is None else integers(order, "order", 1)
     _check_signals(group, feedthrough)
     parts, cut = lively_parts(group)
     system = from_starts(parts, asked, delays, feedthrough).system
@@ -176,16 +176,6 @@ def refine_state_space(
         experiments(group, shares), in_sections(core.A, core.B, core.C, core.D), feedthrough=given
     )
     return fitted_system(Candidate(found, core.nstates, *shares, given, np.nan), group, {}, (), cut)
-
-
-def _orders(order: int | Iterable[int] | None) -> tuple[int, ...] | None:
-    if order is None:
-        return None
-    given = order if isinstance(order, Iterable) else (order,)
-    orders = tuple(sorted({integer(n, "order", 1) for n in given}))
-    if not orders:
-        raise OrderError("order is empty; expected at least one order")
-    return orders
 
 
 def _check_signals(group: Sequence[Record], feedthrough: bool | None) -> None:

@@ -140,7 +140,7 @@ class TrackHistory(Result):
     dead_time : ndarray, shape (K,)
         In s, interpolated between samples.
     low, high : ndarray, shape (K,)
-        Ends of the 95 % interval in s; `delay_low` and `delay_high` are the same in samples.
+        Ends of the 95 % interval in s.
     gain_ratio : ndarray, shape (K,)
         Gain relative to that of the starting model.
     resolved : ndarray of bool, shape (K,)
@@ -172,16 +172,6 @@ class TrackHistory(Result):
     resolved: BoolArray
     lost: BoolArray
     dt: float
-
-    @property
-    def delay_low(self) -> FloatArray:
-        """Lower end of the interval in samples."""
-        return self.low / self.dt
-
-    @property
-    def delay_high(self) -> FloatArray:
-        """Upper end of the interval in samples."""
-        return self.high / self.dt
 
     @property
     def delay(self) -> FloatArray:

@@ -68,7 +68,9 @@ def cross_validate(
     import pandas as pd
 
     several = as_records(records)
-    models = systems if isinstance(systems, Mapping) else {_name(systems): systems}
+    # systems of python-control have a name, a model of the caller may have none
+    name = str(getattr(systems, "name", None) or "model")
+    models = systems if isinstance(systems, Mapping) else {name: systems}
     if not models:
         raise DataError("no models; expected at least one, such as {'mine': model}")
 
@@ -84,8 +86,3 @@ def cross_validate(
             name = f"{name} ({i})"
         columns[name] = {label: mean_fit(system, record) for label, system in models.items()}
     return pd.DataFrame(columns)
-
-
-def _name(system: Any) -> str:
-    # a model of the caller: systems of python-control have a name, others may have none
-    return str(getattr(system, "name", None) or "model")

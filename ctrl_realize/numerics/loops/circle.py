@@ -19,7 +19,7 @@ from collections.abc import Callable
 import numpy as np
 from scipy.optimize import minimize_scalar
 
-from ..arrays import ComplexArray, FloatArray
+from ..arrays import ComplexArray, FloatArray, IntArray
 
 DAMPING = 1e6
 """Growth of the circle's radius over the record: wrap-around is divided by this, and rounding
@@ -72,13 +72,7 @@ def gain_gaps(shape: ComplexArray, distance: float) -> list[tuple[float, float]]
     list of (low, high)
         Increasing; the last `high` is inf.
     """
-    square = np.abs(shape) ** 2
-    real = shape.real
-    inside = real**2 - square * (1 - distance**2)
-    enters = (inside >= 0) & (real < 0) & (square > 0)
-    root = np.sqrt(inside[enters])
-    low = (1 - distance**2) / (-real[enters] + root)
-    high = (-real[enters] + root) / square[enters]
+    low, high, _ = _circle_entered(shape, distance)
     order = np.argsort(low)
     low = np.append(low[order], np.inf)
     reached = np.maximum.accumulate(np.concatenate([[0.0], high[order]]))
@@ -107,17 +101,24 @@ def largest_gain(shape: ComplexArray, distance: float) -> tuple[float, int]:
     at : int
         Index of the decisive frequency.
     """
+    low, _, where = _circle_entered(shape, distance)
+    if not low.size:
+        return float("inf"), 0
+    first = int(np.argmin(low))
+    return float(low[first]), int(where[first])
+
+
+def _circle_entered(
+    shape: ComplexArray, distance: float
+) -> tuple[FloatArray, FloatArray, IntArray]:
+    """Gains between which the loop is in the circle around -1, and where on the curve it is so."""
     square = np.abs(shape) ** 2
     real = shape.real
     inside = real**2 - square * (1 - distance**2)
-    enters = (inside >= 0) & (real < 0) & (square > 0)
-    if not enters.any():
-        return float("inf"), 0
-    gains = np.full(shape.size, np.inf)
+    where = np.flatnonzero((inside >= 0) & (real < 0) & (square > 0))
     # The rationalized root: no cancellation if the circle is only touched.
-    gains[enters] = (1 - distance**2) / (-real[enters] + np.sqrt(inside[enters]))
-    at = int(np.argmin(gains))
-    return float(gains[at]), at
+    sums = -real[where] + np.sqrt(inside[where])
+    return (1 - distance**2) / sums, sums / square[where], where
 
 
 def smallest_on_line(

@@ -39,28 +39,6 @@ def hold_response(omega: FloatArray, dt: float) -> ComplexArray:
     return np.asarray(np.sinc(half / np.pi) * np.exp(-1j * half), dtype=np.complex128)
 
 
-def unwrapped_phase(response: ComplexArray, omega: FloatArray, delay: float) -> FloatArray:
-    """Unwrap the phase along frequency after removing the phase of a known delay.
-
-    Parameters
-    ----------
-    response : ndarray, shape (K,)
-        Frequency response.
-    omega : ndarray, shape (K,)
-        Rising frequencies in rad/s.
-    delay : float
-        Delay in s whose phase ``-omega delay`` is removed before unwrapping and added again.
-
-    Returns
-    -------
-    ndarray, shape (K,)
-        Phase in rad; correct at any delay and on coarse grids, as long as the *rest* changes by
-        less than half a turn from point to point.
-    """
-    turned = np.angle(response * np.exp(1j * omega * delay))
-    return np.asarray(np.unwrap(turned) - omega * delay)
-
-
 @dataclass(frozen=True, eq=False)
 class SpectralSums:
     """Auto and cross power, summed over `count` segments.

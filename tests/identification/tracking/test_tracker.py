@@ -40,7 +40,7 @@ def test_a_dead_time_that_wears_from_37_to_60_samples_is_followed():
     then = np.interp(track.time - 2.5, record.time, truth)
     assert np.sqrt(np.mean((track.delay - then)[told] ** 2)) < 1.0
     now = np.interp(track.time, record.time, truth)
-    inside = (track.delay_low - 0.5 <= now) & (now <= track.delay_high + 0.5)
+    inside = (track.low / track.dt - 0.5 <= now) & (now <= track.high / track.dt + 0.5)
     # not when the wear sets in: the samples of the memory do not know of it yet
     assert np.mean(inside[told]) > 0.85
     assert abs(track.delay[-1] - 60) < 0.6
@@ -93,7 +93,7 @@ def test_a_model_that_is_off_is_renewed_until_poles_and_delay_are_right():
     assert abs(ratios[1] - 8.0 / 7.0) < 0.05
     assert abs(last.delay - 50) <= 1
     now = np.interp(track.time, record.time, truth)
-    inside = (track.delay_low - 0.5 <= now) & (now <= track.delay_high + 0.5)
+    inside = (track.low / track.dt - 0.5 <= now) & (now <= track.high / track.dt + 0.5)
     assert np.mean(inside[track.resolved]) > 0.9
     pulse = cr.delayed_ss(R3, delay=0, dt=TS).markov(1000)
     found = cr.DelayedStateSpace(bank.model.delay_free).markov(1000)
@@ -141,7 +141,7 @@ def operated(plant, *, seconds, seed, noise=0.005, walk=0.0):
 
 def wrong(track, delay):
     """Moments at which an interval is told that does not hold the delay."""
-    held = (track.delay_low - 0.5 <= delay) & (delay <= track.delay_high + 0.5)
+    held = (track.low / track.dt - 0.5 <= delay) & (delay <= track.high / track.dt + 0.5)
     return int(np.sum(track.resolved & ~held))
 
 
