@@ -6,8 +6,8 @@ import pytest
 import ctrl_realize as cr
 from benchmarks.experiment.cases import CASES, Case, dead_time, planned, simulated
 from ctrl_realize.errors import DataError, OptionError, UnsuitableSystemError
-from ctrl_realize.experiment.bound import Bound, Experiment
 from ctrl_realize.experiment.signals import KINDS, shapes
+from ctrl_realize.identification.bound import Bound, Experiment
 from ctrl_realize.identification.noise import NoiseModel
 from ctrl_realize.numerics.engine.plausible_models import PlausibleModel
 

@@ -9,8 +9,8 @@ from scipy.linalg import toeplitz
 from scipy.signal import lfilter
 
 import ctrl_realize as cr
-from ctrl_realize.experiment.bound import Bound
 from ctrl_realize.experiment.result import ExperimentPlan
+from ctrl_realize.identification.bound import Bound
 from ctrl_realize.numerics.arrays import FloatArray
 from ctrl_realize.numerics.engine.plausible_models import PlausibleModel
 from ctrl_realize.numerics.engine.problem import KnownFactor, Structure

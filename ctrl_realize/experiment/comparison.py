@@ -9,9 +9,9 @@ from .._wording import interval_in_time, plainly
 from ..data import Record
 from ..data.given import as_record
 from ..identification import OutputErrorFit
+from ..identification.bound import Bound
 from ..numerics.constants import Z_95
 from ..results import Result
-from .bound import Bound
 from .first import fitted, known_from_fit
 from .result import WORDS, ExperimentPlan, amount
 

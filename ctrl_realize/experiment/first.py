@@ -14,12 +14,12 @@ from ..delayed import DelayedStateSpace
 from ..design import ProcessModel
 from ..errors import UnsuitableSystemError
 from ..identification import OutputErrorFit, identify
+from ..identification.bound import Bound, Experiment
 from ..identification.noise import NoiseModel, noise_of
 from ..numerics.arrays import FloatArray
 from ..numerics.engine.plausible_models import PlausibleModel
 from ..numerics.engine.static_gain import INTEGRATOR
 from ..numerics.signals.noise import correlation_time, winsorised_sigma
-from .bound import Bound, Experiment
 
 _OTHERS = 4  # of the plausible models every fourth stands for all: time
 

@@ -15,6 +15,7 @@ from ..data import Record
 from ..delayed import DelayedStateSpace
 from ..design import ProcessModel
 from ..errors import OptionError
+from ..identification.bound import WANTED, Bound, Experiment, Wanted
 from ..identification.noise import NoiseModel
 from ..identification.plausible import continuous_core
 from ..numerics.arrays import FloatArray
@@ -22,7 +23,6 @@ from ..numerics.engine.plausible_models import PlausibleModel
 from ..numerics.engine.poles import lag_sum
 from ..numerics.loops.relay import relay_loop
 from ..numerics.state_space.sampling import sample_with_dead_time
-from .bound import WANTED, Bound, Experiment, Wanted
 from .first import Known, known_from, largest_move
 from .result import ErrorCurve, ExperimentPlan, PlannedTest
 from .signals import KINDS, shapes

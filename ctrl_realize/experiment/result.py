@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING
 
 from .._checks import one_of
 from .._wording import in_time, plainly
+from ..identification.bound import Experiment, Wanted
 from ..identification.noise import NoiseModel
 from ..numerics.arrays import FloatArray
 from ..numerics.engine.plausible_models import PlausibleModel
-from .bound import Experiment, Wanted
 from .command import PlannedInput, duration_in_words
 
 if TYPE_CHECKING:

@@ -26,11 +26,12 @@ from scipy.signal import lfilter
 from ..data import Record
 from ..data.given import as_records
 from ..data.shown_units import in_shown_units
-from ..delayed import DelayedStateSpace, delayed_ss, fit_of
+from ..delayed import DelayedStateSpace, fit_of
 from ..errors import DataError, DataWarning
 from ..numerics.arrays import FloatArray
 from ..numerics.blas_threads import single_threaded
-from ..numerics.engine.poles import parameters_from_poles, poles_from_parameters
+from ..numerics.engine.plausible_models import PlausibleModel
+from .bound import Bound
 from .impulse.from_io import impulse_from_io
 from .output_error.fit import fit_output_error, model_alone
 from .output_error.result import OutputErrorFit
@@ -46,8 +47,6 @@ MOST_CYCLES = 8
 _SETTLED = 0.02
 """Change of a response, in standard deviations of the residual, from which on all is settled: a
 tenth of the error of a response that five parameters have from a thousand samples."""
-_STEP = 1e-4
-"""Relative change of a parameter for a derivative by differences."""
 
 
 @single_threaded
@@ -173,9 +172,12 @@ def _kept(fit: OutputErrorFit, structures: Structures | None) -> Any:
 
 def _wider(fits: list[OutputErrorFit], record: Record) -> tuple[OutputErrorFit, ...]:
     """Widen the intervals from those with the other models known to those with all estimated."""
-    tangents = [
-        _tangents(fit, u - u[0]) for fit, u in zip(fits, np.atleast_2d(record.input), strict=True)
+    bounds = [
+        Bound(PlausibleModel(fit.dead_time, fit.poles, fit.estimate.numerator), fit.data.dt)
+        for fit in fits
     ]
+    inputs = np.atleast_2d(record.input)
+    tangents = [bound.slopes(u)[0] for bound, u in zip(bounds, inputs, strict=True)]
     seen = ~np.isnan(np.ravel(record.output))
     time = record.time - record.time[0]
     local = np.stack([np.ones_like(time), time / max(float(time[-1]), 1e-300)], axis=1)
@@ -196,7 +198,7 @@ def _wider(fits: list[OutputErrorFit], record: Record) -> tuple[OutputErrorFit, 
         )
         if estimate.static is not None:
             gains = np.zeros(own.shape[1])
-            gains[1 : tangents[i].shape[1]] = _gain_slopes(fit)
+            gains[: tangents[i].shape[1]] = bounds[i].gradient(("gain",))[0]
             more = _ratio(own, others, gains)
             static = replace(estimate.static, gain_std=more * estimate.static.gain_std)
             alike = tuple(
@@ -214,48 +216,6 @@ def _ratio(own: FloatArray, others: FloatArray, weights: FloatArray) -> float:
     alone = np.linalg.pinv(own).T @ weights
     together = np.linalg.pinv(np.column_stack([own, others]))[: own.shape[1]].T @ weights
     return float(np.linalg.norm(together) / np.linalg.norm(alone))
-
-
-def _parameters(fit: OutputErrorFit) -> tuple[FloatArray, FloatArray]:
-    """Pole parameters and numerator of a fit."""
-    return parameters_from_poles(fit.estimate.poles), fit.estimate.numerator
-
-
-def _tangents(fit: OutputErrorFit, u: FloatArray) -> FloatArray:
-    """Derivatives (N, 1 + n + k) of a response to dead time, pole parameters and numerator."""
-    poles, numerator = _parameters(fit)
-
-    def response(late: float, theta: FloatArray, b: FloatArray) -> FloatArray:
-        core = continuous_core(b, poles_from_parameters(theta[None])[0][0])
-        return np.asarray(delayed_ss(core, dead_time=late, dt=fit.data.dt).simulate(u))
-
-    at, h = fit.dead_time, 0.25 * fit.data.dt
-    best = response(at, poles, numerator)
-    early = max(at - h, 0.0)
-    columns = [(response(at + h, poles, numerator) - response(early, poles, numerator)) / 2]
-    for k in range(poles.size):
-        moved = poles.copy()
-        moved[k] += _STEP
-        columns.append((response(at, moved, numerator) - best) / _STEP)
-    columns += [response(at, poles, row) for row in np.diag(numerator)]
-    return np.stack(columns, axis=1)
-
-
-def _gain_slopes(fit: OutputErrorFit) -> FloatArray:
-    """Derivatives of the gain to the parameters of `_tangents` behind the dead time."""
-    poles, numerator = _parameters(fit)
-
-    def gain(theta: FloatArray, b: FloatArray) -> float:
-        found = poles_from_parameters(theta[None])[0][0]
-        return float(b[0] / np.prod(-found[found != 0]).real)
-
-    slopes = []
-    for k in range(poles.size):
-        moved = poles.copy()
-        moved[k] += _STEP
-        slopes.append((gain(moved, numerator) - gain(poles, numerator)) / _STEP)
-    slopes += [gain(poles, row) for row in np.diag(numerator)]
-    return np.array(slopes)
 
 
 def _joined(systems: Sequence[DelayedStateSpace], result: SeveralInputsFit) -> DelayedStateSpace:

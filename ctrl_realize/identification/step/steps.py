@@ -16,9 +16,6 @@ from ...numerics.constants import SMALLEST
 from ...numerics.signals.baseline import rest_line
 from ...numerics.signals.edges import difference_noise, find_edges
 
-_MIN_SHARE = 0.1
-"""Smallest edge to detect, as a fraction of the range of the input."""
-
 
 def detect_step(record: Record) -> StepEdge:
     """Find the step in the input of a record.
@@ -73,7 +70,7 @@ def found_step(record: Record, most: int | None = None) -> StepEdge:
     # A short record does not contain a window of that length on both sides of its step.
     spikes = int(np.clip(record.n_samples // 1000, 3, 50))
     spikes = min(spikes, max((record.n_samples - 3) // 6, 0))
-    found = find_edges(signal, spikes, _MIN_SHARE, most)
+    found = find_edges(signal, spikes, most=most)
     if not found and np.ptp(signal) == 0:
         raise NoStepError(
             f"no step in the input {_of(record)}: it is {signal[0]:.6g} throughout. If the "

@@ -66,7 +66,7 @@ def despike(values: FloatArray, spike_samples: int) -> FloatArray:
 
 
 def find_edges(
-    values: FloatArray, spike_samples: int, min_share: float, most: int | None = None
+    values: FloatArray, spike_samples: int, min_share: float = 0.1, most: int | None = None
 ) -> list[Edge]:
     """Find all edges whose height is at least `min_share` of the signal's range.
 
@@ -76,7 +76,7 @@ def find_edges(
         Measured input; it may be noisy, drift slowly, ramp over some samples and have spikes.
     spike_samples : int
         Longest spike to ignore, in samples.
-    min_share : float
+    min_share : float, default 0.1
         Smallest edge, as a fraction of the range of the input without spikes.
     most : int, optional
         Stop after one edge more than these: an input that moves all the time has millions.

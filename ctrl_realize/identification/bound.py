@@ -20,7 +20,6 @@ from scipy.linalg import block_diag
 from scipy.signal import lfilter
 
 from ..errors import UnsuitableSystemError
-from ..identification.noise import NoiseModel
 from ..numerics.arrays import FloatArray
 from ..numerics.engine.modal import respond
 from ..numerics.engine.plausible_models import PlausibleModel
@@ -36,6 +35,7 @@ from ..numerics.loops.reference import (
     model_response,
     robust_pi,
 )
+from .noise import NoiseModel
 
 Wanted: TypeAlias = Literal["dead_time", "gain", "phase", "Ms"]
 WANTED: tuple[Wanted, ...] = ("dead_time", "gain", "phase", "Ms")
