@@ -133,8 +133,7 @@ def frf_fit_plot(fit: FRFFit, *, ax: style.AxesLike = None, **kwargs: Any) -> ct
     >>> [text.get_text() for text in cplt.figure.axes[0].get_legend().get_texts()]
     ['measured', 'fit, order 2']
     """
-    omega = 2 * np.pi * fit.frequency_hz
-    model = np.asarray(fit.core(1j * omega)).reshape(-1) * np.exp(-1j * omega * fit.dead_time)
+    model = fit.response(2 * np.pi * fit.frequency_hz)
     measured = MeasuredFRF(fit.measured, fit.frequency_hz, name=fit.name or "measured")
     fitted = MeasuredFRF(model, fit.frequency_hz, name=f"{FITTED} {fit.order}")
     return frf_plot([measured, fitted], ax=ax, dead_time=fit.dead_time, **kwargs)

@@ -9,7 +9,7 @@ from ...data import ImpulseResponse
 from ...delayed import DelayedStateSpace, fit_of
 from ...numerics.arrays import read_only
 from ...numerics.blas_threads import single_threaded
-from .delay_scan_result import Candidates, DelayScan
+from .delay_scan_result import DelayScan
 from .realize import realize
 from .result import Realization
 from .scan_curve import best_delay, curve_flags, flat_set, noise_flags
@@ -107,7 +107,6 @@ def best_of(surface: Surface, order: int) -> DelayedStateSpace:
     """Realize the model of one order at its best delay."""
     iae, rounding = surface.row(order), surface.rounding
     delay = best_delay(iae, rounding)
-    models = surface.models
     system = realize(
         surface.impulse,
         order,
@@ -125,15 +124,8 @@ def best_of(surface: Surface, order: int) -> DelayedStateSpace:
         order=order,
         samples=surface.samples,
         feedthrough=surface.feedthrough is not False,
-        singular_values=read_only(models.singular_values[:, :order]),
+        singular_values=read_only(surface.singular_values[:, :order]),
         noise_floor=surface.noise_floor,
-        candidates=Candidates(
-            models.A[:, :order, :order],
-            models.B[:, :order],
-            models.C[:, :, :order],
-            surface.direct,
-            realization.dt,
-        ),
         realization=realization,
         flags=(
             *curve_flags(iae, delay, rounding),

@@ -2,57 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import overload
 
-import control as ct
 import numpy as np
 
 from ..._wording import in_time
 from ...data import ImpulseResponse, Record
-from ...delayed import DelayedStateSpace
-from ...numerics.arrays import FloatArray, read_only
+from ...numerics.arrays import FloatArray
 from ...results import Flag, IntervalKind, ModelFit
 from .result import Realization
-
-
-class Candidates(Sequence[DelayedStateSpace]):
-    """The models of a delay scan, one for each delay, computed on demand.
-
-    ``candidates[d]`` has the delay d and the feedthrough that the scan used.
-    """
-
-    def __init__(
-        self, A: FloatArray, B: FloatArray, C: FloatArray, D: FloatArray, dt: float
-    ) -> None:
-        self._matrices = tuple(read_only(M) for M in (A, B, C, D))
-        self._dt = dt
-
-    def __len__(self) -> int:
-        return int(self._matrices[0].shape[0])
-
-    @overload
-    def __getitem__(self, delay: int) -> DelayedStateSpace: ...
-    @overload
-    def __getitem__(self, delay: slice) -> tuple[DelayedStateSpace, ...]: ...
-    def __getitem__(self, delay: int | slice) -> DelayedStateSpace | tuple[DelayedStateSpace, ...]:
-        if isinstance(delay, slice):
-            return tuple(self[d] for d in range(*delay.indices(len(self))))
-        d = range(len(self))[delay]
-        return DelayedStateSpace(ct.ss(*(M[d] for M in self._matrices), self._dt), d)
-
-    def __repr__(self) -> str:
-        return f"<Candidates: d = 0...{len(self) - 1}>"
 
 
 @dataclass(frozen=True, eq=False)
 class DelayScan(ModelFit):
     """IAE of the best model for every candidate delay.
 
-    ``iae[d]`` is the sum of ``|impulse.markov[k] - candidates[d].markov(n)[k]|`` over the fixed
-    window ``n = samples + max_delay + 1``, for all channels together. ``delay`` is the smallest d
-    whose IAE equals the minimum up to rounding; ``interval`` contains all d within 5 % of it.
+    ``iae[d]`` is the sum of ``|impulse.markov[k] - model.markov(n)[k]|`` over the fixed window
+    ``n = samples + max_delay + 1``, for all channels together, of the model
+    ``realize(impulse, order, delay=d, samples=samples)``. ``delay`` is the smallest d whose IAE
+    equals the minimum up to rounding; ``interval`` contains all d within 5 % of it.
 
     Attributes
     ----------
@@ -66,14 +34,12 @@ class DelayScan(ModelFit):
     order, samples : int
         Order of all models; Markov parameters after each delay used.
     feedthrough : bool
-        Whether the candidates have the feedthrough G[d] (the paper); otherwise 0.
+        Whether the models have the feedthrough G[d] (the paper); otherwise 0.
     singular_values : ndarray, shape (max_delay + 1, order)
         Of the Hankel matrix for each delay.
     noise_floor : float or None
         Largest singular value of a Hankel matrix of the noise before the step; None if that noise
         is not known.
-    candidates : Candidates
-        The models, computed on demand.
     realization : Realization
         Realization of the returned model after `delay`.
     flags : tuple of Flag
@@ -101,7 +67,6 @@ class DelayScan(ModelFit):
     feedthrough: bool
     singular_values: FloatArray
     noise_floor: float | None
-    candidates: Candidates = field(repr=False)
     realization: Realization = field(repr=False)
     flags: tuple[Flag, ...] = ()
     choices: tuple[str, ...] = ()

@@ -249,7 +249,7 @@ def scan_orders(
         delay_intervals=tuple(
             flat_set(row, d, rounding) for row, d in zip(surface.iae, delays, strict=True)
         ),
-        singular_values=read_only(surface.models.singular_values),
+        singular_values=read_only(surface.singular_values),
         noise_floor=surface.noise_floor,
         order=chosen,
         samples=surface.samples,

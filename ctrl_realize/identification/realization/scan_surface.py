@@ -13,7 +13,6 @@ from ..._checks import integer, one_of
 from ...data import ImpulseResponse
 from ...numerics.arrays import FloatArray
 from ...numerics.hankel.delay_models import (
-    DelayModels,
     hankel_size,
     iae_of_models,
     realize_at_delays,
@@ -24,10 +23,9 @@ from .realize import HANKEL
 
 @dataclass(frozen=True, eq=False)
 class Surface:
-    """Models for every delay, and the IAE of each order.
+    """IAE of each order over the delay, and the singular values for every delay.
 
-    The model of order j is the leading part of `models`; ``iae[i]`` belongs to ``orders[i]``.
-    `feedthrough` and `hankel` are as requested.
+    ``iae[i]`` belongs to ``orders[i]``; `feedthrough` and `hankel` are as requested.
     """
 
     impulse: ImpulseResponse
@@ -35,8 +33,7 @@ class Surface:
     samples: int
     feedthrough: bool | None
     hankel: str
-    models: DelayModels
-    direct: FloatArray
+    singular_values: FloatArray
     iae: FloatArray
     noise_floor: float | None
 
@@ -57,7 +54,7 @@ class Surface:
 
     def singular_value(self, order: int, delay: int) -> float:
         """Singular value `order` of the Hankel matrix for a delay."""
-        return float(self.models.singular_values[delay, order - 1])
+        return float(self.singular_values[delay, order - 1])
 
 
 def scan_surface(
@@ -90,8 +87,7 @@ def scan_surface(
         samples=samples,
         feedthrough=feedthrough,
         hankel=hankel,
-        models=models,
-        direct=direct,
+        singular_values=models.singular_values,
         iae=np.stack([iae_of_models(markov, delays, models, order, direct) for order in orders]),
         noise_floor=noise_floor(data, hankel_size(samples, padded=padded)),
     )
