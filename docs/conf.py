@@ -62,7 +62,8 @@ GENERATED.mkdir(exist_ok=True)
 public_names.write_pages(GENERATED / "api")
 LABORATORY = "13_dead_time_laboratory.ipynb"
 student_copy.write(ROOT / "notebooks" / LABORATORY, GENERATED / "course" / LABORATORY)
-gallery_pages.write(HERE / "gallery", GENERATED / "gallery", ROOT / "ctrl_realize")
+if not tags.has("without_gallery"):  # noqa: F821 - Sphinx brings `tags`; `-t without_gallery`
+    gallery_pages.write(HERE / "gallery", GENERATED / "gallery", ROOT / "ctrl_realize")
 
 
 def _notebooks_into_source() -> None:

@@ -48,7 +48,8 @@ def flags(package: Path) -> list[tuple[str, str, str]]:
     found = set()
     for path in package.rglob("*.py"):
         place = path.relative_to(package).with_suffix("").as_posix()
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        source = path.read_text(encoding="utf-8")
+        for node in ast.walk(ast.parse(source)) if "flagged(" in source else ():
             if isinstance(node, ast.Call) and getattr(node.func, "id", "") == "flagged":
                 by = RAISED_BY.get(place) or RAISED_BY[place.rpartition("/")[0]]
                 for code, _, case in (key.partition(".") for key in keys(node)):
