@@ -3,12 +3,14 @@
 Everything is based on a function of frequency, not on a polynomial: each crossing is bracketed on a
 sufficiently fine grid, then computed by root finding on the curve itself.
 
-Encirclements as in [1]_.
+Encirclements as in [1]_, roots as in [2]_.
 
 References
 ----------
 .. [1] K. J. Astrom and R. M. Murray, Feedback Systems, 2nd ed., Princeton University Press 2021,
    section 10.2 (the Nyquist criterion).
+.. [2] M. Dowell and P. Jarratt, A modified regula falsi method for computing the root of an
+   equation, BIT 11 (1971) 168-174.
 """
 
 from __future__ import annotations
@@ -16,7 +18,6 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from scipy.optimize import elementwise
 
 from ..arrays import ComplexArray, FloatArray
 
@@ -24,6 +25,7 @@ Curve = Callable[[FloatArray], ComplexArray]
 
 POINTS_PER_TURN = 16  # of the phase of a delay: 0.4 rad, less than what `follow` asks for
 MAX_REFINEMENTS = 24  # halvings: an interval is then a ten-millionth of what it was
+MAX_STEPS = 100  # of a search for a root; smooth curves take six to eight
 
 
 def frequency_grid(low: float, top: float, features: ComplexArray, turn_time: float) -> FloatArray:
@@ -126,12 +128,23 @@ def encircled(values: ComplexArray, rest: float = 0.0) -> tuple[int, bool]:
 def _roots(
     function: Callable[[FloatArray], FloatArray], low: FloatArray, high: FloatArray
 ) -> FloatArray:
+    """Roots between pairs of ends of unlike signs: regula falsi, as Dowell and Jarratt mend it."""
     if low.size == 0:
-        return np.zeros(0)
-    found = elementwise.find_root(function, (low, high), tolerances={"xatol": 0.0, "xrtol": 1e-15})
-    roots = np.asarray(found.x, dtype=np.float64)
+        return low
+    a, b, at_a, at_b = low, high, function(low), function(high)
     # Very close to zero, rounding may have caused the sign change; there is no root to find.
-    return roots[np.isfinite(roots)]
+    unlike = np.sign(at_a) * np.sign(at_b) <= 0
+    for _ in range(MAX_STEPS):
+        with np.errstate(divide="ignore", invalid="ignore"):
+            x = b - at_b * (b - a) / (at_b - at_a)
+        x = np.where((x - a) * (x - b) <= 0, x, 0.5 * (a + b))
+        moved, at_x = np.abs(x - b), function(x)
+        behind = np.sign(at_x) == np.sign(at_b)
+        a, at_a = np.where(behind, a, b), np.where(behind, 0.5 * at_a, at_b)
+        b, at_b = x, at_x
+        if np.all((moved <= 1e-15 * x) | (at_x == 0) | ~unlike):
+            break
+    return b[unlike & np.isfinite(at_b)]
 
 
 def unit_crossings(curve: Curve, grid: FloatArray, values: ComplexArray) -> FloatArray:
