@@ -22,27 +22,14 @@ from ctrl_realize.cli.results import Provenance, write_record_files
 from ctrl_realize.cli.staging import appearing
 from ctrl_realize.errors import OptionError
 from ctrl_realize.identification.campaign import rows
+from tests.killing_records import COUNT, OPTIONS, killed, killed_here, record
 
 QUICK = ["--method", "scan", "--order", "1", "--max-delay", "40"]
-OPTIONS = {"method": "scan", "order": 1, "max_delay": 40}
-COUNT = 4
 
 pytestmark = [
     pytest.mark.skipif(not hasattr(signal, "SIGKILL"), reason="processes are stopped otherwise"),
     pytest.mark.usefixtures("without_figures"),
 ]
-
-
-def record(seed: int) -> cr.Record:
-    t = 0.1 * np.arange(150)
-    y = np.where(t > 5.0, 1.5 * (1 - np.exp(-(t - 5.0) / 1.5)), 0.0)
-    noise = 0.004 * np.random.default_rng(seed).normal(size=t.size)
-    return cr.Record(t, (t >= 3.0).astype(float), y + noise, name=f"r{seed}")
-
-
-def killed(seed: int) -> cr.Record:
-    os.kill(os.getpid(), signal.SIGKILL)
-    return record(seed)
 
 
 @pytest.fixture(scope="module")
@@ -311,16 +298,9 @@ def test_the_manifest_names_command_versions_inputs_and_files(files, tmp_path, c
     assert not {name for name in files_in(out) if name.startswith(("models/", "records"))}
 
 
-def killed_here(killers: str, folder: str) -> list[str | None]:
-    """Identify four records in this process, some of which kill it; return the errors."""
-    sources = [partial(killed if str(k) in killers else record, k) for k in range(COUNT)]
-    store = cr.io.CampaignStore(Path(folder) / "rows.sqlite")
-    return [row.error for row in cr.identify_campaign(sources, store=store, **OPTIONS).rows]
-
-
 @pytest.mark.slow
 def test_records_over_which_the_process_itself_was_killed_are_rows_when_it_is_resumed(tmp_path):
-    call = "import sys; from tests.test_cli_stopped import killed_here; killed_here(*sys.argv[1:])"
+    call = "import sys; from tests.killing_records import killed_here; killed_here(*sys.argv[1:])"
     died = [
         subprocess.run([sys.executable, "-c", call, "13", str(tmp_path)], check=False).returncode
         for _ in range(2)
