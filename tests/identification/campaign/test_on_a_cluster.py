@@ -54,24 +54,33 @@ def connected(n_workers):
         yield client
 
 
-def test_a_cluster_gives_the_same_bits_even_when_a_worker_dies(tmp_path):
+@pytest.fixture(scope="module")
+def client():
+    """Of two workers; one of them is started again whenever it dies."""
+    with (
+        dask.config.set({"distributed.scheduler.allowed-failures": 1}),
+        connected(2) as shared,
+    ):
+        yield shared
+
+
+def test_a_cluster_gives_the_same_bits_even_when_a_worker_dies(client, tmp_path):
     # the arrays of the valve are sent, and must be as usable there as here
     sources = [functools.partial(slowly, cr.bench.valve(), seed) for seed in range(8)]
     store = cr.io.CampaignStore(tmp_path / "rows.sqlite")
-    with connected(2) as client:
-        pids = list(client.run(os.getpid).values())
+    pids = list(client.run(os.getpid).values())
 
-        def kill_one() -> None:
-            while len(store) < 3:
-                time.sleep(0.05)
-            os.kill(pids[0], signal.SIGKILL)
+    def kill_one() -> None:
+        while len(store) < 3:
+            time.sleep(0.05)
+        os.kill(pids[0], signal.SIGKILL)
 
-        killer = threading.Thread(target=kill_one)
-        killer.start()
-        spread = cr.identify_campaign(sources, method="paper", client=client, store=store)
-        killer.join()
-        # The killed worker is gone; the cluster's nanny starts another in its place.
-        assert pids[0] not in client.run(os.getpid).values()
+    killer = threading.Thread(target=kill_one)
+    killer.start()
+    spread = cr.identify_campaign(sources, method="paper", client=client, store=store)
+    killer.join()
+    # The killed worker is gone; the cluster's nanny starts another in its place.
+    assert pids[0] not in client.run(os.getpid).values()
     serial = cr.identify_campaign(sources, method="paper")
     assert spread.failed == ()
     assert spread.table().equals(serial.table())
@@ -80,20 +89,18 @@ def test_a_cluster_gives_the_same_bits_even_when_a_worker_dies(tmp_path):
         assert a.system.A.flags.aligned
 
 
-def test_a_record_that_always_kills_its_worker_is_a_row_and_the_others_go_on():
+def test_a_record_that_always_kills_its_worker_is_a_row_and_the_others_go_on(client):
     sources = [functools.partial(killing if s == 1 else quick, s) for s in range(6)]
-    with (
-        dask.config.set({"distributed.scheduler.allowed-failures": 1}),
-        connected(2),
-        joblib.parallel_config(backend="dask"),  # means the same client
-    ):
+    with joblib.parallel_config(backend="dask"):  # means the same client
         campaign = cr.identify_campaign(sources, method="paper")
     assert [row.error is None for row in campaign.rows] == [s != 1 for s in range(6)]
     assert "was killed by the system, even when run alone" in campaign.rows[1].error
     assert campaign.rows[1].name == "1"
 
 
-def test_a_cluster_takes_a_bounded_number_of_records_ahead_and_needs_no_shared_store(tmp_path):
+def test_a_cluster_takes_a_bounded_number_of_records_ahead_and_needs_no_shared_store(
+    client, tmp_path
+):
     taken = []
 
     def endless():
@@ -102,12 +109,11 @@ def test_a_cluster_takes_a_bounded_number_of_records_ahead_and_needs_no_shared_s
             yield functools.partial(quick, seed % 7)
 
     store = cr.io.CampaignStore(tmp_path / "rows.sqlite")
-    with connected(1) as client:
-        # workers do not write: where they are, the file may be out of reach
-        options = {"method": "paper", "client": client, "store": store}
-        rows = cr.identification.identify_each(endless(), **options)
-        seen = [row.position for row in itertools.islice(rows, 20)]
-        rows.close()
+    # workers do not write: where they are, the file may be out of reach
+    options = {"method": "paper", "client": client, "store": store}
+    rows = cr.identification.identify_each(endless(), **options)
+    seen = [row.position for row in itertools.islice(rows, 20)]
+    rows.close()
     assert len(set(seen)) == 20
     assert max(seen) < len(taken) <= 20 + 100 + 2
     assert len(store) == 7
