@@ -7,10 +7,11 @@ from typing import Any
 
 import control as ct
 import numpy as np
+from scipy.linalg import block_diag
 
-from ..._checks import integer, positive
+from ..._checks import integer
 from ...delayed import DelayedStateSpace
-from ...errors import OptionError, OrderError
+from ...errors import OrderError
 from ...numerics.arrays import FloatArray, read_only
 from ...numerics.blas_threads import single_threaded
 from ...numerics.state_space.balancing import Part, balanced_truncation, split_modes
@@ -123,9 +124,7 @@ def hankel_singular_values(system: Any) -> FloatArray:
 
 
 @single_threaded
-def reduce(
-    system: Any, order: int | None = None, *, tolerance: float | None = None
-) -> DelayedStateSpace:
+def reduce(system: Any, order: int) -> DelayedStateSpace:
     """Reduce the order of the core by balanced truncation, and keep the delay.
 
     Poles on or outside the unit circle are kept. python-control's ``balred`` applies the continuous
@@ -135,11 +134,8 @@ def reduce(
     ----------
     system : DelayedStateSpace
         Any number of channels; any discrete system.
-    order : int, optional
-        Order of the reduced core.
-    tolerance : float, optional
-        Instead of `order`: the smallest order whose error bound is below this (in the unit of the
-        gain).
+    order : int
+        Order of the reduced core; `hankel_singular_values` tell the error bound of each.
 
     Returns
     -------
@@ -150,8 +146,6 @@ def reduce(
     ------
     OrderError
         An order larger than the core's, or smaller than its unstable part.
-    OptionError
-        Not exactly one of `order` and `tolerance`.
 
     Notes
     -----
@@ -185,27 +179,18 @@ def reduce(
     """
     plant = delayed_system(system, "reduce", siso=False)
     core = plant.delay_free
-    if (order is None) == (tolerance is None):
-        raise OptionError(f"order={order!r}, tolerance={tolerance!r}; give exactly one of them")
     (A, B, C), rest = _parts(core)
     kept = rest[0].shape[0]
-    if order is None:
-        limit = positive(tolerance, "tolerance", "largest error of the frequency response")
-        tails = 2 * np.cumsum(balanced_truncation(A, B, C, 0)[3][::-1])[::-1]
-        wanted = int(np.sum(tails > limit))
-    else:
-        wanted = integer(order, "order", 0) - kept
-        if wanted < 0 or order > core.nstates:
-            raise OrderError(
-                f"order={order}; the core has order {core.nstates}, of which {kept} state(s) on or "
-                f"outside the unit circle are kept: expected {kept}...{core.nstates}"
-            )
+    wanted = integer(order, "order", 0) - kept
+    if wanted < 0 or order > core.nstates:
+        raise OrderError(
+            f"order={order}; the core has order {core.nstates}, of which {kept} state(s) on or "
+            f"outside the unit circle are kept: expected {kept}...{core.nstates}"
+        )
     A, B, C, values = balanced_truncation(A, B, C, wanted)
     n = A.shape[0]
-    joined = np.zeros((n + kept, n + kept))
-    joined[:n, :n], joined[n:, n:] = A, rest[0]
     reduced = ct.StateSpace(
-        joined,
+        block_diag(A, rest[0]),
         np.vstack([B, rest[1]]),
         np.hstack([C, rest[2]]),
         np.asarray(core.D),
