@@ -19,6 +19,7 @@ import subprocess
 import sys
 import venv
 from pathlib import Path
+from typing import Any
 
 ROOT = Path(__file__).resolve().parents[1]
 VENV = Path(os.environ.get("CTRL_REALIZE_VENV", ROOT / ".venv"))
@@ -26,11 +27,18 @@ PYTHON = VENV / ("Scripts/python.exe" if os.name == "nt" else "bin/python")
 EXTRAS = {"demo": "", "docs": "[test,docs]", "setup": "[test]", "test": "[test]", "lint": "[test]"}
 
 
-def run(*command: object) -> None:
+def started(*command: object, **options: Any) -> subprocess.Popen[str]:
     # One BLAS thread: the matrices are small, and two cores then serve two test workers.
     threads = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
     environment = {**threads, **os.environ, "MPLBACKEND": "Agg"}
-    code = subprocess.call([str(part) for part in command], cwd=ROOT, env=environment)
+    # Tests start dozens of processes, of which each would compile the package again.
+    environment.pop("PYTHONDONTWRITEBYTECODE", None)
+    parts = [str(part) for part in command]
+    return subprocess.Popen(parts, cwd=ROOT, env=environment, text=True, **options)
+
+
+def run(*command: object) -> None:
+    code = started(*command).wait()
     if code:
         sys.exit(code)
 
@@ -56,23 +64,24 @@ def pip() -> list[object]:
 
 def set_up(extras: str) -> None:
     """Make the virtual environment and install the project, unless both are as they should be."""
-    wanted = hashlib.sha256((ROOT / "pyproject.toml").read_bytes()).hexdigest() + extras
+    project = hashlib.sha256((ROOT / "pyproject.toml").read_bytes()).hexdigest()
     stamp = VENV / "installed.txt"
     done = stamp.read_text().splitlines() if stamp.exists() else []
-    if PYTHON.exists() and wanted in done:
+    names = set(extras.strip("[]").split(","))
+    there = [line.removeprefix(project).strip("[]") for line in done if line.startswith(project)]
+    if PYTHON.exists() and any(names <= {"", *one.split(",")} for one in there):
         return
     if not PYTHON.exists():
         print(f"making {VENV}", flush=True)
         make_environment()
     print("installing ctrl_realize and what it needs", flush=True)
     run(*pip(), "install", "--quiet", "--disable-pip-version-check", "--editable", f".{extras}")
-    stamp.write_text("\n".join([*done, wanted]))
+    stamp.write_text("\n".join([*done, project + extras]))
 
 
 def lint() -> None:
     run(PYTHON, "-m", "ruff", "check", ".")
     run(PYTHON, "-m", "ruff", "format", "--check", ".")
-    run(PYTHON, "-m", "mypy")
     run(PYTHON, "-m", "codespell_lib")
 
 
@@ -91,13 +100,22 @@ def main(arguments: list[str]) -> None:
         run(PYTHON, "-m", "sphinx", *(rest or site))
     elif task == "lint":
         lint()
+        run(PYTHON, "-m", "mypy")
     elif task == "test":
         if not rest:
             lint()
+            print("mypy runs beside the tests, and is heard of if it finds something", flush=True)
+            mypy = started(PYTHON, "-m", "mypy", stdout=subprocess.PIPE)
         # One more than processors: tests of other processes and of browsers wait for these.
         count = min(os.cpu_count() or 1, 7) + 1
         workers = ["-n", str(count), "--dist", "worksteal"] if not rest else []
-        run(PYTHON, "-m", "pytest", *workers, *rest)
+        code = started(PYTHON, "-m", "pytest", *workers, *rest).wait()
+        if not rest:
+            said = mypy.communicate()[0]
+            if mypy.returncode:
+                print(said, end="")
+                code = code or mypy.returncode
+        sys.exit(code)
 
 
 if __name__ == "__main__":

@@ -18,6 +18,7 @@ import json
 import re
 import sys
 import tokenize
+from functools import cache
 from pathlib import Path
 from types import FrameType
 
@@ -35,6 +36,7 @@ _SILENT = {tokenize.COMMENT, tokenize.NL, tokenize.NEWLINE, tokenize.INDENT, tok
            tokenize.ENCODING, tokenize.ENDMARKER}  # fmt: skip
 
 
+@cache
 def code_lines(path: Path) -> int:
     """Lines of a file that hold code."""
     text = path.read_text(encoding="utf-8")
@@ -88,11 +90,11 @@ def path_of_identify() -> dict[str, int]:
             if kind.__module__.startswith("ctrl_realize"):
                 types.add(kind)
 
-    sys.setprofile(entered)
+    sys.settrace(entered)  # of calls alone
     try:
         cr.identify(record)
     finally:
-        sys.setprofile(None)
+        sys.settrace(None)
     return {
         "modules on the path of identify": len(modules),
         "functions on the path of identify": len(functions),
