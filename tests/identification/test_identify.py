@@ -171,7 +171,7 @@ def test_for_simulation_a_model_of_a_wrong_class_is_fitted_to_the_frequencies_of
 
 
 def test_for_simulation_as_for_prediction_a_right_structure_is_weighted_by_the_noise():
-    (prediction, simulation), _ = focused(LAG, 40)
+    (prediction, simulation), _ = focused(LAG, 25)
     assert simulation.fit.estimate.residual.noise_lags
     assert simulation.fit.dead_time == prediction.fit.dead_time
     assert simulation.fit.gain == prediction.fit.gain

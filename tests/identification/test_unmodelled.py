@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import ctrl_realize as cr
-from benchmarks.worlds import driven, loops, sensors, steps
+from benchmarks.worlds import driven, sensors, steps
 from benchmarks.worlds.judge import judged
 from tests.rigs import codes
 
@@ -15,7 +15,6 @@ FAMILIES = [
     (steps.still_coming_to_rest, 0, "not_at_rest"),
     (sensors.dead_band_of_a_historian, 0, "held_output"),
     (driven.insensitive, 0, "not_linear"),
-    (loops.relay_with_load, 0, "feedback"),
 ]
 
 

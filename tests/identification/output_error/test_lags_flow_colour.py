@@ -163,14 +163,14 @@ def test_ripple_hardly_touches_the_delay():
 @pytest.mark.parametrize("rest", [BEFORE, 90])  # it tells the noise, or is too short for that
 def test_slow_noise_leaves_a_narrower_interval_that_holds(rest):
     narrower = 0
-    for seed in range(4):
+    for seed in range(3):
         data, delay = record(seed, slow)
         data = data.between(data.time[BEFORE - rest], np.inf)
         low, high = cr.fit_output_error(data, **LAGS).fit.delay_interval
         assert low <= delay <= high
         first, last = cr.fit_output_error(data, noise="white", **LAGS).fit.delay_interval
         narrower += high - low < last - first
-    assert narrower >= 3
+    assert narrower >= 2
 
 
 def test_the_gain_in_slow_noise_has_its_standard_error_though_the_model_takes_part_of_it():

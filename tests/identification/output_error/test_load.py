@@ -79,7 +79,7 @@ def test_the_flag_names_the_time_on_the_clock_of_the_record():
     moved = record(5, 600.0, 0.3)
     later = cr.Record(1000 + TIME, moved.input, moved.output)
     for one, start in ((moved, 0.0), (later, 1000.0)):
-        fit = cr.identify(one).fit
+        fit = cr.identify(one, structures="P2D").fit
         (flag,) = told(fit)
         assert abs(fit.estimate.load.time - 600.0) < 0.02 * TIME[-1]
         assert f"cut the record before {start + fit.estimate.load.time:.4g} s" in str(flag)

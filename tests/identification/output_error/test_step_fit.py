@@ -178,15 +178,15 @@ def test_coloured_noise_leaves_a_delay_and_structures_disagree_only_where_it_mat
 
 
 def test_a_code_for_missing_samples_is_told_by_its_value():
-    record = rigs.step_record(noise=0.005)
+    record = rigs.step_record(rigs.R1, noise=0.005, before=300, after=600)
     y = record.output.copy()
-    y[[700, 1900]] = -9999.0
-    fit = cr.fit_output_error(cr.Record(record.time, record.input, y), **THREE).fit
+    y[[350, 800]] = -9999.0
+    fit = cr.fit_output_error(cr.Record(record.time, record.input, y), structures=[(1, 1)]).fit
     message = next(str(flag) for flag in fit.flags if flag.code == "outliers")
-    assert "2 sample(s), the first at index 700, are -9999" in message
+    assert "2 sample(s), the first at index 350, are -9999" in message
     # One wild sample of each kind is no code.
-    y[1900] = 8888.0
-    fit = cr.fit_output_error(cr.Record(record.time, record.input, y), **THREE).fit
+    y[800] = 8888.0
+    fit = cr.fit_output_error(cr.Record(record.time, record.input, y), structures=[(1, 1)]).fit
     assert not any("missing value" in str(flag) for flag in fit.flags)
 
 
