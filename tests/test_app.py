@@ -48,9 +48,15 @@ def fitted():
     return session, finished(session)
 
 
-def test_the_curve_over_the_dead_time_is_the_profile_of_the_fit(fitted):
+@pytest.fixture(scope="module")
+def called():
+    """What the same call of Python gives."""
+    return cr.identify(step_record())
+
+
+def test_the_curve_over_the_dead_time_is_the_profile_of_the_fit(fitted, called):
     _, view = fitted
-    fit = cr.identify(step_record()).fit
+    fit = called.fit
     curve = layer(panel(view, "model", "criterion"), "model")
     dead_time, misfit = fit.estimate.profile
     # in s, the unit of the panel
@@ -61,9 +67,9 @@ def test_the_curve_over_the_dead_time_is_the_profile_of_the_fit(fitted):
 
 
 @pytest.mark.parametrize("name", ["dead_time", "lag_1", "gain"])
-def test_a_dragged_model_is_the_closed_form_with_that_value(fitted, name):
+def test_a_dragged_model_is_the_closed_form_with_that_value(fitted, called, name):
     session, _ = fitted
-    fit = cr.identify(step_record()).fit
+    fit = called.fit
     values = {one.name: one.value for one in fit.parameters}
     moved = {name: 1.3 * values[name]}
     drag = session.apply({"do": "drag", "values": moved})["drag"]
@@ -102,9 +108,9 @@ def test_a_dragged_model_of_any_input_is_its_simulation(count):
     np.testing.assert_allclose(moved[there], expected, atol=0.3)
 
 
-def test_a_drag_says_whether_the_record_allows_the_dead_time(fitted):
+def test_a_drag_says_whether_the_record_allows_the_dead_time(fitted, called):
     session, _ = fitted
-    low, high = cr.identify(step_record()).fit.interval
+    low, high = called.fit.interval
     for value, allowed in ((0.9 * low, False), ((low + high) / 2, True), (1.1 * high, False)):
         drag = session.apply({"do": "drag", "values": {"dead_time": value}})["drag"]
         assert drag["misfit"]["allowed"] is allowed
@@ -324,12 +330,11 @@ def test_plants_that_a_quick_loop_makes_unstable_are_drawn_apart():
     assert max(band["high"]) < max(map(max, layer(drawn, "bad")["many"]))
 
 
-def test_noise_at_the_actuator_is_that_of_a_simulated_loop(fitted):
+def test_noise_at_the_actuator_is_that_of_a_simulated_loop(fitted, called):
     _, view = fitted
-    system = cr.identify(step_record())
-    pid = cr.design.pid(system)
+    pid = cr.design.pid(called)
     loop = cr.design.simulate_loop(
-        system, pid, 40_000, setpoint_step=0.0, noise_std=system.fit.noise_model.std
+        called, pid, 40_000, setpoint_step=0.0, noise_std=called.fit.noise_model.std
     )
     told = float(view["loop"]["noise"].partition(" by ")[2].partition(" ")[0])
     # of 40 000 samples, of which many follow one another, the std is known to 2 %
