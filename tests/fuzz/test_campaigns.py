@@ -218,7 +218,7 @@ def look_at(campaign: cr.Campaign) -> None:
 SETTINGS = [{"method": "scan", "order": 1, "max_delay": 12}, {"method": "paper", "order": 2}]
 
 
-@fuzz(25)
+@fuzz(15)
 def test_a_stopped_campaign_ends_as_one_that_was_not(rng, tmp_path_factory):
     with identified(rng):
         stopped_campaign(rng, tmp_path_factory)
@@ -256,7 +256,7 @@ def stopped_campaign(rng, tmp_path_factory):
 
 
 @pytest.mark.parametrize("method", ["scan", "output_error"])
-@fuzz(6)
+@fuzz(4)
 def test_what_a_campaign_says_follows_from_its_rows(rng, method):
     kinds = ["good"] * 4 + ["error of ours", "other dt", "no step"]
     sources = [
