@@ -22,7 +22,7 @@ from ..siso import (
 from .delay_robustness_result import DelayRobustness
 from .loop import Loop, open_loop
 from .margin_result import Margins
-from .margins import loop_margins
+from .margins import distance_if_stable, loop_margins
 
 MAX_DELAYS = 21
 """Largest number of delays that are tried within an interval."""
@@ -137,8 +137,10 @@ def _tried(
     held: float = 0.0,
 ) -> DelayRobustness:
     """Compute the margins at each delay, in samples, or in s for a continuous loop."""
-    margins = [found if d == nominal else loop_margins(_with_delay(loop, d)) for d in delays]
-    sizes = np.array([one.modulus_margin if one.stable else 0.0 for one in margins])
+    known = found.modulus_margin if found.stable else 0.0
+    sizes = np.array(
+        [known if d == nominal else distance_if_stable(_with_delay(loop, d)) for d in delays]
+    )
     (earlier, later), unit = _room(found), loop.dt or 1.0
     return DelayRobustness(
         delays=locked(delays),

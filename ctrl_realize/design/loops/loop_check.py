@@ -25,7 +25,7 @@ from .delay_robustness_result import DelayRobustness
 from .factors import factor
 from .loop import Loop, open_loop
 from .margin_result import Margins
-from .margins import loop_margins
+from .margins import distance_if_stable, loop_margins
 
 TRIED = 2
 """Delays of the interval whose margins are computed: its ends. Stability between them follows from
@@ -195,8 +195,7 @@ def _corners(
     corners = [Corner(time, nominal, _ms(size)) for _, time, size in ends]
     for gain, ratio in gains:
         for delay, time, _ in ends:
-            at = loop_margins(_moved(loop, delay, ratio))
-            corners.append(Corner(time, gain, _ms(at.modulus_margin if at.stable else 0.0)))
+            corners.append(Corner(time, gain, _ms(distance_if_stable(_moved(loop, delay, ratio)))))
     return tuple(corners)
 
 
@@ -209,8 +208,8 @@ def _of_models(loop: Loop, models: PlausibleModels) -> tuple[Corner, ...]:
     found = []
     for one, system in zip(models.models, models.systems, strict=True):
         other = replace(loop, factors=(factor(system, loop.dt), *loop.factors[1:]))
-        at, gain = loop_margins(other), float(np.real(system.delay_free.dcgain()))
-        ms = _ms(at.modulus_margin if at.stable else 0.0)
+        ms = _ms(distance_if_stable(other))
+        gain = float(np.real(system.delay_free.dcgain()))
         found.append(Corner(one.dead_time, gain if np.isfinite(gain) else None, ms))
     worst = max(found, key=lambda corner: corner.ms)
     return tuple(corner for corner in found if corner is not worst)

@@ -132,16 +132,23 @@ def loop_margins(loop: Loop) -> Margins:
     """Margins of a loop."""
     omega, values = follow(loop, loop.grid())
     count, marginal = closed_loop_count(loop, omega, values)
-    crossings = _crossings(loop, omega, values)
+    crossings = _crossings(loop, omega, values, _from_the_start(loop, omega, values))
     if loop.dt:
         crossings = replace(crossings, phases=_with_ends(loop, crossings.phases))
-    start = float(abs(1 + loop(np.zeros(1))[0]))
-    if start < crossings.distance:
-        crossings = replace(crossings, distance=start, closest=0.0)
     plain = _collect(loop, crossings, count, marginal, loop.dt)
     # So close to -1 the count is not reliable.
     stable = plain.stable and crossings.distance > MARGINAL
     return replace(plain, stable=stable, delay_margin=plain.delay_margin if stable else np.nan)
+
+
+def distance_if_stable(loop: Loop) -> float:
+    """Modulus margin of a loop, without the others; 0 if it is not stable."""
+    omega, values = follow(loop, loop.grid())
+    count, marginal = closed_loop_count(loop, omega, values)
+    if count or marginal:
+        return 0.0
+    distance, _ = _from_the_start(loop, omega, values)
+    return distance if distance > MARGINAL else 0.0
 
 
 @dataclass(frozen=True)
@@ -156,16 +163,23 @@ class _Crossings:
     closest: float
 
 
-def _crossings(loop: Curve, omega: FloatArray, values: ComplexArray) -> _Crossings:
-    distance, closest = smallest_distance(lambda w: 1 + loop(w), omega, 1 + values)
-    return _Crossings(
-        omega,
-        values,
-        unit_crossings(loop, omega, values),
-        negative_axis_crossings(loop, omega, values),
-        distance,
-        closest,
-    )
+def _crossings(
+    loop: Curve, omega: FloatArray, values: ComplexArray, closest: tuple[float, float]
+) -> _Crossings:
+    gains = unit_crossings(loop, omega, values)
+    return _Crossings(omega, values, gains, negative_axis_crossings(loop, omega, values), *closest)
+
+
+def _closest(loop: Curve, omega: FloatArray, values: ComplexArray) -> tuple[float, float]:
+    """Smallest distance to -1, and the frequency where it is reached."""
+    return smallest_distance(lambda w: 1 + loop(w), omega, 1 + values)
+
+
+def _from_the_start(loop: Loop, omega: FloatArray, values: ComplexArray) -> tuple[float, float]:
+    """The same from frequency 0 on."""
+    start = float(abs(1 + loop(np.zeros(1))[0]))
+    distance, closest = _closest(loop, omega, values)
+    return (start, 0.0) if start < distance else (distance, closest)
 
 
 def _with_ends(loop: Loop, phases: FloatArray) -> FloatArray:
@@ -238,7 +252,9 @@ def _collect(loop: Curve, at: _Crossings, count: int, marginal: bool, dt: float)
 
 def _from_data(loop: DataLoop) -> Margins:
     count, marginal = loop.closed_loop_count()
-    plain = _collect(loop, _crossings(loop, *loop.dense()), count, marginal, 0.0)
+    omega, values = loop.dense()
+    crossings = _crossings(loop, omega, values, _closest(loop, omega, values))
+    plain = _collect(loop, crossings, count, marginal, 0.0)
     plain = replace(plain, flags=(*plain.flags, *loop.flags()))
     if loop.std is None:
         return plain
