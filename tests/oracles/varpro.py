@@ -91,5 +91,5 @@ def _real_product(modes, weights):
         return modes[:, :, : weights.shape[1]] @ weights.real
     # Re(E w) = Re(E) Re(w) - Im(E) Im(w), as one product of real matrices.
     parts = np.stack([weights.real, -weights.imag], axis=2)
-    real = modes.view(np.float64)[:, :, : 2 * weights.shape[1]]
+    real = np.ascontiguousarray(modes).view(np.float64)[:, :, : 2 * weights.shape[1]]
     return real @ parts.reshape(weights.shape[0], -1, weights.shape[2])

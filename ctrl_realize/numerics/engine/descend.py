@@ -24,7 +24,8 @@ from __future__ import annotations
 import numpy as np
 
 from ..arrays import BoolArray, FloatArray, IntArray
-from .eliminate import compress, triangle
+from .eliminate import compress
+from .local_terms import triangle
 from .problem import Bounds, Problem, Structure
 
 IN_ROUNDING = 1e-11

@@ -25,13 +25,11 @@ References
 
 from __future__ import annotations
 
-from functools import lru_cache
-
 import numpy as np
 
-from ..arrays import FloatArray
+from ..arrays import ComplexArray, FloatArray
 from ..signals.sines import Sines
-from .local_terms import solve_upper
+from .local_terms import solve_upper, triangle
 from .modal import RealModes, moved_amplitudes, partial_fractions
 from .poles import poles_from_parameters
 from .problem import Compressed, Eliminated, Evaluation, Family, Problem, Structure
@@ -47,24 +45,38 @@ def eliminate(problem: Problem, structure: Structure, parameters: FloatArray) ->
     if models.local is None:
         linear = models.linear(triangle(columns)[:, q:, q:])
     else:
-        linear = models.local.without(models.linear(columns, q))
+        left = [part.left for part in models.local.reduced(columns)]
+        linear = models.linear(np.concatenate(left, axis=1), q)
     residual, weights, _ = _eliminated(linear)
     numerator = weights[:, : structure.zeros + 1]
     return Eliminated(np.add.reduce(residual * residual, axis=1), numerator)
 
 
 def compress(problem: Problem, structure: Structure, parameters: FloatArray) -> Compressed:
-    """Eliminate the linear terms at parameters (B, 1 + n), in as few rows as can be.
-
-    Free responses have other derivatives for every segment: with local terms all rows remain.
-    """
-    if problem.segments is not None or isinstance(structure, Family):
+    """Eliminate the linear terms at parameters (B, 1 + n), in as few rows as can be."""
+    if isinstance(structure, Family):
         return evaluate(problem, structure, parameters)
     models, q = _Models(problem, structure, parameters), problem.regressors.shape[1]
-    left = triangle(models.columns())[:, q:, q:]
-    residual, numerator, basis = _eliminated(models.linear(left))
-    jacobian = _orthogonal(left[:, :, :-1] @ models.slopes(numerator), basis)
-    return Compressed(np.add.reduce(residual * residual, axis=1), numerator, residual, jacobian)
+    columns, count = models.columns(), structure.zeros + 1
+    if models.local is None:
+        left = triangle(columns)[:, q:, q:]
+        residual, numerator, basis = _eliminated(models.linear(left))
+        derivative = left[:, :, :-1] @ models.slopes(numerator)
+    else:
+        free, k = models.free_slopes(), columns.shape[2]
+        parts = models.local.reduced(np.concatenate([columns, free], axis=2))
+        left = np.concatenate([part.left for part in parts], axis=1)
+        residual, weights, basis = _eliminated(models.linear(left[:, :, :k], q))
+        numerator = weights[:, :count]
+        derivative = left[:, :, q : k - 1] @ models.slopes(numerator)
+        remainder = models.remainder(weights, k)
+        moved = [
+            part.left[:, :, k:] @ models.moved(models.local.amplitudes(part, remainder))
+            for part in parts
+        ]
+        derivative[:, :, 1:] += np.concatenate(moved, axis=1)
+    cost = np.add.reduce(residual * residual, axis=1)
+    return Compressed(cost, numerator, residual, _orthogonal(derivative, basis))
 
 
 def evaluate(problem: Problem, structure: Structure, parameters: FloatArray) -> Evaluation:
@@ -139,7 +151,8 @@ class _Models:
                 parts.append(self._modes.columns(slope[:, :, :n]))
             if turning is not None:
                 parts.append(turning.direct_slope(self._tau)[:, :, None])
-            inside[:] = np.swapaxes(problem.weighted(np.concatenate(parts, axis=2)), 1, 2)
+            made = np.concatenate(parts, axis=2)
+            inside[:] = np.swapaxes(problem.weighted(made), 1, 2)
         return np.swapaxes(space, 1, 2)
 
     def linear(self, columns: FloatArray, regressors: int = 0) -> FloatArray:
@@ -159,10 +172,27 @@ class _Models:
         level = ((-1.0 / self._free)[:, None] @ self.dfree)[:, 0].real
         found[:, 0, 1:] = level * (self._gain * numerator[:, 0])[:, None]
         found[:, 1 : 1 + count] = self._modes.weights(through)
-        moved = amplitudes[:, :n, None] * self.dfree
-        found[:, 1 + count : 1 + count + n, 1:] = self._modes.weights(moved)
+        found[:, 1 + count : 1 + count + n, 1:] = self.moved(amplitudes[:, :n])
         if self._sines is not None:
             found[:, -1, 0] = numerator[:, -1]
+        return found
+
+    def moved(self, amplitudes: ComplexArray) -> FloatArray:
+        """Weights (B, n, n) of the modes' derivatives, where modes of amplitudes (B, n) move."""
+        return self._modes.weights(amplitudes[:, :, None] * self.dfree)
+
+    def free_slopes(self) -> FloatArray:
+        """Weighted derivatives (B, m, n) of the modes of free responses."""
+        assert self.local is not None
+        return self._modes.columns(self.local.slope) * self._problem.root_weight[:, None]
+
+    def remainder(self, weights: FloatArray, count: int) -> FloatArray:
+        """Weights (B, count) of all columns in the data without regressors and responses."""
+        q, (made, powers) = self._problem.regressors.shape[1], self.weights.shape[1:]
+        found = np.zeros((len(weights), count))
+        found[:, :q] = -weights[:, powers:]
+        found[:, q : q + made] = -(self.weights @ weights[:, :powers, None])[:, :, 0]
+        found[:, -1] = 1.0
         return found
 
 
@@ -185,19 +215,6 @@ def _eliminated(columns: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray
 def _orthogonal(columns: FloatArray, basis: FloatArray) -> FloatArray:
     """Project an orthonormal basis (B, m, k) out of columns (B, m, l)."""
     return np.asarray(columns - basis @ (np.swapaxes(basis, 1, 2) @ columns))
-
-
-def triangle(columns: FloatArray) -> FloatArray:
-    """Triangular factor (B, k, k) of columns (B, m, k) with m >= k; fewer rows if m < k."""
-    # What LAPACK leaves, without the reflections below; `mode="r"` takes as long again for that.
-    left = np.swapaxes(np.linalg.qr(columns, mode="raw")[0], 1, 2)
-    rows = min(left.shape[1:])
-    return np.asarray(left[:, :rows] * _upper(rows, left.shape[2]))
-
-
-@lru_cache(maxsize=64)
-def _upper(rows: int, columns: int) -> FloatArray:
-    return np.triu(np.ones((rows, columns)))
 
 
 def _step_columns(

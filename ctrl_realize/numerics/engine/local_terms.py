@@ -26,9 +26,9 @@ References
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from itertools import pairwise
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -80,20 +80,16 @@ class Segments:
         return sum(int(self.regressors[rows].any(axis=0).sum()) for rows in self.rows)
 
 
-class FixedTerms:
-    """Part of the local terms that does not depend on the plant, orthonormalised once.
+class Reduced(NamedTuple):
+    """One segment after an orthogonal transformation, local terms first.
 
-    Parameters
-    ----------
-    segments : Segments
-    root_weight : ndarray, shape (m,)
+    ``left`` (B, k', k) are the rows in which none of them is, ``above`` (B, f, k) those of their
+    ``triangle`` (B, f, f).
     """
 
-    def __init__(self, segments: Segments, root_weight: FloatArray) -> None:
-        self.segments = segments
-        self.weight = root_weight
-        weighted = segments.regressors * root_weight[:, None]
-        self.parts = [_orthonormal(weighted[rows]) for rows in segments.rows]
+    triangle: FloatArray
+    above: FloatArray
+    left: FloatArray
 
 
 class LocalTerms:
@@ -101,44 +97,59 @@ class LocalTerms:
 
     Parameters
     ----------
-    fixed : FixedTerms
+    segments : Segments
+    root_weight : ndarray, shape (m,)
     poles : ndarray, shape (B, n)
         Of the plant; conjugates are neighbours, an odd one comes first.
     """
 
-    def __init__(self, fixed: FixedTerms, poles: ComplexArray) -> None:
-        segments = fixed.segments
-        self._fixed = fixed
-        self._rows = segments.rows
-        self._poles = poles
-        self._weight = fixed.weight
-        self._decay, self._slope = _decay(segments, poles)
-        self._known = segments.regressors.shape[1]
-        columns = _free_columns(self._decay, poles) * self._weight[:, None]
-        self._bases: list[FloatArray] = []
-        self._triangles: list[FloatArray] = []
-        self._shared: list[FloatArray] = []
-        self._norms: list[FloatArray] = []
-        for rows, (q, _, _) in zip(self._rows, fixed.parts, strict=True):
-            own, norm = _normalised(columns[:, rows])
-            shared = q.T @ own
-            own = own - q @ shared
-            # Repeated: columns that are nearly within the fixed terms lose digits the first time.
-            again = q.T @ own
-            basis, triangle = np.linalg.qr(own - q @ again)
-            basis *= np.any(columns[:, rows], axis=1)[:, None, : basis.shape[2]]
-            self._bases.append(basis)
-            self._triangles.append(triangle)
-            self._shared.append(shared + again)
-            self._norms.append(norm)
+    def __init__(self, segments: Segments, root_weight: FloatArray, poles: ComplexArray) -> None:
+        self._rows, self._known = segments.rows, segments.regressors.shape[1]
+        self._poles, self._weight = poles, root_weight
+        decay, self.slope = _decay(segments, poles)
+        columns = _columns(segments, decay, poles) * root_weight[:, None]
+        self._terms = [_with_a_row_for_zeros(columns[:, rows]) for rows in self._rows]
+
+    @cached_property
+    def _bases(self) -> list[tuple[FloatArray, FloatArray, FloatArray]]:
+        """Of every segment: basis (B, m, f), triangle (B, f, f), and norms (B, f) of its terms."""
+        found = []
+        for rows, terms in zip(self._rows, self._terms, strict=True):
+            single, norm = _normalised(terms)
+            basis, upper = np.linalg.qr(single)
+            found.append((basis[:, : rows.stop - rows.start], upper, norm))
+        return found
+
+    def reduced(self, columns: FloatArray) -> list[Reduced]:
+        """Transform weighted columns (B, m, k) of every segment to as few rows as can be."""
+        found = []
+        for rows, terms in zip(self._rows, self._terms, strict=True):
+            batch, length, f = terms.shape
+            every = np.zeros((batch, f + columns.shape[2], length))
+            every[:, :f] = np.swapaxes(terms, 1, 2)
+            every[:, f:, : rows.stop - rows.start] = np.swapaxes(columns[:, rows], 1, 2)
+            upper = triangle(np.swapaxes(every, 1, 2))
+            found.append(Reduced(upper[:, :f, :f], upper[:, :f, f:], upper[:, f:, f:]))
+        return found
+
+    def amplitudes(self, part: Reduced, weights: FloatArray) -> ComplexArray:
+        """Amplitudes (B, n) of the free responses of a segment, fitted to its first columns.
+
+        They are combined by weights (B, k).
+        """
+        upper, norm = _normalised(part.triangle)
+        right = (part.above[:, :, : weights.shape[1]] @ weights[:, :, None])[:, :, 0]
+        return self._amplitudes((solve_upper(upper, right) / norm)[:, self._known :])
 
     def without(self, columns: FloatArray) -> FloatArray:
         """Project the local terms out of weighted columns (B, m, k)."""
         left = np.empty_like(columns)
-        for rows, (q, _, _), basis in zip(self._rows, self._fixed.parts, self._bases, strict=True):
+        for rows, (basis, _, _) in zip(self._rows, self._bases, strict=True):
             part = columns[:, rows]
-            part = part - q @ (q.T @ part)
-            left[:, rows] = part - basis @ (np.swapaxes(basis, 1, 2) @ part)
+            # Repeated: what is nearly within the terms loses digits the first time.
+            for _ in range(2):
+                part = part - basis @ (np.swapaxes(basis, 1, 2) @ part)
+            left[:, rows] = part
         return left
 
     def moved(self, rest: FloatArray, dpoles: ComplexArray) -> FloatArray:
@@ -155,7 +166,7 @@ class LocalTerms:
         for i, rows in enumerate(self._rows):
             amplitudes = self._amplitudes(self._weights(i, rest)[:, self._known :])
             turned = amplitudes[:, :, None] * dpoles
-            slope = self._slope[:, rows]
+            slope = self.slope[:, rows]
             out[:, rows] = (slope @ (turned if np.iscomplexobj(slope) else turned.real)).real
         return out * self._weight[:, None]
 
@@ -172,13 +183,9 @@ class LocalTerms:
 
     def _weights(self, i: int, rest: FloatArray) -> FloatArray:
         """Coefficients of the local terms of segment i, fitted to weighted data (B, m)."""
-        q, r, norm = self._fixed.parts[i]
-        part = rest[:, self._rows[i]]
-        inside = np.einsum("bmk,bm->bk", self._bases[i], part - (part @ q) @ q.T)
-        free = solve_upper(self._triangles[i], inside)
-        known = part @ q - np.einsum("bqk,bk->bq", self._shared[i], free)
-        triangle = np.broadcast_to(r, (len(part), *r.shape))
-        return np.concatenate([solve_upper(triangle, known) / norm, free / self._norms[i]], axis=1)
+        basis, upper, norm = self._bases[i]
+        inside = np.einsum("bmk,bm->bk", basis, rest[:, self._rows[i]])
+        return solve_upper(upper, inside) / norm
 
     def _amplitudes(self, weights: FloatArray) -> ComplexArray:
         """Convert coefficients of the columns to amplitudes of the exponentials."""
@@ -197,9 +204,14 @@ def local_columns(segments: Segments, poles: ComplexArray) -> FloatArray:
 
 def _decay(segments: Segments, poles: ComplexArray) -> tuple[Any, Any]:
     """Exponentials (B, m, n) of the poles, and their derivatives; real if all poles are."""
-    # Real exponentials take a fifth of the time of complex ones.
-    rates = poles if poles.imag.any() else poles.real
-    decay = np.exp(segments.clock[:, None] * rates[:, None, :])
+    turns = poles.imag.any(axis=1)
+    rates = poles if turns.any() else poles.real
+    # The samples of a pole are contiguous, as factorisations have them.
+    decay = np.empty((*rates.shape, segments.clock.size), dtype=rates.dtype)
+    # Real exponentials take a twentieth of the time of complex ones.
+    decay[~turns] = np.exp(poles.real[~turns, :, None] * segments.clock)
+    decay[turns] = np.exp(rates[turns, :, None] * segments.clock)
+    decay = np.swapaxes(decay, 1, 2)
     slope = segments.clock[:, None] * decay
     if segments.bins is not None:
         mean, turn, kind = segments.bins.bin_means(rates)
@@ -221,8 +233,9 @@ def _free_columns(decay: Any, poles: ComplexArray) -> FloatArray:
     Beside the other pole of its pair such a pole would be a direction of rounding errors.
     """
     n = poles.shape[1]
-    free = np.empty(decay.shape)
-    over = np.abs(decay).max(axis=1, initial=0.0) < _OVER
+    free = np.empty_like(decay, dtype=np.float64)
+    parts = (decay.real, decay.imag) if np.iscomplexobj(decay) else (decay,)
+    over = np.max([np.abs(part).max(axis=1, initial=0.0) for part in parts], axis=0) < _OVER
     if n % 2:
         free[:, :, 0] = np.where(over[:, :1], 0.0, decay[:, :, 0].real)
     for i in range(n % 2, n, 2):
@@ -234,13 +247,12 @@ def _free_columns(decay: Any, poles: ComplexArray) -> FloatArray:
     return free
 
 
-def _orthonormal(columns: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Basis (m, k) of columns of norm 1, triangle (k, k), and the original norms (k,)."""
-    single, norm = _normalised(columns[None])
-    q, r = np.linalg.qr(single[0])
-    # A zero column spans nothing, but QR would add a direction for it.
-    q[:, ~single[0].any(axis=0)[: q.shape[1]]] = 0.0
-    return q, r, norm[0]
+def _with_a_row_for_zeros(terms: FloatArray) -> FloatArray:
+    """Terms (B, m, f); where some are zero, in more rows, so that these take none of the data."""
+    empty = np.asarray(~terms.any(axis=1))
+    if not empty.any():
+        return terms
+    return np.concatenate([terms, np.eye(empty.shape[1]) * empty[:, None]], axis=1)
 
 
 def _normalised(columns: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -260,3 +272,16 @@ def solve_upper(r: FloatArray, right: FloatArray) -> FloatArray:
         resolved = np.abs(r[:, i, i]) > 1e-12
         x[:, i] = np.where(resolved, rest / np.where(resolved, r[:, i, i], 1.0), 0.0)
     return x
+
+
+def triangle(columns: FloatArray) -> FloatArray:
+    """Triangular factor (B, k, k) of columns (B, m, k) with m >= k; fewer rows if m < k."""
+    # What LAPACK leaves, without the reflections below; `mode="r"` takes as long again for that.
+    left = np.swapaxes(np.linalg.qr(columns, mode="raw")[0], 1, 2)
+    rows = min(left.shape[1:])
+    return np.asarray(left[:, :rows] * _upper(rows, left.shape[2]))
+
+
+@lru_cache(maxsize=64)
+def _upper(rows: int, columns: int) -> FloatArray:
+    return np.triu(np.ones((rows, columns)))

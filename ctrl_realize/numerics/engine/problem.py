@@ -25,7 +25,7 @@ from functools import cached_property
 import numpy as np
 
 from ..arrays import ComplexArray, FloatArray
-from .local_terms import FixedTerms, LocalTerms, Segments
+from .local_terms import LocalTerms, Segments
 from .responses import HeldInput
 
 
@@ -72,14 +72,10 @@ class Problem:
         """Fixed regressors (m, q) in units of the noise."""
         return self.weighted(self.regressors)
 
-    @cached_property
-    def _fixed(self) -> FixedTerms:
-        assert self.segments is not None
-        return FixedTerms(self.segments, self.root_weight)
-
     def local_terms(self, poles: ComplexArray) -> LocalTerms:
         """Local terms of the segments for poles (B, n)."""
-        return LocalTerms(self._fixed, poles)
+        assert self.segments is not None
+        return LocalTerms(self.segments, self.root_weight, poles)
 
     def local_count(self, order: int) -> int:
         """Number of local linear terms of all segments, for a model of a given order."""

@@ -281,10 +281,10 @@ class SampledInput(HeldInput):
         """Evaluate H, E and T at every sample; see `HeldInput`."""
         n = self.signal.size
         moves = np.diff(self.signal, prepend=0.0)
-        # Real recursions take a third of the time of complex ones.
         rates = poles if poles.imag.any() else poles.real
         static = np.zeros((tau.size, n))
-        mode = np.zeros((tau.size, n, poles.shape[1]), dtype=rates.dtype)
+        # The samples of a pole are contiguous, as filters and factorisations have them.
+        mode = np.zeros((*rates.shape, n), dtype=rates.dtype)
         slope = np.zeros_like(mode)
         for b in range(tau.size):
             # A change at sample l is first visible at the first sample after l + tau/dt.
@@ -294,20 +294,22 @@ class SampledInput(HeldInput):
             rest = max(whole * self.dt - tau[b], 0.0)
             static[b, whole:] = self.signal[: n - whole]
             before = None
-            for j, pole in enumerate(rates[b]):
+            for j, pole in enumerate(poles[b]):
                 if pole.imag and before is not None and pole == before.conjugate():
-                    mode[b, whole:, j] = mode[b, whole:, j - 1].conj()
-                    slope[b, whole:, j] = slope[b, whole:, j - 1].conj()
+                    mode[b, j, whole:] = mode[b, j - 1, whole:].conj()
+                    slope[b, j, whole:] = slope[b, j - 1, whole:].conj()
                     continue
                 before = pole
-                z = np.exp(pole * self.dt)
+                # Real recursions take half of the time of complex ones.
+                rate = pole if pole.imag else pole.real
+                z = np.exp(rate * self.dt)
                 sums = lfilter([1.0], [1.0, -z], moves[: n - whole])
                 # d(z^k)/dp = k dt z^k: a second pass of the same recursion.
                 weighted = lfilter([0.0, z * self.dt], [1.0, -z], sums)
-                gain = np.exp(pole * rest)
-                mode[b, whole:, j] = gain * sums
-                slope[b, whole:, j] = gain * (weighted + rest * sums)
-        return static, mode, slope
+                gain = np.exp(rate * rest)
+                mode[b, j, whole:] = gain * sums
+                slope[b, j, whole:] = gain * (weighted + rest * sums)
+        return static, np.swapaxes(mode, 1, 2), np.swapaxes(slope, 1, 2)
 
 
 @dataclass(frozen=True, eq=False)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from ctrl_realize.numerics.engine.local_terms import FixedTerms, LocalTerms, Segments
+from ctrl_realize.numerics.engine.local_terms import LocalTerms, Segments
 from ctrl_realize.numerics.engine.poles import poles_from_parameters
 
 CLOCK = np.concatenate([np.arange(70.0), np.arange(110.0)])
@@ -25,7 +25,7 @@ THETA = {
 def test_what_a_record_has_for_itself_disappears(theta):
     poles, _ = poles_from_parameters(np.array([theta]))
     rng = np.random.default_rng(0)
-    own = LocalTerms(FixedTerms(STRETCHES, np.ones(180)), poles)
+    own = LocalTerms(STRETCHES, np.ones(180), poles)
     data = np.zeros(180)
     for rows in STRETCHES.rows:
         # every real free response: with conjugate amplitudes
@@ -36,21 +36,25 @@ def test_what_a_record_has_for_itself_disappears(theta):
     assert_allclose(left, 0.0, atol=1e-9 * np.abs(data).max())
 
 
-def test_a_free_response_that_is_over_before_the_first_row_takes_nothing_away():
-    clock = np.arange(60.0) + 0.5
+# alone, beside the other of its pair, and before a pair
+@pytest.mark.parametrize(
+    ("lasting", "over"),
+    [([], [-900.0]), ([-0.2], [-0.2, -900.0]), ([-0.2, -0.3], [-900.0, -0.2, -0.3])],
+)
+def test_a_free_response_that_is_over_before_the_first_row_takes_nothing_away(lasting, over):
+    clock, weight = np.arange(60.0) + 0.5, np.linspace(1.0, 2.0, 60)
     rows = Segments(np.array([0, 60]), clock, np.ones((60, 1)))
-    fixed = FixedTerms(rows, np.ones(60))
     data = np.random.default_rng(0).normal(size=(1, 60, 1))
-    alone = LocalTerms(fixed, np.array([[-0.2 + 0j]])).without(data)
-    beside = LocalTerms(fixed, np.array([[-0.2 + 0j, -900.0 + 0j]])).without(data)
-    assert_allclose(beside, alone, atol=1e-12)
-    none = LocalTerms(fixed, np.array([[-900.0 + 0j]])).without(data)
-    assert_allclose(none, data - data.mean(), atol=1e-12)
+    without = [
+        LocalTerms(rows, weight, np.array([poles], dtype=np.complex128)).without(data)
+        for poles in (lasting, over)
+    ]
+    assert_allclose(without[1], without[0], atol=1e-12)
 
 
 def test_nothing_else_disappears_and_records_do_not_mix():
     poles, _ = poles_from_parameters(np.array([THETA["three"]]))
-    own = LocalTerms(FixedTerms(STRETCHES, np.ones(180)), poles)
+    own = LocalTerms(STRETCHES, np.ones(180), poles)
     data = np.zeros(180)
     data[:70] = np.random.default_rng(0).normal(size=70)
     left = own.without(data[None, :, None])[0, :, 0]
