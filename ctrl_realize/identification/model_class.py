@@ -147,9 +147,10 @@ def _chosen(
     if lags.residual <= HOPELESS * float(modes.noise_std[0]):
         low, high = min(low, lags.interval[0]), max(high, lags.interval[1])
     dead_time = dt * _delay(system)
-    staying = marked("stays_with_states") - {flag.code for flag in modes.flags}
-    kept = [flag for flag in lags.flags if flag.code in staying]
-    flags, notes = [*cut, *modes.flags, *kept], list[str]()
+    kept = [flag for flag in lags.flags if flag.code in marked("stays_with_states")]
+    codes = {flag.code for flag in kept}
+    own_flags = [flag for flag in modes.flags if flag.code not in codes]
+    flags, notes = [*cut, *own_flags, *kept], list[str]()
     if len(modes.checks) == 1 and all(flag.code != "feedback" for flag in flags):
         check = modes.checks[0]
         output, drive = np.ravel(check.record.output), np.ravel(check.record.input)

@@ -23,7 +23,7 @@ from ...numerics.signals.counters import counter_period
 from ...numerics.validation.own_response import OwnResponse
 from .averaging import common_sample_time
 from .flags import sampled_flags
-from .loop_flags import loop_choices
+from .loop_flags import late_input, loop_choices
 from .repeat_flags import repeat_flags
 from .repeatability import (
     Repeatability,
@@ -100,13 +100,18 @@ def _fit(
         raise UnrelatedError(
             f"{_named(records)}: the output does not respond to the input, which explains nothing "
             f"beyond the noise (test value {found.explained:.3g}, needed {FOLLOWS:g}); "
-            + (codes[0] if codes else _turns(found.data.measured))
+            + (codes[0] if codes else _advice(records, found.data.measured))
         )
     return found
 
 
-def _turns(outputs: Sequence[FloatArray]) -> str:
-    """Advice where the output does not follow the input: a counter that starts again is named."""
+def _advice(records: Sequence[Record], outputs: Sequence[FloatArray]) -> str:
+    """Advice where the output does not follow the input, which may be late.
+
+    A counter that starts again is named.
+    """
+    if all(not record.n_missing for record in records) and (late := late_input(records)):
+        return str(flagged("feedback.late", **late))
     for output in outputs:
         if (period := counter_period(output)) is not None:
             return (

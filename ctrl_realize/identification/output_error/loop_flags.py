@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 from scipy.special import ndtr
@@ -14,7 +14,7 @@ from ...numerics.arrays import BoolArray, FloatArray
 from ...numerics.constants import Z_95
 from ...numerics.output_error.result import UnweightedModel
 from ...numerics.signals.excitation import lively_start
-from ...numerics.validation.innovations import feedback_chance
+from ...numerics.validation.innovations import feedback_chance, late_samples
 from ...numerics.validation.instability import unstable_chance
 from ...numerics.validation.white_step import WhiteStep, white_step
 from .result import OutputErrorFit
@@ -96,8 +96,18 @@ def feedback_flags(records: tuple[Record, ...], delay: float) -> Iterator[Flag]:
         return
     if all(in_automatic(record) for record in records):
         yield flagged("feedback.moved", chance=min(chances))
+    elif late := late_input(records):
+        yield flagged("feedback.late", **late)
     else:
         yield flagged("feedback", chance=min(chances))
+
+
+def late_input(records: Sequence[Record]) -> dict[str, float]:
+    """Samples by which inputs are late, and the percentage that tells it: see `late_samples`."""
+    stretches = [(y[0], u[0], past_inputs(y[0].size, 0.0)) for y, u in _stretches(records)]
+    found = [late_samples(*stretch) for stretch in stretches]
+    samples, part = (min(values) for values in zip(*found, strict=True))
+    return {"samples": samples, "part": 100 * part} if samples else {}
 
 
 def _regulates(record: Record) -> bool:
@@ -121,7 +131,7 @@ def _rare(chances: list[float]) -> bool:
     return min(chances) < RARE / len(chances)
 
 
-def _stretches(records: tuple[Record, ...]) -> list[tuple[FloatArray, FloatArray]]:
+def _stretches(records: Sequence[Record]) -> list[tuple[FloatArray, FloatArray]]:
     """Outputs (p, n) and inputs (m, n) of the part of each record with the largest variation."""
     found = []
     for record in records:

@@ -87,6 +87,18 @@ def test_an_output_that_does_not_follow_the_input_gets_no_answer():
         cr.fit_output_error(cr.Record(good.time, good.input, y), structures=[(1, 1), (2, 2)])
 
 
+def test_an_output_that_responds_within_the_sample_is_told_by_how_much_its_input_is_late():
+    rng = np.random.default_rng(0)
+    t, u = np.arange(600.0), rng.standard_normal(600)
+    y = 2 * u + 0.05 * rng.standard_normal(600)
+    with pytest.raises(DataError, match=r"late.*Record\(time\[:-1\], input\[1:\], output\[:-1\]\)"):
+        cr.fit_output_error(cr.Record(t, u, y))
+    fit = cr.fit_output_error(cr.Record(t[:-1], u[1:], y[:-1])).fit
+    assert fit.gain == pytest.approx(2, rel=0.01)
+    assert fit.interval[0] == 0.0
+    assert fit.interval[1] == pytest.approx(1, abs=0.05)
+
+
 def test_all_samples_of_a_long_record_count():
     colour = 0.9
     rng = np.random.default_rng(2)

@@ -117,3 +117,20 @@ def test_a_response_that_settles_has_no_plateau():
     for seed in range(3):
         fit = fitted(u, clipped(u, np.inf, "before", seed, noise=0.04), structures=FEW)
         assert not codes(fit) & {"may_be_at_limit", "output_at_limit"}
+
+
+@pytest.mark.parametrize("seed", [0, 1, 11])
+def test_an_output_that_a_controller_holds_is_at_no_limit(seed):
+    # A lag of 20 samples behind 12 under a gain of 0.5: it rises as if to twice its level, and is
+    # held there.
+    size, pole = 800, np.exp(-1 / 20)
+    noise = 0.02 * np.random.default_rng(seed).standard_normal(size)
+    wanted = np.repeat([0.0, 1.0, -1.0, 1.0], size // 4)
+    u, y, state = np.zeros(size), np.zeros(size), 0.0
+    for k in range(size):
+        y[k] = state + noise[k]
+        u[k] = 0.5 * (wanted[k] - y[k])
+        state = pole * state + (1 - pole) * u[max(k - 12, 0)]
+    fit = cr.fit_output_error(cr.Record(DT * np.arange(size), u, y), structures=FEW).fit
+    assert fit.interval[0] <= 12 * DT <= fit.interval[1]
+    assert not codes(fit)

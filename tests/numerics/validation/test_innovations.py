@@ -6,7 +6,11 @@ import pytest
 from scipy.signal import lfilter
 
 import ctrl_realize as cr
-from ctrl_realize.numerics.validation.innovations import feedback_chance, nonlinear_chance
+from ctrl_realize.numerics.validation.innovations import (
+    feedback_chance,
+    late_samples,
+    nonlinear_chance,
+)
 from ctrl_realize.numerics.validation.instability import unstable_chance
 from ctrl_realize.numerics.validation.parameter_change import parameter_change
 from ctrl_realize.numerics.validation.white_step import white_step
@@ -52,6 +56,26 @@ def test_a_controller_is_found_by_the_noise_that_it_passes_on(seed, gain, integr
     noise = 0.05 * lfilter([1.0], [1, -0.9], rng.standard_normal(N))
     u, y = loop(rng, gain, integral, noise)
     assert feedback_chance(y, u, 20) < SURE
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_a_pulse_into_an_integrator_tells_of_no_feedback(seed):
+    rng = np.random.default_rng(seed)
+    u = np.where(np.arange(N) // 30 == 4, 1.0, 0.0)
+    y = 0.03 * np.cumsum(first_order(u)) + 0.02 * rng.standard_normal(N)
+    assert feedback_chance(y, u, 60) == 1.0
+
+
+@pytest.mark.parametrize("samples", [0, 1, 4])
+@pytest.mark.parametrize("held", [1, 3, 12])
+@pytest.mark.parametrize("pole", [0.0, 0.8])
+def test_samples_by_which_an_input_is_late_are_counted(samples, held, pole):
+    rng = np.random.default_rng(held)
+    u = np.repeat(rng.choice([-1.0, 0.0, 1.0], N // held), held)
+    y = lfilter([0.0, 1 - pole], [1, -pole], u) + 0.02 * rng.standard_normal(N)
+    late, part = late_samples(y[: N - samples], np.r_[np.zeros(samples), u][: N - samples], 30)
+    assert late == samples
+    assert (part > 0.5) == (samples > 0)
 
 
 @pytest.mark.parametrize("seed", range(5))

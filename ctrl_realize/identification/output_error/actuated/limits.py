@@ -20,6 +20,7 @@ from ....numerics.constants import STRONG
 from ....numerics.validation.limits import at_limit, clips, ends, passed, plateaus
 from ...plausible import continuous_core
 from ..arguments import FEWEST_SAMPLES, step_data_of
+from ..loop_flags import feedback_flags
 from ..result import OutputErrorFit
 from ..summary import fitted_model
 
@@ -85,6 +86,9 @@ def _without_plateaus(record: Record, linear: OutputErrorFit, fit: Fit) -> Outpu
     output = np.ravel(record.output)
     held, evidence = plateaus(output, [edge for edge, _ in linear.data.edges])
     if not held.any():
+        return linear
+    # A controller holds the output as well, and a model of it alone leaves much to explain.
+    if not record.n_missing and any(feedback_flags((record,), linear.delay)):
         return linear
     if np.isfinite(linear.onset):  # any other input may leave the output where it is
         when = in_time(record.time[np.argmax(held)])
