@@ -62,8 +62,8 @@ class Scales:
     `length` the duration of the record after the change of the input, `dt` the sample time.
     `latest` and `earliest` bound the dead time; `ringing` is an angular frequency that stands out
     of the residual of a first-order fit, or 0; `integrating`: the pole of that fit is far slower
-    than the record. `bounds` are those of the parameters of an order where there are no
-    samples, as for points of a frequency response.
+    than the record. No pole is slower than `slowest`, in 1/s. `bounds` are those of the parameters
+    of an order where there are no samples, as for points of a frequency response.
     """
 
     onset: float
@@ -74,6 +74,7 @@ class Scales:
     earliest: float = 0.0
     ringing: float = 0.0
     integrating: bool = False
+    slowest: float = 0.0
     bounds: Callable[[int], Bounds] | None = None
 
 
@@ -185,7 +186,8 @@ def parameter_bounds(structure: Structure, scales: Scales) -> Bounds:
     if scales.bounds is not None:
         return scales.bounds(order)
     fast = np.log((SLOWER_WITH_ZEROS if structure.zeros else FASTEST) / scales.dt)
-    slow = np.log(SLOWEST / scales.length)
+    slow = np.log(max(SLOWEST / scales.length, scales.slowest))
+    slow_pair = np.log(max(SLOWEST_PAIR / scales.length, scales.slowest))
     low, high = [scales.earliest], [scales.latest]
     if order % 2:
         low.append(slow)
@@ -197,7 +199,7 @@ def parameter_bounds(structure: Structure, scales: Scales) -> Bounds:
             total = np.log(2 * _DAMPING) + fast
             size = (total + slow) / 2
             damping = (total - slow) / 2 - np.log(2.0)
-        low += [np.log(SLOWEST_PAIR / scales.length), np.log(LEAST_DAMPING)]
+        low += [slow_pair, np.log(LEAST_DAMPING)]
         high += [size, damping]
     return Bounds(np.array(low), np.array(high))
 

@@ -36,7 +36,7 @@ from scipy.linalg import eigh
 from scipy.signal import fftconvolve, lfilter
 
 from ...arrays import ComplexArray, FloatArray
-from ...constants import HUBER
+from ...constants import HUBER, SMALLEST
 from ...engine.responses import HeldInput, Modes, SampledInput
 from ...regression.normal_equations import NormalEquations, normal_equations
 from ...signals.excitation import lively_start
@@ -123,14 +123,15 @@ def condensed(
     """
     if not 1 < lags <= MOST_LAGS or sum(y.size for y in outputs) < PER_LAG * lags:
         return None
-    whiten, pulse = _noise_and_pulse(outputs, inputs, lags, huber=huber)
+    whiten = _noise(outputs, inputs, lags, huber=huber)
     sums: NormalEquations | None = None
     for y, u in _pieces(outputs, inputs, lags + whiten.size - 1):
         white_y = lfilter(whiten, [1.0], y)[whiten.size - 1 :]
         white_u = lfilter(whiten, [1.0], u)[whiten.size - 1 :]
         if huber:
-            error = white_y[lags - 1 :] - fftconvolve(white_u, pulse, "valid")
-            white_y[lags - 1 :] += _pulled_in(error)
+            # A pulse response from another part would hold at the frequencies of that part only.
+            pulse = _free_pulse(white_y, white_u, lags, turns=_TURNS)
+            white_y[lags - 1 :] += _pulled_in(_left(white_y, white_u, pulse))
         part = normal_equations(white_u[None], white_y[None], lags)
         sums = part if sums is None else sums + part
     if sums is None:
@@ -149,39 +150,39 @@ def condensed(
     return Condensed(data, drive, noise, sums.rows, whiten.size - 1)
 
 
-def _noise_and_pulse(
+def _noise(
     outputs: Sequence[FloatArray], inputs: Sequence[FloatArray], lags: int, *, huber: bool
-) -> tuple[FloatArray, FloatArray]:
-    """Autoregressive noise model, leading 1 included, and a first pulse response.
+) -> FloatArray:
+    """Autoregressive noise model, leading 1 included, of the longest record where its input moves.
 
-    From the longest record, where its input moves: assuming white noise first, then with the noise
-    model.
+    It is that of the residual of a free pulse response.
     """
     longest = int(np.argmax([y.size for y in outputs]))
     y, u = outputs[longest], inputs[longest]
     count = min(y.size, _PIECE)
     start = lively_start(u[None], count)
     y, u = (x[start : start + count] - np.mean(x[start : start + count]) for x in (y, u))
-    pulse = _free_pulse(y, u, lags, huber=huber)
-    error = y[lags - 1 :] - fftconvolve(u, pulse, "valid")
-    whiten = whitening_filter(error, MOST_NOISE_LAGS, 3.0)
-    y, u = (lfilter(whiten, [1.0], x)[whiten.size - 1 :] for x in (y, u))
-    return whiten, _free_pulse(y, u, lags, huber=huber)
+    pulse = _free_pulse(y, u, lags, turns=_TURNS if huber else 1)
+    return whitening_filter(_left(y, u, pulse), MOST_NOISE_LAGS, 3.0)
 
 
-def _free_pulse(y: FloatArray, u: FloatArray, lags: int, *, huber: bool) -> FloatArray:
-    """Free pulse response by least squares, with Huber steps as needed for outliers."""
-    pulse: FloatArray = np.zeros(0)
-    for _ in range(_TURNS if huber else 1):
-        pulled = y
-        if pulse.size:
-            pulled = y.copy()
-            pulled[lags - 1 :] += _pulled_in(y[lags - 1 :] - fftconvolve(u, pulse, "valid"))
+def _left(y: FloatArray, u: FloatArray, pulse: FloatArray) -> FloatArray:
+    """What a pulse response leaves of an output, from its last lag on."""
+    return np.asarray(y[pulse.size - 1 :] - fftconvolve(u, pulse, "valid"))
+
+
+def _free_pulse(y: FloatArray, u: FloatArray, lags: int, turns: int) -> FloatArray:
+    """Free pulse response by least squares, and Huber's steps from the second turn on."""
+    pulled = y
+    for turn in range(turns):
         sums = normal_equations(u[None], pulled[None], lags)
-        # directions that the input does not excite stay small
-        ridge = _RIDGE * float(np.trace(sums.gram)) / lags
+        # Directions that the input does not excite stay small; where it rests all are.
+        ridge = max(_RIDGE * float(np.trace(sums.gram)) / lags, SMALLEST)
         found = np.linalg.solve(sums.gram + ridge * np.eye(lags), sums.cross[:, 0])
         pulse = np.asarray(found, dtype=np.float64)
+        if turn + 1 < turns:
+            pulled = y.copy()
+            pulled[lags - 1 :] += _pulled_in(_left(y, u, pulse))
     return pulse
 
 

@@ -25,10 +25,12 @@ from functools import partial
 import numpy as np
 
 from ...arrays import FloatArray
+from ...constants import Z_95
 from ...engine.compared_fits import converged
 from ...engine.local_terms import local_columns
-from ...engine.poles import parameters_from_poles, poles_from_parameters
+from ...engine.poles import lag_sum, parameters_from_poles, poles_from_parameters
 from ...engine.problem import KnownFactor, Problem, Structure
+from ...engine.profile import dead_time_error
 from ...engine.structures import Candidate, search
 from ...engine.window import window_of_rows
 from ...engine.window_fit import WindowFit, extended, with_known_noise
@@ -42,9 +44,9 @@ from ..process_models import fit_without_fast_lags, process_fit
 from ..result import OutputErrorEstimate, followed_by
 from ..selection import chains_of
 from .condensed import MOST_LAGS, Condensed, condensed
-from .data import MOST_SAMPLES, SampledData, cut
+from .data import BEYOND, MOST_SAMPLES, SampledData, cut
 from .lags import fit_lags, plain_lags
-from .stretch import WHITE, explained, fit_stretch, response_samples, samples_in_a_block
+from .stretch import DIED_AWAY, WHITE, explained, fit_stretch, response_samples, samples_in_a_block
 from .window import ORDERS, SampledWindow, modelled, window_of
 
 MORE_LAGS = (Structure(4, 4), Structure(5, 5))
@@ -53,6 +55,8 @@ fourth and fifth lag."""
 _LEAST_LAGS = 30  # of a response that is condensed; fewer cost as much
 _SHIFT = 0.25  # samples, for a slope by differences
 _REACH = 20.0  # samples by which the dead time of a record moves in one turn at most
+_MORE = 1.1  # lags over those that are needed
+_LESS = 0.5  # of what is unexplained, for twice as many lags to be worthwhile
 _CLEARLY = 4.0  # standard deviations of a chi-square: 3e-5 by chance
 
 
@@ -145,17 +149,13 @@ def fit_sampled(
     fits, sums = stretch, None
     long = any(y.size > every * kept.size for y, kept in zip(outputs, data.outputs, strict=True))
     if long and not any(np.isnan(y).any() for y in outputs):
-        lags = min(response_samples(stretch.best, dt), MOST_LAGS + 1)
-        sums = condensed(
-            [y / scale for y, scale in zip(outputs, data.scales, strict=True)],
-            [u / scale for u, scale in zip(inputs, data.scales, strict=True)],
-            dt,
-            max(int(np.ceil(lags)), _LEAST_LAGS),
-            huber=requested.huber,
+        y, u = (
+            [x / scale for x, scale in zip(signals, data.scales, strict=True)]
+            for signals in (outputs, inputs)
         )
-    if sums is not None:
-        stretch = replace(stretch, scales=replace(stretch.scales, dt=dt))
-        fits = _fit_condensed(sums, stretch, requested.known)
+        of_all = _of_all_samples(y, u, dt, stretch, requested)
+        if of_all is not None:
+            fits, sums = of_all
     if structures is None and fits.best.structure.order == ORDERS[-1].order:
         fits = extended(fits, MORE_LAGS)
     others = None
@@ -182,6 +182,9 @@ def fit_sampled(
         if others is not None:
             fit = replace(fit, others=others.told(others.better))
     if sums is not None:
+        later = data.after(fit.dead_time)
+        if later.starts > data.starts:
+            part, data = replace(part, data=later), later
         fit = _of_measured(part, fit, 0)
     elif part.noise.size > 1:
         fit = replace(_of_measured(part, fit, part.noise.size - 1), unweighted=part.unweighted)
@@ -216,9 +219,54 @@ def _of_measured(
     )
 
 
+def _of_all_samples(
+    outputs: Sequence[FloatArray],
+    inputs: Sequence[FloatArray],
+    dt: float,
+    stretch: WindowFit,
+    requested: Requested,
+) -> tuple[WindowFit, Condensed] | None:
+    """Fit all samples of long records, condensed; None if the response is too long for that.
+
+    A part may not tell how long it is: there are more lags until the responses of models end within
+    them, and until more of them leave no less unexplained.
+    """
+    found = None
+    needed = _lags_needed(stretch, dt)
+    if needed > MOST_LAGS:
+        return None
+    lags = min(max(int(np.ceil(_MORE * needed)), _LEAST_LAGS), MOST_LAGS)
+    stretch = replace(stretch, scales=replace(stretch.scales, dt=dt))
+    while (sums := condensed(outputs, inputs, dt, lags, huber=requested.huber)) is not None:
+        fits = _fit_condensed(sums, stretch, requested.known)
+        needed = _lags_needed(fits, dt)
+        if needed <= lags:
+            if found is not None and fits.correlation > _LESS * found[0].correlation:
+                break
+            found = fits, sums
+        if lags == MOST_LAGS or (needed <= lags and fits.correlation <= 1):
+            break
+        lags = min(int(np.ceil(_MORE * needed)) if needed > lags else 2 * lags, MOST_LAGS)
+    return found
+
+
+def _lags_needed(fits: WindowFit, dt: float) -> float:
+    """Samples until the response of the best model has ended, and of others with its total delay.
+
+    These have the shortest dead time that the data allow, and a longer lag.
+    """
+    best = fits.best
+    reach = Z_95 * dead_time_error(fits.problem, best, fits.variance)
+    low, total = max(best.dead_time - reach, 0.0), best.dead_time + lag_sum(best.poles, np.ones(1))
+    other = (BEYOND * low + DIED_AWAY * (total - low)) / dt
+    return float(max(response_samples(best, dt), min(other, MOST_LAGS / _MORE)))
+
+
 def _fit_condensed(sums: Condensed, stretch: WindowFit, known: KnownFactor) -> WindowFit:
     """Fit all structures to all samples, starting from the fit of a part."""
-    m, scales = sums.data.size, stretch.scales
+    m, lags = sums.drive.factor.shape
+    # What has not died away at the last lag is missing.
+    scales = replace(stretch.scales, slowest=DIED_AWAY / (lags * stretch.scales.dt))
     problem = Problem(sums.data, np.ones(m), sums.drive, np.empty((m, 0)), known)
     starts = {s: [fit.parameters] for s, fit in stretch.candidates.items()}
     fits = search(problem, starts, scales, starts=starts)

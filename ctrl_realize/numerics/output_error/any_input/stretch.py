@@ -27,7 +27,7 @@ WHITE = 3.0
 """Correlation time of the residual, in samples, up to which a model is taken for right: twice what
 white noise scatters to. It decides on flags alone."""
 
-_DIED_AWAY = 10.0  # slowest time constants in which a response ends, but for 5e-5 of it
+DIED_AWAY = 10.0  # slowest time constants in which a response ends, but for 5e-5 of it
 _SEEN = 40.0  # slowest time constants in the part that is fitted, if the record is as long
 _RESOLVED = 4.0, 8.0  # blocks in the fastest and in the slowest time constant
 _GROWTH = 16  # of blocks, before the time constants are looked at again
@@ -103,7 +103,7 @@ def _seen_to_end(fit: WindowFit, dt: float) -> bool:
 def response_samples(best: Candidate, dt: float) -> float:
     """Samples until the response of a model to a pulse has ended."""
     slowest = float(1.0 / np.abs(best.poles.real).min())
-    return (BEYOND * best.dead_time + _DIED_AWAY * slowest) / dt
+    return (BEYOND * best.dead_time + DIED_AWAY * slowest) / dt
 
 
 def explained(fits: WindowFit) -> float:
