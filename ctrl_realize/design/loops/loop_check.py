@@ -207,9 +207,9 @@ def _of_models(loop: Loop, models: PlausibleModels) -> tuple[Corner, ...]:
     """Ms with other models of the plant, in the place of the first factor of a loop."""
     found = []
     for one, system in zip(models.models, models.systems, strict=True):
-        other = replace(loop, factors=(factor(system, loop.dt), *loop.factors[1:]))
-        ms = _ms(distance_if_stable(other))
-        gain = float(np.real(system.delay_free.dcgain()))
+        plant = factor(system, loop.dt)
+        ms = _ms(distance_if_stable(replace(loop, factors=(plant, *loop.factors[1:]))))
+        gain = float(plant.response(np.zeros(1, dtype=np.complex128))[0].real)
         found.append(Corner(one.dead_time, gain if np.isfinite(gain) else None, ms))
     worst = max(found, key=lambda corner: corner.ms)
     return tuple(corner for corner in found if corner is not worst)
