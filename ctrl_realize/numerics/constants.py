@@ -19,6 +19,10 @@ STRONG, VERY_STRONG = 6.0, 10.0
 strong evidence (R. E. Kass and A. E. Raftery, Bayes factors, J. Amer. Statist. Assoc. 90 (1995)
 773-795, section 3.2)."""
 
+OUTLIER = 4.0
+"""Standard deviations at which residuals are cut where explanations are compared: of 16 000 samples
+of Gaussian noise one is larger."""
+
 LEAST_FREEDOM = 40
 """Degrees of freedom left by a regression that is tested: Student's point of 1e-4 is then within
 11 % of the normal one, so that a residual that is not quite normal does little."""

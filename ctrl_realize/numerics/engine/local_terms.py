@@ -35,8 +35,8 @@ import numpy as np
 from ..arrays import ComplexArray, FloatArray, IntArray
 from .responses import StepSequence
 
-_OVER = 1e-12
-"""Part of a free response that is left at the first row, below which nothing of it counts."""
+ROUNDING = 1e-12
+"""Part of a factor, or of a free response that is left at the first row, that counts as nothing."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -235,7 +235,7 @@ def _free_columns(decay: Any, poles: ComplexArray) -> FloatArray:
     n = poles.shape[1]
     free = np.empty_like(decay, dtype=np.float64)
     parts = (decay.real, decay.imag) if np.iscomplexobj(decay) else (decay,)
-    over = np.max([np.abs(part).max(axis=1, initial=0.0) for part in parts], axis=0) < _OVER
+    over = np.max([np.abs(part).max(axis=1, initial=0.0) for part in parts], axis=0) < ROUNDING
     if n % 2:
         free[:, :, 0] = np.where(over[:, :1], 0.0, decay[:, :, 0].real)
     for i in range(n % 2, n, 2):
@@ -264,12 +264,12 @@ def _normalised(columns: FloatArray) -> tuple[FloatArray, FloatArray]:
 
 def solve_upper(r: FloatArray, right: FloatArray) -> FloatArray:
     """Solve R x = b for a batch, R from columns of norm 1; unresolved components are 0."""
-    if np.abs(np.einsum("bii->bi", r)).min(initial=1.0) > 1e-12:
+    if np.abs(np.einsum("bii->bi", r)).min(initial=1.0) > ROUNDING:
         return np.asarray(np.linalg.solve(r, right[:, :, None])[:, :, 0], dtype=np.float64)
     x = np.zeros_like(right)
     for i in range(right.shape[1] - 1, -1, -1):
         rest = right[:, i] - np.einsum("bj,bj->b", r[:, i, i + 1 :], x[:, i + 1 :])
-        resolved = np.abs(r[:, i, i]) > 1e-12
+        resolved = np.abs(r[:, i, i]) > ROUNDING
         x[:, i] = np.where(resolved, rest / np.where(resolved, r[:, i, i], 1.0), 0.0)
     return x
 

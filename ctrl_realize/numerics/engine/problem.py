@@ -25,11 +25,10 @@ from functools import cached_property
 import numpy as np
 
 from ..arrays import ComplexArray, FloatArray
-from .local_terms import LocalTerms, Segments
+from .local_terms import ROUNDING, LocalTerms, Segments
 from .responses import HeldInput
 
 _ROWS = 64  # of a whitener that are multiplied together
-_ROUNDING = 1e-12  # of the largest element of a row of it
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,7 +75,7 @@ class Problem:
         """
         assert self.whitener is not None
         size = np.abs(self.whitener)
-        seen = size > _ROUNDING * size.max(axis=1, keepdims=True)
+        seen = size > ROUNDING * size.max(axis=1, keepdims=True)
         found = []
         for first in range(0, len(size), _ROWS):
             rows = slice(first, first + _ROWS)

@@ -31,7 +31,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..arrays import FloatArray
-from ..constants import SMALLEST, VERY_STRONG
+from ..constants import OUTLIER, SMALLEST, VERY_STRONG
 from ..engine.descend import descend
 from ..engine.eliminate import eliminate, evaluate
 from ..engine.modal import partial_fractions
@@ -78,7 +78,6 @@ _FOLLOWED = Structure(2, 2), Structure(3, 2), Structure(3, 3)
 16 of 16 simulated loads. Without two lags alone, a zero took up part of a load in 3 of 30, and
 gains were off by 15 %."""
 _TURNS, _SETTLED, _ZOOMS = 12, 0.002, 2  # of scan and fit by turns; part of the cost; finer scans
-_OUTLIER = 4.0  # standard deviations at which innovations are cut
 _FLOOR = 0.1  # of the noise, below which a residual is rounding
 _NOTHING = 1e-10  # part of the largest singular value that is rounding
 
@@ -169,7 +168,7 @@ def _evidence(fits: WindowFit, error: FloatArray, structure: Structure) -> float
     )
     before, after = _innovations(plain), _innovations(error)
     # Not of the residuals, of which the larger one would become constant.
-    limit = _OUTLIER * max(mad_sigma(before), mad_sigma(after), SMALLEST)
+    limit = OUTLIER * max(mad_sigma(before), mad_sigma(after), SMALLEST)
     before, after = (np.clip(new, -limit, limit) for new in (before, after))
     floor = error.size * (_FLOOR * fits.sigma) ** 2
     count = error.size / correlation_time(after)

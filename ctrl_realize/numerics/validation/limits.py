@@ -20,7 +20,7 @@ import numpy as np
 from scipy.ndimage import uniform_filter1d
 
 from ..arrays import BoolArray, FloatArray, IntArray
-from ..constants import VERY_STRONG
+from ..constants import OUTLIER, VERY_STRONG
 from ..signals.noise import (
     correlation_time,
     is_coarse,
@@ -53,7 +53,6 @@ _EARLY = 2  # samples that are left out before and after a plateau
 _RATES = np.geomspace(0.25, 32, 15)  # of lags, over the length of what they explain
 _TOLD = 3.0  # by which a kink lowers a likelihood criterion to be told
 _BEYOND = 0.02  # part of the range by which a plant passes its limit, on average, to be told
-_OUTLIER = 4.0  # standard deviations at which residuals are cut
 
 
 def at_limit(output: FloatArray) -> list[tuple[float, BoolArray]]:
@@ -207,7 +206,7 @@ def clips(output: FloatArray, linear: FloatArray, beyond: FloatArray, held: Bool
     if away < _BEYOND * np.ptp(output):
         return False
     errors = [output - limited, output - linear]
-    worst = _OUTLIER * max(mad_sigma(errors[0]), rounding_error(output))
+    worst = OUTLIER * max(mad_sigma(errors[0]), rounding_error(output))
     errors = [np.clip(error, -worst, worst) for error in errors]
     if correlation_time(errors[0]) > 1:
         better, other = (coloured_criterion([error])[0] for error in errors)
