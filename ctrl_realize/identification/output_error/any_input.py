@@ -111,7 +111,7 @@ def _advice(records: Sequence[Record], outputs: Sequence[FloatArray]) -> str:
     A counter that starts again is named.
     """
     if all(not record.n_missing for record in records) and (late := late_input(records)):
-        return str(flagged("feedback.late", **late))
+        return str(late)
     for output in outputs:
         if (period := counter_period(output)) is not None:
             return (

@@ -97,17 +97,17 @@ def feedback_flags(records: tuple[Record, ...], delay: float) -> Iterator[Flag]:
     if all(in_automatic(record) for record in records):
         yield flagged("feedback.moved", chance=min(chances))
     elif late := late_input(records):
-        yield flagged("feedback.late", **late)
+        yield late
     else:
         yield flagged("feedback", chance=min(chances))
 
 
-def late_input(records: Sequence[Record]) -> dict[str, float]:
-    """Samples by which inputs are late, and the percentage that tells it: see `late_samples`."""
+def late_input(records: Sequence[Record]) -> Flag | None:
+    """Flag inputs of which all are recorded late, as `late_samples` counts."""
     stretches = [(y[0], u[0], past_inputs(y[0].size, 0.0)) for y, u in _stretches(records)]
     found = [late_samples(*stretch) for stretch in stretches]
     samples, part = (min(values) for values in zip(*found, strict=True))
-    return {"samples": samples, "part": 100 * part} if samples else {}
+    return flagged("feedback.late", samples=samples, part=100 * part) if samples else None
 
 
 def _regulates(record: Record) -> bool:
