@@ -345,9 +345,16 @@ def followed_by(fits: WindowFit, chosen: Candidate, numerator: FloatArray) -> Fo
     closest = min(fits.candidates.values(), key=lambda candidate: candidate.cost)
     alone = respond(window.drive, problem.known, numerator, chosen.theta)
     alone += np.mean(window.output - alone)
-    modelled = [window.predict(problem, chosen), alone, window.predict(problem, closest)]
-    complete, simulated, most = fit_percent(np.tile(window.output, (3, 1)), np.stack(modelled))
-    return Followed(float(complete), float(simulated), closest.structure.plain, float(most))
+
+    # One after the other: a long record takes much memory.
+    def percent(model: FloatArray) -> float:
+        return float(fit_percent(window.output[None], model[None])[0])
+
+    simulated = percent(alone)
+    del alone
+    complete = percent(window.predict(problem, chosen))
+    most = percent(window.predict(problem, closest))
+    return Followed(complete, simulated, closest.structure.plain, most)
 
 
 def assembled(

@@ -83,6 +83,9 @@ def _without_plateaus(record: Record, linear: OutputErrorFit, fit: Fit) -> Outpu
     If they do not, a plateau is told all the same: in noise a response that a limit ends looks like
     one that settles.
     """
+    stepped = bool(np.isfinite(linear.onset))
+    if linear.at_noise_level and not stepped:
+        return linear  # nothing is left for a limit to explain
     output = np.ravel(record.output)
     held, evidence = plateaus(output, [edge for edge, _ in linear.data.edges])
     if not held.any():
@@ -90,7 +93,7 @@ def _without_plateaus(record: Record, linear: OutputErrorFit, fit: Fit) -> Outpu
     # A controller holds the output as well, and a model of it alone leaves much to explain.
     if not record.n_missing and any(feedback_flags((record,), linear.delay)):
         return linear
-    if np.isfinite(linear.onset):  # any other input may leave the output where it is
+    if stepped:  # any other input may leave the output where it is
         when = in_time(record.time[np.argmax(held)])
         doubt = flagged("may_be_at_limit", limits=_levels(output, held), when=when)
         linear = replace(linear, flags=(*linear.flags, doubt))
