@@ -36,11 +36,15 @@ def least_error(plant: Plant, drive: np.ndarray, sigma: float, pole: float = 0.0
             response(Plant(tuple(one[1:]), one[0]), drive) for one in (values - move, values + move)
         )
         slopes.append((high - low) / (2 * move.sum()))
-    white = lfilter([1.0, -pole], [1.0], np.stack(slopes), axis=1)[:, 1:].T
-    # The dead time comes last, so that the last diagonal element is what nothing else explains.
-    order = [*range(3), *range(4, white.shape[1]), 3]
-    alone = abs(np.linalg.qr(white[:, order])[1][-1, -1])
-    return float(sigma * np.sqrt(1 - pole**2) / alone)
+    return float(least_errors(np.stack(slopes), sigma, pole)[3])
+
+
+def least_errors(slopes: np.ndarray, sigma: float, pole: float = 0.0) -> np.ndarray:
+    """Least standard deviations (k,) of parameters by which the output has slopes (k, N)."""
+    white = lfilter([1.0, -pole], [1.0], slopes, axis=1)[:, 1:].T
+    size = np.linalg.norm(white, axis=0)
+    inverse = np.linalg.inv(np.linalg.qr(white / size)[1])
+    return np.asarray(sigma * np.sqrt(1 - pole**2) * np.linalg.norm(inverse, axis=1) / size)
 
 
 def response(plant: Plant, drive: np.ndarray) -> np.ndarray:

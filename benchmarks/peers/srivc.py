@@ -26,11 +26,11 @@ _DELAYS = 16  # of the grid on which the dead time is sought first
 
 
 @dataclass(frozen=True)
-class _Model:
+class Model:
     """b(s) / a(s) in units of one sample, behind a dead time of `delay` samples."""
 
     a: np.ndarray  # monic, (n + 1,)
-    b: np.ndarray  # (n,): as many zeros as a strictly proper model may have
+    b: np.ndarray  # (m,), m - 1 zeros; m <= n
     delay: float
 
     def simulate(self, u: np.ndarray) -> np.ndarray:
@@ -83,21 +83,49 @@ def _stable(a: np.ndarray) -> np.ndarray:
     return np.real(np.poly(-np.abs(roots.real) - 1e-9 + 1j * roots.imag))
 
 
-def _at(delay: float, task: Task, cutoff: float) -> tuple[float, _Model]:
-    """Iterate at a given dead time: half the sum of squares, and the model."""
-    a = np.poly(-cutoff * np.geomspace(0.7, 1.4, ORDER))
-    held, best = _delayed(task.u, delay), (np.inf, _Model(a, np.zeros(ORDER), delay))
-    settled = np.zeros(2 * ORDER)
+def sought(
+    u: np.ndarray, y: np.ndarray, sizes: tuple[int, int], longest: float, cutoff: float
+) -> Model:
+    """Seek the dead time on a grid, then between its best point's neighbours.
+
+    `sizes` are n poles and m coefficients of b, `cutoff` of the first prefilter is in rad/sample.
+    """
+
+    def at(delay: float) -> tuple[float, Model]:
+        starts = cutoff * _STARTS
+        return min((_at(delay, u, y, sizes, start) for start in starts), key=lambda each: each[0])
+
+    grid = np.linspace(0.0, longest, _DELAYS)
+    found = [at(delay) for delay in grid]
+    k = int(np.argmin([cost for cost, _ in found]))
+    around = (float(grid[max(k - 1, 0)]), float(grid[min(k + 1, _DELAYS - 1)]))
+    between = minimize_scalar(
+        lambda delay: at(delay)[0], bounds=around, method="bounded",
+        options={"xatol": 0.02, "maxiter": 25},
+    )  # fmt: skip
+    return min(found[k], at(float(between.x)), key=lambda each: each[0])[1]
+
+
+def _at(
+    delay: float, u: np.ndarray, y: np.ndarray, sizes: tuple[int, int], cutoff: float
+) -> tuple[float, Model]:
+    """Iterate at a given dead time: sum of squares, and the model."""
+    n, m = sizes
+    a = np.poly(-cutoff * np.geomspace(0.7, 1.4, n))
+    held, best = _delayed(u, delay), (np.inf, Model(a, np.zeros(m), delay))
+    settled = np.zeros(n + m)
     instrument = None
     for _ in range(_TURNS):
-        y, u = _filtered(a, task.y), _derivatives(a, held)
-        regressors = np.hstack([-y[:, :-1], u])
-        by = regressors if instrument is None else np.hstack([-_filtered(a, instrument)[:, :-1], u])
-        theta = np.linalg.lstsq(by.T @ regressors, by.T @ y[:, -1], rcond=1e-14)[0]
-        a = _stable(np.r_[1.0, theta[ORDER - 1 :: -1]])
-        model = _Model(a, theta[: ORDER - 1 : -1], delay)
-        instrument = model.simulate(task.u)
-        cost = float(np.sum((task.y - instrument) ** 2))
+        outputs, inputs = _filtered(a, y), _derivatives(a, held)[:, :m]
+        regressors = np.hstack([-outputs[:, :-1], inputs])
+        by = regressors
+        if instrument is not None:
+            by = np.hstack([-_filtered(a, instrument)[:, :-1], inputs])
+        theta = np.linalg.lstsq(by.T @ regressors, by.T @ outputs[:, -1], rcond=1e-14)[0]
+        a = _stable(np.r_[1.0, theta[n - 1 :: -1]])
+        model = Model(a, theta[: n - 1 : -1], delay)
+        instrument = model.simulate(u)
+        cost = float(np.sum((y - instrument) ** 2))
         if cost < best[0]:
             best = cost, model
         if np.linalg.norm(theta - settled) < _SETTLED * np.linalg.norm(theta):
@@ -107,23 +135,11 @@ def _at(delay: float, task: Task, cutoff: float) -> tuple[float, _Model]:
 
 
 def from_srivc(task: Task) -> Answer:
-    """Seek the dead time on a grid, then between its best point's neighbours."""
+    """Model of order 3, with as many zeros as a strictly proper model may have."""
     # The area above a step response is its dead time and lags.
     area = float(np.sum((task.u - task.y)[task.edge :]))
-    cutoffs = _STARTS * 2.0 / np.clip(area, 2.0, task.y.size / 4)
-
-    def at(delay: float) -> tuple[float, _Model]:
-        return min((_at(delay, task, cutoff) for cutoff in cutoffs), key=lambda found: found[0])
-
-    grid = np.linspace(0.0, task.max_delay, _DELAYS)
-    found = [at(delay) for delay in grid]
-    k = int(np.argmin([cost for cost, _ in found]))
-    around = (float(grid[max(k - 1, 0)]), float(grid[min(k + 1, _DELAYS - 1)]))
-    between = minimize_scalar(
-        lambda delay: at(delay)[0], bounds=around, method="bounded",
-        options={"xatol": 0.02, "maxiter": 25},
-    )  # fmt: skip
-    model = min(found[k], at(float(between.x)), key=lambda each: each[0])[1]
+    rate = 2.0 / np.clip(area, 2.0, task.y.size / 4)
+    model = sought(task.u, task.y, (ORDER, ORDER), task.max_delay, rate)
 
     def response(hz: np.ndarray) -> np.ndarray:
         s = 2j * np.pi * hz * task.dt
