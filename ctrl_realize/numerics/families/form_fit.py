@@ -42,8 +42,7 @@ class FormFamily(LagFamily):
     @property
     def varied(self) -> tuple[str, ...]:
         """Names of the parameters that are neither fixed nor at a bound; the gain comes last."""
-        fixed = [*self.form.fixed, *self.at_bound]
-        fixed += [] if self.form.dead_time else ["dead_time"]
+        fixed = [*self.form.fixed, *self.at_bound, *([] if self.form.dead_time else ["dead_time"])]
         return tuple(name for name in (*self.names, "gain") if name not in fixed)
 
     @property
@@ -61,6 +60,7 @@ class FormFamily(LagFamily):
         self, problem: Problem, x: FloatArray, variance: float
     ) -> tuple[ProcessParameter, ...]:
         """Values by name, with their standard errors: 0 where they are fixed, NaN at a bound."""
+        x = self.ordered(x)
         values, sizes = self.values(x)
         values["gain"] = self.linearised(problem, x).gain
         scale = dict(zip(self.names, sizes, strict=True)) | {"gain": 1.0}
@@ -69,8 +69,13 @@ class FormFamily(LagFamily):
         errors = LocalErrors(slopes, slopes[:, :0]).std(gradient, variance)
         std = dict.fromkeys(self.form.fixed, 0.0) | dict.fromkeys(self.at_bound, float("nan"))
         std |= dict(zip(self.varied, map(float, errors), strict=True))
-        shown = [name for name in self.form.names if name in std]
-        return tuple(ProcessParameter(name, values[name], std[name]) for name in shown)
+        return tuple(ProcessParameter(n, values[n], std[n]) for n in self.form.names if n in std)
+
+    def ordered(self, x: FloatArray) -> FloatArray:
+        """Parameters (k,) of the same model, the slowest lag first."""
+        found, alike = x.copy(), [self.names.index(name) for name in self.form.free_lags]
+        found[alike] = np.sort(x[alike])[::-1]
+        return found
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -181,9 +186,7 @@ def fit_form(
     if "dead_time" not in form.start:
         starts += [np.append(0.5 * x[0], x[1:]) for x in starts]
     best = lowest(problem, family, np.array(starts), scales.dt)
-    x = best.parameters
-    alike = [family.names.index(name) for name in form.free_lags]
-    x[alike] = np.sort(x[alike])[::-1]
+    x = family.ordered(best.parameters)
     values = family.values(x)[0] | {"gain": family.linearised(problem, x).gain}
     limits = _limits(form, scales).items()
     ends = tuple(n for n, (low, high) in limits if low < high and _at_end(values[n], low, high))
@@ -193,8 +196,7 @@ def fit_form(
 def _start(form: ProcessForm, like: Candidate, scales: Scales) -> dict[str, float]:
     """Parameters of the form that are closest to a model without prescriptions."""
     poles = like.poles[np.abs(like.poles) * scales.length >= INTEGRATOR]
-    lags = sorted((float(1.0 / abs(p)) for p in poles), reverse=True)
-    lags = lags or [scales.rise]
+    lags = sorted((float(1.0 / abs(p)) for p in poles), reverse=True) or [scales.rise]
     if form.integrator and poles.size == like.poles.size:
         # a slow lag is taken for the integrator: K / (T s + 1) begins like (K / T) / s
         lags = lags[1:] or [0.3 * scales.rise]

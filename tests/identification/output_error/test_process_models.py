@@ -8,6 +8,7 @@ import pytest
 from scipy.optimize import curve_fit
 
 import ctrl_realize as cr
+from benchmarks.acceptance.cases import PLANTS, made
 from ctrl_realize.identification import ProcessStructure
 
 DT, EDGE, NOISE = 0.1, 100, 0.01
@@ -123,3 +124,25 @@ def test_names_serve_moving_inputs_too():
     for key, value in {"gain": 2.0, "lag_1": 5.0, "lag_2": 2.0}.items():
         assert abs(table.loc[key, "value"] - value) < 4 * table.loc[key, "std_given_structure"]
     assert fit.better is None
+
+
+def test_the_slowest_lag_comes_first_wherever_the_search_ends():
+    plant = PLANTS["zero on the right"]
+    start = {name: value for name, value in plant.values.items() if name != "gain"}
+    near = ProcessStructure("P2DZ", start=start)
+    # the likelihood has its maximum at lags of 10.9 and 9.9 s, from which the profiles begin
+    fit = cr.identify(made("zero on the right", "step", 718).record, structures=near).fit
+    lags = fit.parameter_table().loc[["lag_1", "lag_2"]]
+    assert lags["value"].is_monotonic_decreasing
+    assert (lags["low"] <= lags["value"]).all()
+    assert (lags["value"] <= lags["high"]).all()
+
+
+@pytest.mark.parametrize(("kind", "seed"), [("binary", 718), ("loop", 715)])
+def test_a_lag_beside_an_integrator_is_found_where_one_pole_fits_as_a_ramp(kind, seed):
+    # one lag is then ten thousand times as long as the record, which is no start for another
+    plant = PLANTS["integrator and lag"]
+    fit = cr.identify(made("integrator and lag", kind, seed).record, structures="P1DI").fit
+    table = fit.parameter_table()
+    for name, value in plant.values.items():
+        assert abs(table.loc[name, "value"] - value) < 4 * table.loc[name, "std_given_structure"]

@@ -102,7 +102,8 @@ def fit_windows(
     lag = float(-1.0 / rough.poles[0].real)
     data = data.after(max(rough.dead_time, longest / BEYOND))
     length = (max(data.lengths) - order) * dt
-    onset, rise = max(rough.dead_time, 0.5 * usual), max(lag, 2 * usual)
+    # A lag beyond the record is a ramp, which tells nothing about lags to start from.
+    onset, rise = max(rough.dead_time, 0.5 * usual), min(max(lag, 2 * usual), length)
     scales = Scales(onset, rise, length, dt, within[1], within[0])
     fits = _fit(data.whitened(noise, residual), structures, scales, huber, like)
     levels = _noise_levels(data.whitened(noise, residual), fits)
