@@ -7,7 +7,7 @@ Gauss-Newton steps. Each section has two directions in which B and C cancel; the
 steps along them.
 
 Prediction errors with one unknown variance for each output [1]_; elimination as in [2]_, steps as
-in [3]_.
+in [3]_, with the damping of [5]_.
 
 References
 ----------
@@ -19,24 +19,27 @@ References
    10.2 (Numerical solution by iterative search methods).
 .. [4] D. P. Bertsekas, Projected Newton methods for optimization problems with simple constraints,
    SIAM J. Control Optim. 20 (1982) 221-246, doi:10.1137/0320018.
+.. [5] D. W. Marquardt, An algorithm for least-squares estimation of nonlinear parameters, J. SIAM
+   11 (1963) 431-441, doi:10.1137/0111030.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import FloatArray
-from ..regression.marquardt import Damping, damped_step, descend
 from .sections import Motion, Sections, motion
 
 MOST_STEPS = 40  # at most
 ENOUGH = 0.01
 """Increase of log likelihood below which the iteration ends: insignificant for any data."""
-_DAMPING = Damping(tries=16)  # shorter steps at most, before a fit ends
+_DAMPING, _LEAST_DAMPING, _FACTOR = 1e-3, 1e-12, 5.0
+"""Of the first step, the least, and by what it changes from step to step."""
+_TRIES = 16  # shorter steps at most, before a fit ends
 _ROWS = 4096
 """Number of samples whose derivatives are computed together."""
 LARGEST_POLE = 1 - 1e-7  # slower than any record shows: 1e7 samples to decay to 37 %
@@ -145,23 +148,40 @@ def fit_sections(
     here = at(model, 1 / spread)
     mask = model.free(feedthrough=feedthrough, poles=False)
     gram, slope = _normal(here, data, known, 1 / spread, mask)
-    there = at(_stepped(model, mask, damped_step(gram, slope, _DAMPING.least)), 1 / spread)
+    there = at(_stepped(model, mask, _damped_step(gram, slope, _LEAST_DAMPING)), 1 / spread)
     if there.cost < here.cost:
         here = there
     free = model.free(feedthrough=feedthrough)
 
-    def linearised(here: _Point) -> Callable[[float], _Point]:
+    damping, done = _DAMPING, 0
+    while done < most:
         weights = 1 / here.variance
         gram, slope = _held(here.model, *_normal(here, data, known, weights, free), free)
-
-        def ahead(damping: float) -> _Point:
-            candidate = _stepped(here.model, free, damped_step(gram, slope, damping))
-            return at(_inside(candidate, LARGEST_POLE), weights)
-
-        return ahead
-
-    here, done = descend(here, linearised, lambda gain, _: gain < enough, _DAMPING, most)
+        for _ in range(_TRIES):
+            candidate = _stepped(here.model, free, _damped_step(gram, slope, damping))
+            there = at(_inside(candidate, LARGEST_POLE), weights)
+            if there.cost < here.cost:
+                break
+            damping *= _FACTOR
+        else:
+            break
+        gain, here, done = here.cost - there.cost, there, done + 1
+        damping = max(damping / _FACTOR, _LEAST_DAMPING)
+        if gain < enough:
+            break
     return SectionFit(here.model, here.variance, spread, counts, here.cost, done)
+
+
+def _damped_step(gram: FloatArray, slope: FloatArray, damping: float) -> FloatArray:
+    """Solve (J'J + damping diag(J'J)) step = slope, with columns of one size; shape (n,).
+
+    A direction that nothing depends on is not moved.
+    """
+    size = np.sqrt(np.diag(gram))
+    size = np.where(size > 0, size, 1.0)
+    scaled = gram / np.outer(size, size)
+    scaled[np.diag_indices_from(scaled)] += damping
+    return np.asarray(np.linalg.solve(scaled, slope / size) / size)
 
 
 def _inside(model: Sections, to: float) -> Sections:
