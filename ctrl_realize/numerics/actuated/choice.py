@@ -20,23 +20,26 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..arrays import FloatArray
-from ..constants import VERY_STRONG
-from ..engine.problem import Structure
+from ..constants import SMALLEST, VERY_STRONG
+from ..engine.problem import Problem, Structure
 from ..engine.structures import (
-    LEAST_CHARGE,
     Candidate,
     Scales,
+    charged,
+    choose,
+    criteria,
     needless_parameters,
     parameter_charge,
+    plausible,
 )
 from ..engine.structures import search as search_linear
 from ..signals.noise import correlation_time, mad_sigma
 from .commands import knots
-from .family import ActuatedFamily, Member
+from .family import actuated_family
 from .intervals import Ends, profiled
 from .motions import Kind, Place
 from .records import ActuatedRecord, Records
-from .search import cost_of, searched, with_other_lags
+from .search import cost_of, family_of, minimum, searched, with_other_lags
 
 LINEAR = tuple(Structure(n, r) for n, r in ((1, 1), (2, 2), (3, 3), (4, 4), (2, 1), (3, 2)))
 LAGS = (1, 2, 3)
@@ -56,9 +59,11 @@ class ActuatedFit:
 
     Attributes
     ----------
-    member : Member
+    best : Candidate
+    problem : Problem
+        That it fits: of a long record, of means over blocks.
     evidence : float
-        Criterion of the best linear model minus that of the member; more than 10 is very strong.
+        Criterion of the best linear model minus that of the best; more than 10 is very strong.
     ends : tuple of Ends
         95 % interval of the dead time in s, for all models with an actuator that are not ruled out,
         and of the values of the actuator, for all numbers of lags.
@@ -72,7 +77,8 @@ class ActuatedFit:
         That counts in the likelihood.
     """
 
-    member: Member
+    best: Candidate
+    problem: Problem
     evidence: float
     ends: tuple[Ends, ...]
     records: Records
@@ -113,57 +119,61 @@ def fit_actuated(
     orders = LAGS if structures is None else tuple(s.order for s in structures if s.zeros == 0)
     if not wanted or not orders:
         return None
-    linear = search_linear(records.problem, LINEAR, scales)
+    problem = records.problem
+    linear = search_linear(problem, LINEAR, scales)
     found = _with_actuators(records, scales, wanted, orders, linear)
-    residual = _residual(found)
+    residual = _residual(problem, found)
     spikes = _spikes(residual, _WILD * mad_sigma(residual))
     if np.mean(spikes != 0) > _FEW_SPIKES:
-        records = records.with_outputs(records.output - spikes)
-        linear = search_linear(records.problem, LINEAR, scales)
-        found = [replace(one.family, records=records).improved(one.x) for one in found]
-        residual = _residual(found)
+        problem = replace(problem, data=problem.data - spikes)
+        linear = search_linear(problem, LINEAR, scales)
+        found = [minimum(problem, family_of(one), one.parameters[None]) for one in found]
+        residual = _residual(problem, found)
     correlation = correlation_time(residual[: max(part.rows.size for part in records.parts)])
-    free = max(residual.size - found[0].parameters - records.regressors.shape[1], 1)
-    variance = max(float(residual @ residual) / free, 1e-300) * correlation
-    charge = max(parameter_charge(residual.size / correlation), LEAST_CHARGE)
+    counted = found[0].structure.free + 2 + problem.regressors.shape[1]
+    noise = float(residual @ residual) / max(residual.size - counted, 1)
+    variance, samples = max(noise, SMALLEST) * correlation, residual.size / correlation
 
-    def criterion(cost: float, structure: Structure, parameters: int) -> float:
-        return float(cost / variance + charge * parameters) + needless_parameters(structure)
+    def value(candidates: dict[Structure, Candidate]) -> dict[Structure, float]:
+        return charged(criteria(candidates, variance, samples), parameter_charge(samples))
 
-    def value(one: Member) -> float:
-        return criterion(one.cost, one.family.structure, one.parameters)
-
-    straight = min(criterion(c.cost, s, s.order + s.zeros + 2) for s, c in linear.items())
-    tried = {one.family.kind for one in found}
-
-    def judged(one: Member) -> float:
+    def chosen_of(members: dict[Structure, Candidate]) -> Candidate:
         # One that contains a simpler one only where the evidence is very strong.
-        return value(one) + VERY_STRONG * (not tried.isdisjoint(one.family.properties.extends))
+        tried = {family_of(one).kind for one in members.values()}
+        extends = {s: family_of(one).properties.extends for s, one in members.items()}
+        more = {s: VERY_STRONG * (not tried.isdisjoint(extends[s])) for s in members}
+        return members[choose({s: each + more[s] for s, each in value(members).items()})]
 
-    chosen = min(found, key=judged)
-    member, ends = profiled(chosen, variance)
-    # Lags that fit no worse are not ruled out: noise hides lags, and does not remove them.
-    near = [
-        one
-        for one in sorted(found, key=value)
-        if one is not chosen
-        and min(value(one) - value(chosen), (one.cost - chosen.cost) / variance) <= VERY_STRONG
-    ]
-    every = [ends]
+    members = {one.structure: one for one in found}
+    chosen = chosen_of(members)
+    if structures is None and chosen.structure.order == LAGS[-1]:
+        # One lag more than chosen is never ruled out.
+        more = with_other_lags(problem, chosen, [LAGS[-1] + 1])[LAGS[-1] + 1]
+        members[more.structure] = more
+        chosen = chosen_of(members)
+    values, straight = value(members), value(linear)
+    level = values[chosen.structure] + needless_parameters(chosen.structure)
+    best, ends = profiled(problem, chosen, variance)
+    every, family = [ends], family_of(best)
+    near = [members[s] for s in plausible(members, values, variance, chosen, level)]
+    near = sorted((one for one in near if one is not chosen), key=lambda one: values[one.structure])
     for one in near[:_MOST]:
-        same = (one.family.kind, one.family.place) == (member.family.kind, member.family.place)
-        every.append(profiled(one, variance, dead_time_alone=not same)[1])
+        other = family_of(one)
+        same = (other.kind, other.place) == (family.kind, family.place)
+        every.append(profiled(problem, one, variance, dead_time_alone=not same)[1])
     unions = ([each[i] for each in every if len(each) > i] for i in range(len(ends)))
     whole = Records(tuple(parts))
+    linear_level = min(straight[s] + needless_parameters(s) for s in straight)
     return ActuatedFit(
-        member=member,
-        evidence=float(straight - value(member)),
+        best=best,
+        problem=problem,
+        evidence=linear_level - level + (chosen.cost - best.cost) / variance,
         ends=tuple(
             Ends(min(lows), max(highs))
             for lows, highs in (zip(*each, strict=True) for each in unions)
         ),
         records=whole,
-        residual=replace(member.family, records=whole).residuals(member.x[None])[0][0],
+        residual=replace(family, records=whole).linearised(whole.problem, best.parameters).residual,
         correlation=correlation,
         variance=variance,
     )
@@ -175,34 +185,30 @@ def _with_actuators(
     wanted: Sequence[tuple[Kind, Place]],
     orders: Sequence[int],
     linear: Mapping[Structure, Candidate],
-) -> list[Member]:
+) -> list[Candidate]:
     """Best members of every kind: one number of lags finds the actuator for all."""
-    levels = knots(records.parts)
+    levels, problem = knots(records.parts), records.problem
     first = sorted(orders)[min(1, len(orders) - 1)]
     minima = [
-        searched(ActuatedFamily(records, scales, first, kind, place, levels), linear)
+        searched(problem, actuated_family(records, scales, first, kind, place, levels), linear)
         for kind, place in wanted
     ]
-    residual = _residual([each[0] for each in minima])
+    residual = _residual(problem, [each[0] for each in minima])
     limit = 1 + _HOPELESS * correlation_time(residual) / residual.size
     found = []
     for base, *others in minima:
         found += [base, *others]
         if base.cost > limit * float(residual @ residual):
             continue
-        members = with_other_lags(base, orders)
-        best = min(members, key=cost_of)
-        if orders == LAGS and best.family.order == LAGS[-1]:
-            # One lag more than chosen is never ruled out.
-            members += with_other_lags(best, [LAGS[-1] + 1])[1:]
-        found += members[1:]
+        members = with_other_lags(problem, base, orders)
+        found += [one for one in members.values() if one is not base]
     return found
 
 
-def _residual(found: Sequence[Member]) -> FloatArray:
+def _residual(problem: Problem, found: Sequence[Candidate]) -> FloatArray:
     """Residual (M,) of the closest of some models."""
     best = min(found, key=cost_of)
-    return np.asarray(best.family.residuals(best.x[None])[0][0])
+    return family_of(best).linearised(problem, best.parameters).residual
 
 
 def _spikes(residual: FloatArray, limit: float) -> FloatArray:

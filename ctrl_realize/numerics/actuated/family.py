@@ -3,8 +3,7 @@
 In front (`place` "input") the actuator changes the command, and lags and dead time follow: a
 Hammerstein model. At the stem, lags and dead time come first: a Wiener model [1]_. A dead time
 commutes with any actuator, so that there is only one. Stiction before linear dynamics was
-identified in this way in [2]_. Gain and the terms of the records are eliminated, and the others
-improved by `regression.marquardt` with differences for derivatives.
+identified in this way in [2]_. Derivatives are differences.
 
 References
 ----------
@@ -16,85 +15,35 @@ References
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from functools import cached_property
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.signal import lfilter
 
-from ..arrays import BoolArray, ComplexArray, FloatArray
-from ..constants import SMALLEST
+from ..arrays import ComplexArray, FloatArray
 from ..engine.modal import partial_fractions
 from ..engine.poles import poles_from_parameters
-from ..engine.problem import Structure
+from ..engine.problem import Bounds, Problem, Structure
 from ..engine.responses import TOGETHER
 from ..engine.structures import Scales, parameter_bounds
-from ..regression.marquardt import Damping, damped_step, descend
+from ..families.shaped import ShapedFamily, UnitResponse
 from .motions import KINDS, Kind, Motion, Place, Properties, Size
 from .records import Records
 
 _OF_DT, _OF_LOG, _OF_START = 0.05, 1e-3, 1e-2  # steps of differences
-_AT_ONCE = 2_000_000  # samples of responses
-_ALIKE = 12  # decimals of sums of squares over that of the data
-_MOST_TURNS = 30
-_LONGEST = 1.0  # of a logarithm, in one step
-_TOLERANCE = 1e-5  # of the sum of squares, gained by a step that is the last one
-_FREELY = 1e-2  # damping up to which a short step tells that the bottom is reached
 _ROUNDING = 1e-12  # of a response
-_DAMPING = Damping(first=1e-2, rise=8.0, fall=5.0, least=1e-9, tries=6)
 
 
 @dataclass(frozen=True, eq=False)
-class Member:
-    """One model of a family: ``x`` = [dead time, pole parameters, values, starts]."""
-
-    family: ActuatedFamily
-    x: FloatArray
-    cost: float
-
-    @property
-    def poles(self) -> ComplexArray:
-        """Poles in 1/s."""
-        return np.asarray(poles_from_parameters(self.x[None, 1 : 1 + self.family.order])[0][0])
-
-    @property
-    def motion(self) -> Motion:
-        """The actuator."""
-        return self.family.motion(self.x)
-
-    @property
-    def starts(self) -> FloatArray:
-        """Place within play or friction at the beginning of each record; empty if there is none."""
-        return self.x[self.family.values.stop :]
-
-    @property
-    def parameters(self) -> int:
-        """Number of parameters, gain included."""
-        return self.x.size + 1
-
-
-@dataclass(frozen=True, eq=False)
-class _Point:
-    """Parameters on the way down, and the damping of the step that led to them."""
-
-    x: FloatArray
-    residual: FloatArray
-    cost: float
-    damping: float
-
-
-@dataclass(frozen=True, eq=False)
-class ActuatedFamily:
-    """Models of records with a kind of actuator at one place.
+class ActuatedFamily(ShapedFamily):
+    """Models over x = [dead time, pole parameters, values, starts] with a kind of actuator.
 
     Attributes
     ----------
     records : Records
+        Of which the commands are used.
     scales : Scales
         Initial guess of the response, see `structures`.
-    order : int
-        Number of lags.
     kind, place : str
         Of the actuator.
     levels : tuple of float
@@ -103,10 +52,14 @@ class ActuatedFamily:
 
     records: Records
     scales: Scales
-    order: int
     kind: Kind
     place: Place
     levels: tuple[float, ...]
+
+    @property
+    def free(self) -> int:
+        """Number of free parameters beside dead time and gain."""
+        return self.bounds.low.size - 1
 
     @property
     def properties(self) -> Properties:
@@ -114,14 +67,9 @@ class ActuatedFamily:
         return KINDS[self.kind]
 
     @property
-    def structure(self) -> Structure:
-        """That of the linear part."""
-        return Structure(self.order, self.order)
-
-    @property
     def names(self) -> tuple[str, ...]:
         """Names of the parameters of the actuator."""
-        return self.properties.names or tuple(f"flow_at_{u:g}" for u in self.levels[1:-1])
+        return self.properties.named(self.levels)
 
     @property
     def values(self) -> slice:
@@ -134,6 +82,11 @@ class ActuatedFamily:
         jump = self.properties.jump
         return None if jump is None else self.values.start + jump
 
+    @property
+    def size(self) -> Size:
+        """What the size of parameters is measured by."""
+        return sizes(self.records, self.scales, self.levels)
+
     def natural(self, entries: FloatArray) -> FloatArray:
         """Parameters of the actuator from their entries in x."""
         return np.exp(entries) if self.properties.logged else entries
@@ -142,30 +95,57 @@ class ActuatedFamily:
         """The actuator of one member."""
         return Motion(self.kind, tuple(self.natural(x[self.values]).tolist()), self.levels)
 
-    @property
-    def size(self) -> Size:
-        """What the size of parameters is measured by."""
-        scales, levels = self.scales, np.array(self.levels)
-        return Size(self.records.range, scales.rise, scales.length, scales.dt, levels)
+    def starts(self, x: FloatArray) -> FloatArray:
+        """Place within play or friction at the beginning of each record; empty if there is none."""
+        return x[self.values.stop :]
 
-    @cached_property
-    def bounds(self) -> tuple[FloatArray, FloatArray]:
-        """Bounds of x."""
-        linear = parameter_bounds(self.structure, self.scales)
-        starts = np.ones(len(self.records.parts) if self.properties.starts else 0)
-        least, most = (np.full(len(self.names), end) for end in self.properties.bounds(self.size))
-        low, high = (linear.low, least, -starts), (linear.high, most, starts)
-        return np.concatenate(low), np.concatenate(high)
+    def held(self, index: int, value: float) -> ActuatedFamily:
+        """Members with an entry of x that is given."""
+        low, high = self.bounds.low.copy(), self.bounds.high.copy()
+        low[index] = high[index] = value
+        return replace(self, bounds=Bounds(low, high, smooth=True))
 
-    @cached_property
-    def steps(self) -> FloatArray:
-        """Steps of differences."""
-        steps = np.full(self.bounds[0].size, _OF_START)
-        steps[0] = _OF_DT * self.scales.dt
-        steps[1 : self.values.stop] = _OF_LOG
-        return steps
+    def theta(self, parameters: FloatArray) -> FloatArray:
+        """Dead time and pole parameters (1 + n,) of one model."""
+        return parameters[: 1 + self.order]
 
-    def forced(self, part: int, xs: FloatArray) -> FloatArray:
+    def tangent(self, x: FloatArray, gain: float) -> FloatArray:
+        """Derivatives of `theta` and numerator with respect to parameters and gain."""
+        poles, dpoles = self._poles(x)
+        unit = np.prod(-poles).real
+        found = np.eye(2 + self.order, x.size + 1)
+        found[-1] = np.append(gain * unit * np.sum(dpoles / poles[:, None], axis=0).real, unit)
+        return found
+
+    def response(self, problem: Problem, x: FloatArray) -> UnitResponse:
+        """Response with gain 1, and its derivatives."""
+        steps = np.full(x.size, _OF_LOG)
+        steps[0], steps[self.values.stop :] = _OF_DT * self.scales.dt, _OF_START
+        steps = np.where(x + steps <= self.bounds.high, steps, -steps)
+        moving = self.bounds.low < self.bounds.high
+        moving[self.values] &= not self.properties.stepwise
+        rows = self.unit(np.append(x[None], (x + np.diag(steps))[moving], axis=0))
+        column, change = rows[0], rows[1:] - rows[0]
+        # What changes nothing has no slope: rounding would send it anywhere.
+        change[np.abs(change).max(axis=1) <= _ROUNDING * np.abs(column).max()] = 0.0
+        slopes = np.zeros((x.size, column.size))
+        slopes[moving] = change / steps[moving, None]
+        poles, dpoles = self._poles(x)
+        return UnitResponse(column, slopes.T, np.prod(-poles).real * np.ones(1), poles, dpoles)
+
+    def _poles(self, x: FloatArray) -> tuple[ComplexArray, ComplexArray]:
+        """Poles (n,) in 1/s, and their derivatives (n, k)."""
+        poles, derivative = poles_from_parameters(x[None, 1 : 1 + self.order])
+        dpoles = np.zeros((self.order, x.size), dtype=np.complex128)
+        dpoles[:, 1 : 1 + self.order] = derivative[0]
+        return poles[0], dpoles
+
+    def unit(self, xs: FloatArray) -> FloatArray:
+        """Responses of unit gain (K, M) of all records."""
+        parts = enumerate(self.records.parts)
+        return np.concatenate([self._forced(i, xs)[:, part.rows] for i, part in parts], axis=1)
+
+    def _forced(self, part: int, xs: FloatArray) -> FloatArray:
         """Responses of unit gain (K, N) of a record to its command, at every sample."""
         record, values = self.records.parts[part], self.values
         starts = xs[:, values.stop + part] if xs.shape[1] > values.stop else np.zeros(len(xs))
@@ -193,20 +173,6 @@ class ActuatedFamily:
                 found[k] = motion.followed(record.command[0] + demand, record.dt, start)
         return found
 
-    def columns(self, xs: FloatArray) -> FloatArray:
-        """Responses of unit gain (K, M) of all records, without what the regressors explain."""
-        parts = enumerate(self.records.parts)
-        return self.records.projected(
-            np.concatenate([self.forced(i, xs)[:, part.rows] for i, part in parts], axis=1)
-        )
-
-    def residuals(self, xs: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Residuals (K, M) of the best members with xs, and their gains (K,)."""
-        columns = self.columns(xs)
-        power = (columns**2).sum(axis=1)
-        gains = columns @ self.records.data / np.where(power > 0, power, 1.0)
-        return self.records.data - gains[:, None] * columns, gains
-
     def moved(self, x: FloatArray, index: int, value: float) -> FloatArray:
         """The same x with another entry; S and J move together, by which S - J is kept.
 
@@ -217,72 +183,37 @@ class ActuatedFamily:
         first, jump = self.values.start, self.jump
         if jump == first + 1 and index in (first, jump):
             other = first + jump - index
-            least = float(np.exp(self.bounds[0][other]))
+            least = float(np.exp(self.bounds.low[other]))
             along = np.exp(x[other]) + np.exp(value) - np.exp(x[index])
             found[other] = np.log(max(along, least))
         return found
 
-    def best(self, xs: FloatArray, count: int) -> list[FloatArray]:
-        """Best `count` of xs; the first of those that are alike, as rates that limit nothing."""
-        power = max(float(self.records.data @ self.records.data), SMALLEST)
-        pieces = np.array_split(xs, 1 + xs.shape[0] * self.records.data.size // _AT_ONCE)
-        costs = [(self.residuals(piece)[0] ** 2).sum(axis=1) for piece in pieces]
-        parts = np.round(np.concatenate(costs) / power, _ALIKE)
-        _, first = np.unique(parts, return_index=True)
-        return [xs[i] for i in first[:count]]
 
-    def free(self, fixed: Sequence[int] = ()) -> BoolArray:
-        """Entries of x that steps move: all but those that are `fixed`."""
-        free = np.ones(self.bounds[0].size, dtype=np.bool_)
-        free[list(fixed)] = False
-        free[self.values] &= not self.properties.stepwise
-        return free
+def actuated_family(
+    records: Records,
+    scales: Scales,
+    order: int,
+    kind: Kind,
+    place: Place,
+    levels: tuple[float, ...],
+) -> ActuatedFamily:
+    """Models of records with a number of lags and a kind of actuator at one place.
 
-    def slopes(self, x: FloatArray, free: BoolArray) -> tuple[FloatArray, FloatArray]:
-        """Derivatives of a model by the free entries of x (M, k), and by its gain (M,)."""
-        steps = np.where(x + self.steps <= self.bounds[1], self.steps, -self.steps)[free]
-        columns = self.columns(
-            np.append(x[None], x + np.eye(x.size)[free] * steps[:, None], axis=0)
-        )
-        column, change = columns[0], columns[1:] - columns[0]
-        # What changes nothing has no slope: rounding would send it anywhere.
-        change[np.abs(change).max(axis=1) <= _ROUNDING * np.abs(column).max()] = 0.0
-        gain = column @ self.records.data / max(float(column @ column), SMALLEST)
-        return gain * (change / steps[:, None]).T, column
+    `scales` is an initial guess of the response, `levels` are those of the commands.
+    """
+    properties, linear = KINDS[kind], parameter_bounds(Structure(order, order), scales)
+    ends = properties.bounds(sizes(records, scales, levels))
+    values = [np.full(len(properties.named(levels)), end) for end in ends]
+    starts = np.ones(len(records.parts) if properties.starts else 0)
+    low = np.concatenate([linear.low, values[0], -starts])
+    high = np.concatenate([linear.high, values[1], starts])
+    bounds, gains = Bounds(low, high, smooth=True), (-np.inf, np.inf)
+    return ActuatedFamily(order, order, bounds, gains, records, scales, kind, place, levels)
 
-    def improved(
-        self, x: FloatArray, *, fixed: Sequence[int] = (), turns: int = _MOST_TURNS
-    ) -> Member:
-        """Follow a start down `turns` steps at most; entries of x that are `fixed` stay."""
-        free = self.free(fixed)
-        low, high = (bound[free] for bound in self.bounds)
-        longest = np.where(np.flatnonzero(free) == 0, self.scales.rise, _LONGEST)
 
-        def at(place: FloatArray, damping: float = _DAMPING.first) -> _Point:
-            residual = self.residuals(place[None])[0][0]
-            return _Point(place, residual, float(residual @ residual), damping)
-
-        def linearised(here: _Point) -> Callable[[float], _Point]:
-            slopes, column = self.slopes(here.x, free)
-            # Without what another gain would do (Kaufman's form).
-            slopes -= np.outer(column, column @ slopes / max(float(column @ column), SMALLEST))
-            inside, downhill = here.x[free], slopes.T @ here.residual
-            slopes[:, (inside <= low) & (downhill < 0) | (inside >= high) & (downhill > 0)] = 0.0
-
-            def ahead(damping: float) -> _Point:
-                step = damped_step(slopes.T @ slopes, slopes.T @ here.residual, damping)
-                step /= max(float(np.abs(step / longest).max()), 1.0)
-                place = here.x.copy()
-                place[free] = np.clip(inside + step, low, high)
-                return at(place, damping)
-
-            return ahead
-
-        def finished(gain: float, here: _Point) -> bool:
-            return gain < _TOLERANCE * (here.cost + gain) and here.damping <= _FREELY
-
-        best, _ = descend(at(np.clip(x, *self.bounds)), linearised, finished, _DAMPING, turns)
-        return Member(self, best.x, best.cost)
+def sizes(records: Records, scales: Scales, levels: tuple[float, ...]) -> Size:
+    """What the parameters of an actuator are measured by."""
+    return Size(records.range, scales.rise, scales.length, scales.dt, np.array(levels))
 
 
 def _lagged(

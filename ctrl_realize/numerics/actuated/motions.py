@@ -80,6 +80,10 @@ class Properties:
     jump: int | None = None
     extends: tuple[Kind, ...] = ()
 
+    def named(self, levels: Sequence[float]) -> tuple[str, ...]:
+        """Names of the parameters for commands at some levels."""
+        return self.names or tuple(f"flow_at_{u:g}" for u in levels[1:-1])
+
     @property
     def places(self) -> tuple[Place, ...]:
         """Where it is tried: a stem that jumps is not seen behind lags that are unknown."""

@@ -1,18 +1,12 @@
-"""Records for fits of actuators: commands without noise, and outputs without the local terms.
+"""Records for fits of actuators: commands without noise, outputs, and local terms.
 
-Level, drift and free motion of a record are eliminated by an orthogonal projection [1]_. Only a
-part of a very long record is used, which is our own rule.
-
-References
-----------
-.. [1] G. Golub and V. Pereyra, Separable nonlinear least squares: the variable projection method
-   and its applications, Inverse Problems 19 (2003) R1-R26, doi:10.1088/0266-5611/19/2/201.
+Only a part of a very long record is used, which is our own rule.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -144,25 +138,12 @@ class Records:
         """Regressors (M, q) of all records."""
         return np.asarray(block_diag(*(part.regressors[part.rows] for part in self.parts)))
 
-    @cached_property
-    def _basis(self) -> FloatArray:
-        return np.linalg.qr(self.regressors)[0]
-
-    def projected(self, rows: FloatArray) -> FloatArray:
-        """Rows (K, M) without what the regressors explain."""
-        return np.asarray(rows - (rows @ self._basis) @ self._basis.T)
-
-    @cached_property
-    def data(self) -> FloatArray:
-        """Outputs (M,) without what the regressors explain."""
-        return np.asarray(self.projected(self.output[None])[0])
-
     @property
     def range(self) -> float:
         """Largest range of a command."""
         return max(float(np.ptp(part.command)) for part in self.parts)
 
-    @property
+    @cached_property
     def problem(self) -> Problem:
         """The problem of linear models of the same records."""
         inputs = tuple(SampledInput(part.command - part.command[0], part.dt) for part in self.parts)
@@ -170,13 +151,3 @@ class Records:
         drive = SeveralInputs(inputs, rows)
         weight = np.ones(self.output.size)
         return Problem(self.output, weight, drive, self.regressors, KnownFactor())
-
-    def with_outputs(self, output: FloatArray) -> Records:
-        """The same records with other outputs (M,)."""
-        ends = np.cumsum([part.rows.size for part in self.parts])[:-1]
-        parts = []
-        for part, values in zip(self.parts, np.split(output, ends), strict=True):
-            measured = part.measured.copy()
-            measured[part.rows] = values
-            parts.append(replace(part, measured=measured))
-        return Records(tuple(parts))

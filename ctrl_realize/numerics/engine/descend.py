@@ -133,7 +133,7 @@ def descend(
         crossed[active] = turn
         pinned[active[kink]], at_kink[active[kink]] = True, cost[active[kink]]
         enough = _NEAR / problem.data.size * cost[active]
-        if dead_time_fixed and level is not None:
+        if level is not None:
             enough = np.maximum(enough, _NO_WAY * np.abs(cost[active] - level))
         elif not dead_time_fixed:
             enough = np.maximum(enough, _NO_WAY * (cost[active] - cost.min()))

@@ -122,7 +122,10 @@ def solve_level(
         if steep == 0 or not np.isfinite(steep):
             return None
         bend = float(hessian[0, 0] + hessian[0, free] @ along)
-        away = _to_level(steep, bend, goal - lower)
+        # Along a parabola; along its tangent if it does not reach the level.
+        square = steep**2 + 2 * bend * (goal - lower)
+        mean = (steep + np.sign(steep) * np.sqrt(square)) / 2 if square > 0 else steep
+        away = float((goal - lower) / mean)
         if not abs(away) < _ENDLESS:
             return None
         off = abs(lower - goal) + abs(float(slope[free] @ back))
@@ -144,14 +147,6 @@ def solve_level(
         slope = slope * unit
         before = off
     return None
-
-
-def _to_level(slope: float, bend: float, rise: float) -> float:
-    """Step along a parabola to a given increase; along its tangent if it does not reach it."""
-    square = slope**2 + 2 * bend * rise
-    if square <= 0:
-        return rise / slope
-    return float(2 * rise / (slope + np.sign(slope) * np.sqrt(square)))
 
 
 def minimum(

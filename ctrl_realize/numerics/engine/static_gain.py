@@ -184,7 +184,8 @@ def local_errors(
     """
     if isinstance(candidate.structure, Family):
         slopes, tangent = candidate.structure.directions(problem, candidate.parameters)
-        return LocalErrors(slopes, slopes[:, :0], tangent)
+        along = tangent.any(axis=0)
+        return LocalErrors(slopes[:, along], slopes[:, ~along], tangent[:, along])
     theta = candidate.parameters
     moves = parameter_steps(candidate, numerator, length)
     # A dead time is not negative: the derivatives at zero are those slightly later.

@@ -102,13 +102,14 @@ class ShapedFamily(Family):
         """Eliminate gain, regressors and local terms at x (k,)."""
         response = self.response(problem, x)
         data = problem.weighted_data
-        columns = problem.weighted(np.column_stack([response.values, problem.regressors]))
+        shape = problem.weighted(response.values[:, None])
+        columns = np.column_stack([shape, problem.weighted_regressors])
         remainder = np.column_stack([columns, data])
         terms = None
         if problem.segments is not None:
             terms = problem.local_terms(response.poles[None])
             remainder = terms.without(remainder[None])[0]
-        q, r = np.linalg.qr(remainder[:, 1:-1])
+        q, r = problem.regressor_basis if terms is None else np.linalg.qr(remainder[:, 1:-1])
         inside = q.T @ remainder
         unit, resolved = (remainder[:, [0, -1]] - q @ inside[:, [0, -1]]).T
         square = float(unit @ unit)

@@ -6,7 +6,7 @@ import control as ct
 import numpy as np
 
 import ctrl_realize as cr
-from ctrl_realize.numerics.actuated.family import ActuatedFamily
+from ctrl_realize.numerics.actuated.family import actuated_family
 from ctrl_realize.numerics.actuated.records import MOST_SAMPLES, ActuatedRecord, Records
 from ctrl_realize.numerics.engine.poles import parameters_from_poles
 from ctrl_realize.numerics.engine.structures import Scales
@@ -26,8 +26,8 @@ def test_one_model_explains_a_long_record_and_its_means_over_blocks():
     scales = Scales(onset=0.7, rise=2.0, length=100.0, dt=dt, latest=3.0)
     for record in (whole, thinned):
         records = Records((record,))
-        family = ActuatedFamily(records, scales, 2, "slew_rate", "input", (0.0, 40.0))
-        residual, gain = family.residuals(x[None])
+        family = actuated_family(records, scales, 2, "slew_rate", "input", (0.0, 40.0))
+        model = family.linearised(records.problem, x)
         # `SlewRateLimit` moves from sample to sample, which is half a sample early.
-        assert abs(gain[0] - 1) < 1e-3
-        assert np.abs(residual).max() < 0.6 * dt * rate
+        assert abs(model.gain - 1) < 1e-3
+        assert np.abs(model.residual).max() < 0.6 * dt * rate

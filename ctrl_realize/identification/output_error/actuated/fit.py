@@ -11,14 +11,16 @@ from ...._flags import Flag, flagged, marked
 from ...._parameters import Parameter
 from ....errors import DataError
 from ....numerics.actuated.choice import ActuatedFit, fit_actuated
-from ....numerics.actuated.intervals import propagated
 from ....numerics.actuated.motions import at_parts
 from ....numerics.actuated.records import FEW_MOVES, ActuatedRecord, actuated_record
+from ....numerics.actuated.search import family_of
 from ....numerics.arrays import FloatArray
 from ....numerics.constants import CHI2_95, VERY_STRONG, Z_95
 from ....numerics.engine.local_terms import Segments, local_columns
 from ....numerics.engine.problem import Structure
+from ....numerics.engine.static_gain import static_gain
 from ....numerics.engine.structures import Scales
+from ....numerics.families.physical import fitted_parameters
 from ....numerics.output_error.any_input.stretch import WHITE
 from ....numerics.output_error.result import (
     Followed,
@@ -188,22 +190,25 @@ def _replaced(
 
 
 def _estimate(result: OutputErrorFit, scales: Scales, found: ActuatedFit) -> OutputErrorEstimate:
-    member, structure = found.member, found.member.family.structure
-    static, parameters = propagated(member, found.variance, scales.length)
+    best, family = found.best, family_of(found.best)
+    structure, setting = family.plain, (found.variance, scales.length)
+    numerator = family.linearised(found.problem, best.parameters).numerator
+    static = static_gain(found.problem, best, *setting)
+    parameters = fitted_parameters(found.problem, best, numerator, *setting)
     measured = found.records.output
     fitted = measured - found.residual
     low, high = found.ends[0]
-    dead_time = float(member.x[0])
+    dead_time = best.dead_time
     low, high = min(low, dead_time), max(high, dead_time)
     complete = float(fit_percent(measured[None], fitted[None])[0])
     if np.isfinite(result.onset) and len(result.records) == 1:
-        free = max(measured.size - member.parameters, 1)
+        free = max(measured.size - family.free - 2, 1)
         normalized_rms = float(np.linalg.norm(found.residual) / np.sqrt(free)) / result.data.sigma
         adequate = normalized_rms <= ADEQUATE * max(result.data.colour, 1.0)
     else:
         normalized_rms, adequate = float(np.sqrt(found.correlation)), found.correlation <= WHITE
     row = StructureFit(
-        structure, dead_time, static.total, 0.0, (low, high), member.poles, static.gain
+        structure, dead_time, static.total, 0.0, (low, high), best.poles, static.gain
     )  # fmt: skip
     profile = (np.array([low, dead_time, high]), np.array([CHI2_95, 0.0, CHI2_95]))
     return OutputErrorEstimate(
@@ -212,8 +217,8 @@ def _estimate(result: OutputErrorFit, scales: Scales, found: ActuatedFit) -> Out
         high=high,
         std=(high - low) / (2 * Z_95),
         structure=structure,
-        poles=member.poles,
-        numerator=static.gain * np.prod(-member.poles).real * np.ones(1),
+        poles=best.poles,
+        numerator=numerator,
         adequate=bool(adequate),
         residual=Residual(mad_sigma(measured - fitted), normalized_rms, found.correlation),
         structures=(row,),
@@ -229,7 +234,8 @@ def _estimate(result: OutputErrorFit, scales: Scales, found: ActuatedFit) -> Out
 
 
 def _actuator_fit(result: OutputErrorFit, found: ActuatedFit) -> ActuatorFit:
-    member, family, motion = found.member, found.member.family, found.member.motion
+    family, x = family_of(found.best), found.best.parameters
+    motion, starts = family.motion(x), family.starts(x)
     travel, timed = family.kind == "saturation", family.kind.startswith("slew")
     unit = "" if family.kind == "characteristic" else result.input_unit
     unit += "/s" if unit and timed else ""
@@ -247,10 +253,10 @@ def _actuator_fit(result: OutputErrorFit, found: ActuatedFit) -> ActuatorFit:
         if not ends.high - ends.low <= 2 * _WELL * size:
             vague.append(unresolved(parameters[-1], family.kind))
     return ActuatorFit(
-        model=model_of(motion, float(member.starts[0]) if member.starts.size else 0.0),
+        model=model_of(motion, float(starts[0]) if starts.size else 0.0),
         actuator_at=family.place,
         parameters=tuple(parameters),
-        starts=tuple(member.starts.tolist()),
+        starts=tuple(starts.tolist()),
         evidence=found.evidence,
         unresolved=tuple(vague),
     )
