@@ -43,7 +43,7 @@ def staircase(*moves, hold=120):
 
 
 def test_a_single_large_step_tells_a_slew_rate_and_the_dead_time_behind_it():
-    record = through(SlewRateLimit(12.0), staircase(40.0, hold=150), 1)
+    record = through(SlewRateLimit(12.0), staircase(40.0, hold=100), 1)
     linear_system = cr.fit_output_error(record)
     system = cr.fit_output_error(record, actuator="auto")
     linear, fit = linear_system.fit, system.fit
@@ -56,7 +56,7 @@ def test_a_single_large_step_tells_a_slew_rate_and_the_dead_time_behind_it():
     assert abs(fit.dead_time - DEAD_TIME) < 0.05
     assert fit.fit_percent > linear.fit_percent
     assert "slew rate" in fit.report()
-    other = through(SlewRateLimit(12.0), staircase(-25.0, hold=150), 3)
+    other = through(SlewRateLimit(12.0), staircase(-25.0, hold=100), 3)
     follows = cr.compare({"linear": linear_system, "actuator": system}, other).fit_percent
     assert follows["actuator"] > 97 > follows["linear"]
 
@@ -80,7 +80,7 @@ def test_records_of_several_sizes_share_dead_band_and_linear_part():
         through(Backlash(1.3, 0.5), staircase(3, -3, 3, 3, -3), 0),
         through(Backlash(1.3, -0.5), staircase(10, 10, -10, -10), 1),
     ]
-    fit = cr.fit_output_error(records, actuator="dead_band").fit
+    fit = cr.fit_output_error(records, actuator="dead_band", structures=[(2, 2), (3, 3)]).fit
     band = fit.actuator["dead_band"]
     assert band.low <= 1.3 <= band.high
     assert band.high - band.low < 0.1
@@ -91,10 +91,10 @@ def test_records_of_several_sizes_share_dead_band_and_linear_part():
 
 def test_a_slip_of_another_step_is_no_outlier_and_spikes_are():
     large = staircase(15, -15, 15, hold=60) - 50.0
-    small = 15.0 + np.repeat(np.cumsum([0.8] * 12 + [-0.8] * 24 + [0.8] * 24), 20)
+    small = 15.0 + np.repeat(np.cumsum([0.8] * 12 + [-0.8] * 24 + [0.8] * 24), 15)
     record = through(KanoStiction(S=10.1, J=5.7, start=1.0), np.concatenate([large, small]), 7)
     output = record.output.copy()
-    output[[40, 333, 700, 1002, 1300]] += 3.0
+    output[[40, 333, 600, 802, 1000]] += 3.0
     spiked = cr.Record(record.time, record.input, output)
     fit = cr.fit_output_error(spiked, actuator="stiction", structures=[(2, 2)]).fit
     for name, truth in (("S", 10.1), ("J", 5.7)):
@@ -114,8 +114,8 @@ def test_a_linear_valve_gets_no_actuator_and_its_interval_covers_those_not_ruled
     assert any("slew-rate limit" in choice for choice in fit.choices)
 
 
-LEVELS = staircase(10, 10, 10, 10, -20, -10, -20, -20, 10, hold=80)  # 20 to 90
-SMALL = staircase(*[0.5] * 10, *[-0.5] * 14, *[0.5] * 8, hold=40)
+LEVELS = staircase(10, 10, 10, 10, -20, -10, -20, -20, 10, hold=50)  # 20 to 90
+SMALL = staircase(*[0.5] * 10, *[-0.5] * 14, *[0.5] * 8, hold=25)
 
 
 def flows(plug):
@@ -127,7 +127,7 @@ def flows(plug):
 
 CURVED = Characteristic("equal-percentage", rangeability=30)
 OTHERS = [
-    ("slew_rate", SlewRateLimit(12.0, 20.0), staircase(30, -30, 20, -30, hold=90),
+    ("slew_rate", SlewRateLimit(12.0, 20.0), staircase(30, -30, 20, -30, hold=70),
      {"slew_rate_opening": (12.0, 1.2), "slew_rate_closing": (20.0, 2.0)}),
     ("saturation", Saturation(27.0, 84.0), LEVELS,
      {"travel_low": (27.0, 0.5), "travel_high": (84.0, 0.5)}),
@@ -183,7 +183,7 @@ def test_one_step_is_told_not_to_tell_it(asked, test):
 
 def test_an_end_that_the_records_do_not_tell_is_flagged():
     """A stem moves by every step that is higher than J, which then may be any below."""
-    record = through(KanoStiction(1.5, 0.4), staircase(5, 5, -5, -5, 5, 5, hold=80), 3)
+    record = through(KanoStiction(1.5, 0.4), staircase(5, 5, -5, -5, 5, 5, hold=50), 3)
     fit = cr.fit_output_error(record, actuator="stiction", structures=[(2, 2)]).fit
     assert fit.actuator["J"].low < 0.1
     flagged = {flag.code: str(flag) for flag in fit.flags}
