@@ -137,7 +137,7 @@ def search(
         if starts is not None:
             tried += starts[structure]
         elif not tried or structure.order <= 3 or _worth_a_search(problem, structure, found):
-            tried += pattern_starts(structure, scales)
+            tried += pattern_starts(structure, scales, alone=not tried)
         bounds = parameter_bounds(structure, scales)
         done = float(np.clip(_ROUGHLY / problem.data.size, 1e-4, 1e-3))
         parameters, cost = fit_batch(problem, structure, np.array(tried), bounds, tolerance=done)
@@ -271,11 +271,11 @@ def needless_parameters(structure: Structure) -> float:
     return NEEDLESS_ZERO * structure.zeros + NEEDLESS_POLE * max(structure.order - 3, 0)
 
 
-def pattern_starts(structure: Structure, scales: Scales) -> list[FloatArray]:
-    """Starts of a search for every set of poles, at one dead time or two."""
+def pattern_starts(structure: Structure, scales: Scales, alone: bool = False) -> list[FloatArray]:
+    """Starts of a search for every set of poles, at two dead times, or at one beside others."""
     patterns = _pole_patterns(structure.order, scales)
     # With zeros, the optimum without them is a start as well: fewer sets suffice.
-    dead_times = (0.4, 1.0) if structure.zeros == 0 else (0.7,)
+    dead_times = (0.4, 1.0) if structure.zeros == 0 or alone else (0.7,)
     return [
         np.concatenate([[part * scales.onset], parameters_from_poles(poles)])
         for part in dead_times

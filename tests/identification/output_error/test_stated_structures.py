@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import ctrl_realize as cr
+from benchmarks.acceptance import cases
 from ctrl_realize import report
 from tests import rigs
 from tests.rigs import codes, covers
@@ -65,3 +66,14 @@ def test_of_any_input_a_stated_structure_is_conditional_too():
     right = cr.fit_output_error(record, structures=[(2, 2)]).fit
     assert right.interval_kind == "conditional"
     assert "apparent_dead_time" not in codes(right)
+
+
+def test_a_stated_structure_with_zeros_needs_no_optimum_without_them_to_start_from():
+    plant = cases.PLANTS["Rao and Garnier"]
+    record, sigma = cases.made("Rao and Garnier", "binary", 797)
+    fit = cr.identify(record, structures=plant.structure).fit
+    least = cases.bounds(plant, "binary", record.input.ravel(), sigma)
+    table = fit.parameter_table()
+    assert fit.residual_std < 1.1 * sigma
+    for name, value in plant.values.items():
+        assert abs(table.loc[name, "value"] - value) < 4 * least[name]
