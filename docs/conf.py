@@ -129,6 +129,11 @@ TABLES = {
         "python -m benchmarks.closed_loop --store loops.jsonl --table "
         "docs/tables/closed_loop_table.md",
     ),
+    "acceptance": (
+        "docs/tables/acceptance_table.md",
+        "python -m benchmarks.acceptance --store acceptance.jsonl --table "
+        "docs/tables/acceptance_table.md",
+    ),
     "factors": (
         "docs/tables/factors_table.md",
         "python -m benchmarks.accuracy.factors --store factors.jsonl --table "

@@ -131,8 +131,8 @@ def table(done: list[Row]) -> list[str]:
         "intervals that hold, and how many biases exceed three of their standard errors. "
         f"`python -m benchmarks.acceptance`, {date.today().isoformat()}.*",
         "",
-        "| record | way | records | refused | parameters | deviation / bound | told / deviation "
-        "| intervals hold | of the dead time | biased |",
+        "| record | way | records | refused | parameters | deviation over bound "
+        "| told over deviation | intervals hold | of the dead time | biased |",
         "|" + "---|" * 10,
     ]
     for kind in KINDS:
@@ -141,6 +141,7 @@ def table(done: list[Row]) -> list[str]:
             some = {key: found for key, found in every.items() if key[1:] == (kind, way)}
             if some:
                 lines.append(summary(kind, way, own, list(some.values())))
+    lines += ["", *by_plant(every)]
     for kind in KINDS:
         lines += ["", f"### {TITLES[kind]}", ""]
         lines += [
@@ -171,6 +172,17 @@ def summary(kind: str, way: str, own: list[Row], found: list[dict[str, Cell]]) -
         f"| {f'{np.median(told):.2f}' if told else ''} | {coverage(each)} "
         f"| {coverage([some['dead_time'] for some in found])} | {biased} |"
     )
+
+
+def by_plant(every: dict[Key, dict[str, Cell]]) -> list[str]:
+    """Intervals that hold of all parameters of a plant, the structure stated."""
+    columns = [(kind, way) for kind in KINDS for way in WAYS[:2] if way in ways("one lag", kind)]
+    names = [f"{TITLES[kind].lower()}{way.removeprefix(WAYS[0])}" for kind, way in columns]
+    lines = [f"| structure stated | {' | '.join(names)} |", "|" + "---|" * (1 + len(columns))]
+    for name in PLANTS:
+        found = [coverage([*every.get((name, *column), {}).values()]) for column in columns]
+        lines.append(f"| {name} | {' | '.join(found)} |")
+    return lines
 
 
 def coverage(found: list[Cell]) -> str:

@@ -56,6 +56,7 @@ def numbers(docs: Path) -> dict[str, str]:
     long = next(
         row for row in rows(text["performance"], "times faster") if "identify, one step" in row[0]
     )
+    stated = [row for row in rows(text["acceptance"], "over bound") if row[1] == "structure"]
     assert worlds
     return {
         "error": single[6],
@@ -71,6 +72,8 @@ def numbers(docs: Path) -> dict[str, str]:
         "coverage": f"{_mean(white, 3):.1f} %",
         "coverage_records": _spaced(sum(int(row[2]) for row in white)),
         "white_silent": f"{_mean(white, 5):.1f} %",
+        "parameters_ratio": ", ".join(row[5].split()[0] for row in stated),
+        "parameters_held": ", ".join(row[7].split()[0] for row in stated) + " %",
         "worlds_silent": worlds[1],
         "worlds_records": worlds[2],
         "worlds_missed": worlds[4],
@@ -84,7 +87,7 @@ def numbers(docs: Path) -> dict[str, str]:
 
 
 TABLES = ("accuracy", "peers", "peers_measured", "honesty", "worlds", "fuzz", "defects")
-TABLES += ("performance",)
+TABLES += ("performance", "acceptance")
 """Tables that the numbers are taken from."""
 
 
