@@ -8,7 +8,7 @@ from scipy.signal import lfilter
 from ctrl_realize.numerics.output_error.any_input.condensed import condensed
 
 LAGS, NOISE, POLE = 100, 0.05, np.exp(-0.2)
-PULSE = np.r_[np.zeros(3), (1 - POLE) * POLE ** np.arange(LAGS - 3)]
+PULSE = np.r_[np.zeros(2), (1 - POLE) * POLE ** np.arange(LAGS - 2)]  # at the lags 1 ... 100
 
 
 def slow(size):
@@ -50,3 +50,21 @@ def test_a_record_at_rest_adds_nothing():
         beside.drive.factor.T @ beside.drive.factor, alone.drive.factor.T @ alone.drive.factor,
         rtol=1e-9, atol=1e-6,
     )  # fmt: skip
+
+
+@pytest.mark.parametrize("huber", [False, True])
+def test_a_proportional_controller_does_not_explain_the_noise(huber):
+    """u = K (r - y) gives every sample of the output by the input of the same sample."""
+    rng = np.random.default_rng(2)
+    target = np.repeat(rng.choice([-1.0, 1.0], 24), 1000)
+    u, y = np.zeros(target.size), NOISE * rng.standard_normal(target.size)
+    state = 0.0
+    for k in range(target.size):
+        state = POLE * state + (1 - POLE) * (u[k - 3] if k >= 3 else 0.0)
+        y[k] += state
+        u[k] = 0.5 * (target[k] - y[k])
+    sums = condensed([y], [u], 1.0, LAGS, huber=huber)
+    # 23 900 degrees of freedom, and Huber's pseudo-values, as above
+    assert sums.noise == pytest.approx(NOISE, rel=0.045 if huber else 0.02)
+    left = sums.data - sums.drive.factor @ PULSE
+    assert np.mean((left / sums.noise) ** 2) == pytest.approx(1, abs=5 * np.sqrt(2 / left.size))

@@ -1,6 +1,6 @@
 r"""Long records condensed to one row for each excited direction of the input.
 
-For an output that depends on the last L samples of the input, y = Phi g + e with white e, all
+For an output that depends on the L samples of the input before it, y = Phi g + e with white e, all
 information about g is contained in the sums R = Phi^T Phi and r = Phi^T y: up to a constant
 
     |y - Phi g(theta)|^2 = |z - F g(theta)|^2,   R = F^T F,   z = F^-T r.
@@ -56,18 +56,18 @@ _TURNS = 5  # of Huber's steps at most, the first from least squares
 
 @dataclass(frozen=True, eq=False)
 class CondensedInput(HeldInput):
-    """Factor (m, L) of the sums of products of an input at L lags."""
+    """Factor (m, L) of the sums of products of an input at the lags 1 ... L."""
 
     factor: FloatArray
     dt: float
 
     def modes(self, tau: FloatArray, poles: ComplexArray) -> Modes:
         """Evaluate H, E and T for a unit pulse, times the factor; see `HeldInput`."""
-        pulse = np.zeros(self.factor.shape[1])
+        pulse = np.zeros(1 + self.factor.shape[1])
         pulse[0] = 1.0
         static, mode, slope = SampledInput(pulse, self.dt).modes(tau, poles)
         parts = [static[:, :, None], mode.real, mode.imag, slope.real, slope.imag]
-        wide = np.concatenate(parts, axis=2).transpose(1, 0, 2)
+        wide = np.concatenate(parts, axis=2).transpose(1, 0, 2)[1:]
         seen = np.tensordot(self.factor, wide, axes=1).transpose(1, 0, 2)
         count = poles.shape[1]
         real, imag, turn, twist = (
@@ -123,6 +123,9 @@ def condensed(
     """
     if not 1 < lags <= MOST_LAGS or sum(y.size for y in outputs) < PER_LAG * lags:
         return None
+    # A held input acts on the next sample at the earliest. At lag 0 there is but the controller of
+    # a loop: u = K (r - y) would explain the noise.
+    outputs, inputs = [y[1:] for y in outputs], [u[:-1] for u in inputs]
     whiten = _noise(outputs, inputs, lags, huber=huber)
     sums: NormalEquations | None = None
     for y, u in _pieces(outputs, inputs, lags + whiten.size - 1):
