@@ -113,6 +113,11 @@ TABLES = {
         "python -m benchmarks.ablation --made-for 24 --only Nyquist "
         "--output docs/tables/ablation_nyquist_table.md",
     ),
+    "ablation_loop": (
+        "docs/tables/ablation_loop_table.md",
+        "python -m benchmarks.ablation --made-for 24 --only held loop "
+        "--output docs/tables/ablation_loop_table.md",
+    ),
     "textbook": ("docs/tables/textbook_table.md", "python -m benchmarks.loops.textbook"),
     "kinds": ("docs/tables/kinds_table.md", "python -m benchmarks.records kinds"),
     "verdicts_measured": (

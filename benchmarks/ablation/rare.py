@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from scipy.signal import lfilter
 
 import ctrl_realize as cr
 from benchmarks.relay import __main__ as tests
@@ -252,6 +253,26 @@ def relay_test(rng: Rng) -> Case:
     return Case(test, truth.dead_time, truth.gain, truth.dead_time + 6.0)
 
 
+def running_loop(rng: Rng) -> Case:
+    """A gain of 0.5 to 1.5, with an integral or not, and 6 to 15 levels of a set point.
+
+    The set point is not recorded; the noise of 1 to 15 % has a pole at 0.6 to 0.9.
+    """
+    count, gain, slow = 100 * int(rng.integers(6, 16)), rng.uniform(0.5, 1.5), rng.uniform(0.6, 0.9)
+    integral = float(rng.choice([0.0, 0.04]))
+    wanted = np.repeat(rng.choice([-1.0, 1.0], count // 100), 100)
+    white = np.sqrt(1 - slow**2) * rng.standard_normal(count)
+    noise = rng.uniform(0.01, 0.15) * lfilter([1.0], [1.0, -slow], white)
+    u, y, state, left = np.zeros(count), np.zeros(count), 0.0, 0.0
+    for k in range(count):
+        # a lag of ten samples behind a dead time of three, and the hold
+        state += (1 - np.exp(-0.1)) * ((u[k - 4] if k > 3 else 0.0) - state)
+        y[k] = state + noise[k]
+        left += wanted[k] - y[k]
+        u[k] = gain * (wanted[k] - y[k] + integral * left)
+    return Case(record(u, y), 3 * DT, 1.0, 4 * DT)
+
+
 MADE_FOR = {
     "unlike residual left alone": noise_of_the_response,
     "noise made white": waves_on_a_canal,
@@ -283,5 +304,7 @@ MADE_FOR = {
     "no dispersion where rounding is coarse": sensors.coarse,
     "estimates against a pinned likelihood": drive_with_friction,
     "no pair at the Nyquist frequency": relay_test,
+    "steps that are held": running_loop,
+    "noise model in a loop": running_loop,
 }
 """Rules, and the world that each was made for."""

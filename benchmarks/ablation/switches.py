@@ -401,6 +401,15 @@ SWITCHES = (
         {f"{ENGINE}.window_fit:at_nyquist": giving(False)},
     ),
     Switch(
+        "steps that are held",
+        {f"{PUBLIC}.arguments:_MOVES": value(np.inf)},
+        asked=(f"{PUBLIC}.arguments:_holds_between",),
+    ),
+    Switch(
+        "noise model in a loop",
+        {f"{FITS}.any_input.stretch:_in_a_loop": giving(False)},
+    ),
+    Switch(
         "records weighted by their noise",
         {f"{FITS}.any_input.window:_noise_levels": _alike_noise},
     ),

@@ -25,6 +25,8 @@ _LAST = 5  # a first step in the last samples of a record has no response to fit
 FEWEST_SAMPLES = 20  # four for each of lag, gain, dead time, level and drift
 _MOST_EDGES = 12  # an input with more of them is no step experiment
 _HOLDS = 0.2  # part of the step by which an input may stray between its edges
+_MOVES, _MEAN, _UNLIKELY = 0.05, 10, 5.0
+"""Part of the step by which the mean of ten samples may, or standard deviations of its noise."""
 _STRAY = 0.01  # part of the first step by which a clean input may stray before it
 _SPIKE = 3  # samples of a spike of the input that do not move a plant
 _DWELL = 3  # times the visible onset: the onsets of faster steps overlap
@@ -158,17 +160,25 @@ def _moves_before(signal: FloatArray, edges: Sequence[StepEdge]) -> bool:
 
 
 def _holds_between(signal: FloatArray, edges: Sequence[StepEdge]) -> bool:
-    """Whether an input is nearly constant between edges, for nine samples of ten.
+    """Whether an input is nearly constant between edges, for nine samples of ten, and in the mean.
 
     A sweep or noise may move like an edge, but is not constant afterwards. On measured steps the
-    nine tenths lie within 2 % of the amplitude, on random inputs and sweeps beyond 45 %.
+    nine tenths lie within 2 % of the amplitude, on random inputs and sweeps beyond 45 %. The output
+    of a controller moves on after the edge of its set point: the mean of ten samples leaves the
+    level by 10 to 100 % of the largest edge in simulated loops, by 1.4 % in measured steps.
     """
     bounds = [0, *(edge.index for edge in edges), signal.size]
     ramps = [0, *(edge.samples for edge in edges)]
-    away = []
-    for start, stop, ramp in zip(bounds[:-1], bounds[1:], ramps, strict=True):
-        held = signal[min(start + max(ramp - 1, 0), stop) : stop]
-        if held.size:
-            away.append(np.abs(held - np.median(held)))
+    held = [
+        signal[min(start + max(ramp - 1, 0), stop) : stop]
+        for start, stop, ramp in zip(bounds[:-1], bounds[1:], ramps, strict=True)
+    ]
+    away = [part - np.median(part) for part in held if part.size]
+    whole = (despike(part, _SPIKE)[: part.size // _MEAN * _MEAN] for part in away)
+    means = np.concatenate([part.reshape(-1, _MEAN).mean(axis=1) for part in whole])
     largest = max(abs(edge.amplitude) for edge in edges)
-    return bool(np.quantile(np.concatenate(away), 0.9) <= _HOLDS * largest)
+    noise = _UNLIKELY * difference_noise(signal) / np.sqrt(_MEAN)
+    return bool(
+        np.quantile(np.abs(np.concatenate(away)), 0.9) <= _HOLDS * largest
+        and np.abs(means).max(initial=0.0) <= max(_MOVES * largest, noise)
+    )

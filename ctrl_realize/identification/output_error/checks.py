@@ -14,15 +14,12 @@ from ..._flags import Flag, flagged
 from ..._wording import chosen
 from ...numerics.arrays import FloatArray, IntArray
 from ...numerics.constants import Z_95
-from ...numerics.validation.innovations import nonlinear_chance
+from ...numerics.validation.innovations import RARE, REGRESSED, nonlinear_chance, past_inputs
 from ...numerics.validation.parameter_change import ParameterChange, parameter_change
 from .loop_flags import (
-    RARE,
-    REGRESSED,
     coloured_flags,
     feedback_flags,
     generalised_step,
-    past_inputs,
     set_point_flags,
     unstable_flags,
 )

@@ -14,18 +14,18 @@ from ...numerics.arrays import BoolArray, FloatArray
 from ...numerics.constants import Z_95
 from ...numerics.output_error.result import UnweightedModel
 from ...numerics.signals.excitation import lively_start
-from ...numerics.validation.innovations import feedback_chance, late_samples
+from ...numerics.validation.innovations import (
+    RARE,
+    REGRESSED,
+    answer_chance,
+    feedback_chance,
+    late_samples,
+    past_inputs,
+)
 from ...numerics.validation.instability import unstable_chance
 from ...numerics.validation.white_step import WhiteStep, white_step
 from .result import OutputErrorFit
 
-RARE = 1e-4
-"""Probability of a false alarm of each test. In 290 records without feedback (29 worlds of
-`benchmarks.worlds`) the smallest p-value was 1e-3; in 60 loops other than pure limit cycles, all
-were below 1e-4."""
-REGRESSED = 4000
-"""Largest number of samples in the long regressions."""
-_LEAST_PAST, _MOST_PAST = 30, 150  # past inputs in them; time grows with the square
 _WIDE = 0.5  # width of an interval, in dead times, from which a set point moved too little
 _HALVED = 2.0  # move over that of the record: errors are in proportion to its inverse
 _LEVELS = 10  # of an input: a relay has two, or three
@@ -102,6 +102,12 @@ def feedback_flags(records: tuple[Record, ...], delay: float) -> Iterator[Flag]:
         yield flagged("feedback", chance=min(chances))
 
 
+def answers_the_past(records: Sequence[Record]) -> bool:
+    """Whether inputs depend on earlier outputs: no response within a sample explains that."""
+    every = _stretches(records)
+    return _rare([answer_chance(y[0], u[0], past_inputs(y[0].size, 0.0)) for y, u in every])
+
+
 def late_input(records: Sequence[Record]) -> Flag | None:
     """Flag inputs of which all are recorded late, as `late_samples` counts."""
     stretches = [(y[0], u[0], past_inputs(y[0].size, 0.0)) for y, u in _stretches(records)]
@@ -140,11 +146,6 @@ def _stretches(records: Sequence[Record]) -> list[tuple[FloatArray, FloatArray]]
         part = slice(start, start + REGRESSED)
         found.append((outputs[:, part], inputs[:, part]))
     return found
-
-
-def past_inputs(size: int, delay: float) -> int:
-    """Number of past inputs: more than a dead time, even if its estimate is wrong."""
-    return int(min(max(size // 12, _LEAST_PAST, 1.5 * delay + 10), _MOST_PAST, size // 6))
 
 
 def generalised_step(

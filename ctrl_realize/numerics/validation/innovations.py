@@ -29,10 +29,16 @@ from ..arrays import FloatArray, IntArray
 from ..constants import LEAST_FREEDOM, SMALLEST
 from ..signals.noise import mad_sigma
 
+RARE = 1e-4
+"""Probability of a false alarm of each test. In 290 records without feedback (29 worlds of
+`benchmarks.worlds`) the smallest p-value was 1e-3; in 60 loops other than pure limit cycles, all
+were below 1e-4."""
+REGRESSED = 4000
+"""Largest number of samples in the long regressions."""
+_LEAST_PAST, _MOST_PAST = 30, 150  # past inputs in them; time grows with the square
 OWN_PAST = 12
 """Past outputs: with them lags and coloured noise of the usual kinds leave a white residual. This
-and the numbers below were set on worlds of `benchmarks.worlds` with and without a loop (see `RARE`
-of the flags)."""
+and the numbers below were set on worlds of `benchmarks.worlds` with and without a loop."""
 _AHEAD = 3
 """Samples after the present for which an input is asked about."""
 _FEWEST_MOVES = 6
@@ -65,6 +71,11 @@ class _Past:
     def left(self, targets: FloatArray) -> tuple[FloatArray, int]:
         """Residual of targets (rows, k) after regression on the past, and its rank."""
         return _left(self.columns, targets, _RANK)
+
+
+def past_inputs(size: int, delay: float) -> int:
+    """Number of past inputs: more than a dead time, even if its estimate is wrong."""
+    return int(min(max(size // 12, _LEAST_PAST, 1.5 * delay + 10), _MOST_PAST, size // 6))
 
 
 def feedback_chance(output: FloatArray, drive: FloatArray, past: int) -> float:
@@ -100,14 +111,18 @@ def feedback_chance(output: FloatArray, drive: FloatArray, past: int) -> float:
         return 1.0
     cut = np.stack([_tamed(column) for column in new.T], axis=1)
     sims = _chance(cut[:, 1:], cut[:, 0], np.zeros((len(cut), 0)), rank)[0]
-    return min(2 * min(sims, _led(output, drive, min(2 * past, output.size // 5))), 1.0)
+    return min(2 * min(sims, answer_chance(output, drive, past, 0)), 1.0)
 
 
-def _led(output: FloatArray, drive: FloatArray, past: int) -> float:
-    """P-value of the prediction of the input by past outputs (Granger causality)."""
+def answer_chance(output: FloatArray, drive: FloatArray, past: int, first: int = 1) -> float:
+    """P-value of the prediction of the input by past outputs (Granger causality), as above.
+
+    The `first` of them are so many samples old: that of the same sample may be a response to it.
+    """
+    past = min(2 * past, output.size // 5)
     here = np.arange(past, output.size)
     own = np.stack([np.ones(here.size), *(drive[here - i] for i in range(1, past + 1))], axis=1)
-    outputs = np.stack([output[here - i] for i in range(_OUTPUTS)], axis=1)
+    outputs = np.stack([output[here - i] for i in range(first, _OUTPUTS)], axis=1)
     left, rank = _Past(here, own).left(np.column_stack([drive[here], outputs]))
     if left[:, 0].std() <= _PREDICTED * drive.std():
         return 1.0

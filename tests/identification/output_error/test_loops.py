@@ -3,6 +3,7 @@
 import control as ct
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
 import ctrl_realize as cr
 from benchmarks.accuracy import factors
@@ -140,3 +141,37 @@ def test_three_lags_that_stand_for_four_leave_the_dead_time_open():
     fit = cr.identify(made).fit
     assert fit.structure == (3, 3)
     assert fit.interval[0] <= plant.dead_time <= fit.interval[1]
+
+
+@pytest.mark.parametrize(("gain", "integral"), [(1.5, 0.0), (1.2, 0.04)])
+def test_without_a_set_point_what_a_controller_does_is_no_step(gain, integral):
+    """Its output moves on after the edges of the set point: as steps it has no dead time."""
+    rng = np.random.default_rng(1)
+    noise = lfilter([0.01 * np.sqrt(1 - 0.81)], [1, -0.9], rng.standard_normal(600))
+    wanted = np.repeat([1.0, -1.0, -1.0, -1.0, -1.0, 1.0], 100)
+    u, y, state, left = np.zeros(600), np.zeros(600), 0.0, 0.0
+    for k in range(600):
+        state += (1 - np.exp(-0.1)) * ((u[k - 4] if k > 3 else 0.0) - state)
+        y[k] = state + noise[k]
+        left += wanted[k] - y[k]
+        u[k] = gain * (wanted[k] - y[k] + integral * left)
+    fit = cr.identify(cr.Record(np.arange(600.0), u, y)).fit
+    low, high = fit.interval
+    assert low <= 3 <= high < low + 1
+    assert fit.gain_interval[0] <= 1 <= fit.gain_interval[1]
+
+
+def test_in_coloured_noise_a_loop_is_no_feedthrough():
+    """u = K (r - y) gives the output by the input of the same sample, noise included."""
+    rng = np.random.default_rng(1)
+    wanted = np.repeat(rng.choice([-1.0, 1.0], 15), 100)
+    noise = lfilter([0.1 * np.sqrt(1 - 0.49)], [1, -0.7], rng.standard_normal(1500))
+    u, y, state = np.zeros(1500), np.zeros(1500), 0.0
+    for k in range(1500):
+        state += (1 - np.exp(-0.1)) * ((u[k - 4] if k > 3 else 0.0) - state)
+        y[k] = state + noise[k]
+        u[k] = 1.2 * (wanted[k] - y[k])
+    fit = cr.identify(cr.Record(np.arange(1500.0), u, y)).fit
+    assert fit.interval[0] <= 3 <= fit.interval[1] < 5
+    assert "feedback" in [one.code for one in fit.flags]
+    assert isinstance(fit, cr.identification.OutputErrorFit)

@@ -36,11 +36,11 @@ from scipy.linalg import eigh
 from scipy.signal import fftconvolve, lfilter
 
 from ...arrays import ComplexArray, FloatArray
-from ...constants import HUBER, SMALLEST
+from ...constants import SMALLEST
 from ...engine.responses import HeldInput, Modes, SampledInput
+from ...engine.window_fit import clipped
 from ...regression.normal_equations import NormalEquations, normal_equations
 from ...signals.excitation import lively_start
-from ...signals.noise import mad_sigma
 from ...signals.noise_model import MOST_LAGS as MOST_NOISE_LAGS
 from ...signals.noise_model import whitening_filter
 
@@ -206,6 +206,4 @@ def _pieces(
 def _pulled_in(error: FloatArray) -> FloatArray:
     """Change of an output for which its least-squares fit is that of Huber's loss."""
     centred = error - np.median(error)
-    limit = HUBER * mad_sigma(centred)
-    inside = float(np.mean(np.abs(centred) <= limit))
-    return np.asarray(np.clip(centred, -limit, limit) / max(inside, 0.5) - centred)
+    return np.asarray(clipped(centred, 0.0) - centred)

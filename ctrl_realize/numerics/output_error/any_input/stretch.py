@@ -2,6 +2,11 @@
 
 A plant is seen for as many of its time constants as the record has, up to a limit of computing
 time. The selection is our own rule.
+
+References
+----------
+.. [1] L. Ljung, System Identification: Theory for the User, 2nd ed., Prentice Hall 1999, section
+   13.4 (A direct approach).
 """
 
 from __future__ import annotations
@@ -15,6 +20,7 @@ from ...arrays import FloatArray
 from ...engine.problem import Structure
 from ...engine.structures import Candidate
 from ...engine.window_fit import WindowFit
+from ...validation.innovations import RARE, REGRESSED, feedback_chance, past_inputs
 from ..other_structures import Requested
 from .condensed import MOST_LAGS
 from .data import BEYOND, SampledData, cut
@@ -48,9 +54,19 @@ def fit_stretch(
     if not (part.fit.correlation > WHITE and requested.whiten and data.complete):
         return part
     weighted = in_coloured_noise(part)
-    if requested.simulates and simulates_worse(weighted, part):
+    if requested.simulates and simulates_worse(weighted, part) and not _in_a_loop(data):
         return part
     return replace(weighted, unweighted=part.model)
+
+
+def _in_a_loop(data: SampledData) -> bool:
+    """Whether inputs depend on outputs: then the noise model is needed for consistency [1]_."""
+    chances = [
+        feedback_chance(y[-REGRESSED:], u[-REGRESSED:], past_inputs(y.size, 0.0))
+        for y, u in zip(data.outputs, data.held, strict=True)
+    ]
+    # The means of a block of samples depend on one another in any case.
+    return data.every == 1 and min(chances) < RARE / len(chances)
 
 
 def samples_in_a_block(
