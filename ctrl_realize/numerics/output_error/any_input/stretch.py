@@ -20,7 +20,7 @@ from ...arrays import FloatArray
 from ...engine.problem import Structure
 from ...engine.structures import Candidate
 from ...engine.window_fit import WindowFit
-from ...validation.innovations import RARE, REGRESSED, feedback_chance, past_inputs
+from ...validation.innovations import RARE, REGRESSED, answer_chance, past_inputs
 from ..other_structures import Requested
 from .condensed import MOST_LAGS
 from .data import BEYOND, SampledData, cut
@@ -60,9 +60,9 @@ def fit_stretch(
 
 
 def _in_a_loop(data: SampledData) -> bool:
-    """Whether inputs depend on outputs: then the noise model is needed for consistency [1]_."""
+    """Whether past outputs tell inputs: then the noise model is needed for consistency [1]_."""
     chances = [
-        feedback_chance(y[-REGRESSED:], u[-REGRESSED:], past_inputs(y.size, 0.0))
+        answer_chance(y[-REGRESSED:], u[-REGRESSED:], past_inputs(y.size, 0.0))
         for y, u in zip(data.outputs, data.held, strict=True)
     ]
     # The means of a block of samples depend on one another in any case.
