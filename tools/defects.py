@@ -181,7 +181,7 @@ DEFECTS = (
        "if fit.actuator is not None or np.isfinite(fit.onset) or missing:", "if True:",
        "identify decisions", FITS),
     _d("modes for nothing", "any gain of the criterion replaces lags by modes",
-       "if gain > VERY_STRONG and not late and not loop:", "if not late and not loop:",
+       "if gain > VERY_STRONG and not late:", "if not late:",
        "identify decisions", FITS),
     _d("best of the models", "the most favourable model decides whether a plant can be tuned",
        "worst = float(np.sort(found)[-1 - _SELDOM])", "worst = float(np.min(found))", "verdicts",

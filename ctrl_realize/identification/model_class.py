@@ -27,7 +27,7 @@ from ..numerics.signals.noise import correlation_time
 from ..numerics.signals.noise_model import coloured_criterion
 from .long_records import lively_parts
 from .output_error.checks import Shown, against_one_model, nonlinear_flags
-from .output_error.loop_flags import answers_the_past
+from .output_error.loop_flags import answers_the_past, in_automatic
 from .output_error.own_gains import at_model_gain
 from .output_error.result import OutputErrorFit
 from .state_space_fit.starts import Outcome, from_starts
@@ -56,7 +56,7 @@ def with_modes_judged(
     neither for records with gains of their own.
     """
     fit = fit_of(system, OutputErrorFit)
-    if fit.estimate.averaged:
+    if all(in_automatic(record) for record in fit.records):
         # Coloured noise that a controller answers is correlated with the input.
         return system
     records, cut = lively_parts(at_model_gain(fit))

@@ -7,7 +7,7 @@ import pytest
 
 import ctrl_realize as cr
 from ctrl_realize import report
-from ctrl_realize.errors import UnresolvedWarning, UnsuitableSystemError
+from ctrl_realize.errors import DataError, UnresolvedWarning, UnsuitableSystemError
 from tests import measured
 from tests.rigs import codes
 
@@ -149,7 +149,7 @@ def held_by_a_controller(pole, n=420):
 @pytest.mark.parametrize(
     "fit",
     [
-        lambda record: cr.fit_output_error(record, structures=[(1, 1)]),
+        lambda record: cr.fit_output_error(record),
         lambda record: cr.fit_state_space(record, 1),
     ],
 )
@@ -159,6 +159,11 @@ def test_an_unstable_plant_in_a_loop_is_called_so(fit):
     assert report.verdict_of(system).level == "poor"
     assert "whether the plant is stable" in warned(cr.design.margins, system, 0.01)
     assert "unstable" not in codes(fit(held_by_a_controller(0.97, n=240)))
+
+
+def test_no_stable_model_of_an_unstable_plant_is_told_why():
+    with pytest.raises(DataError, match="unstable plant"):
+        cr.fit_output_error(held_by_a_controller(1.03), structures=[(1, 1)])
 
 
 def test_a_tank_that_fills_after_a_long_rest_is_not_called_unstable():

@@ -23,7 +23,7 @@ from ...numerics.signals.counters import counter_period
 from ...numerics.validation.own_response import OwnResponse
 from .averaging import common_sample_time
 from .flags import sampled_flags
-from .loop_flags import late_input, loop_choices
+from .loop_flags import late_input, loop_choices, unstable_flags
 from .repeat_flags import repeat_flags
 from .repeatability import (
     Repeatability,
@@ -108,10 +108,12 @@ def _fit(
 def _advice(records: Sequence[Record], outputs: Sequence[FloatArray]) -> str:
     """Advice where the output does not follow the input, which may be late.
 
-    A counter that starts again is named.
+    An unstable plant is named, and a counter that starts again.
     """
-    if all(not record.n_missing for record in records) and (late := late_input(records)):
-        return str(late)
+    if all(not record.n_missing for record in records):
+        found = late_input(records) or next(unstable_flags(tuple(records), 0.0), None)
+        if found is not None:
+            return str(found)
     for output in outputs:
         if (period := counter_period(output)) is not None:
             return (

@@ -53,18 +53,21 @@ def test_a_record_at_rest_adds_nothing():
 
 
 @pytest.mark.parametrize("huber", [False, True])
-def test_a_proportional_controller_does_not_explain_the_noise(huber):
+@pytest.mark.parametrize("slow", [0.0, 0.9])
+def test_a_proportional_controller_does_not_explain_the_noise(slow, huber):
     """u = K (r - y) gives every sample of the output by the input of the same sample."""
     rng = np.random.default_rng(2)
     target = np.repeat(rng.choice([-1.0, 1.0], 24), 1000)
-    u, y = np.zeros(target.size), NOISE * rng.standard_normal(target.size)
+    u = np.zeros(target.size)
+    y = lfilter([1.0], [1.0, -slow], NOISE * rng.standard_normal(target.size))
     state = 0.0
     for k in range(target.size):
         state = POLE * state + (1 - POLE) * (u[k - 3] if k >= 3 else 0.0)
         y[k] += state
         u[k] = 0.5 * (target[k] - y[k])
     sums = condensed([y], [u], 1.0, LAGS, huber=huber)
-    # 23 900 degrees of freedom, and Huber's pseudo-values, as above
+    # that of the innovations: 23 900 degrees of freedom, and Huber's pseudo-values, as above
     assert sums.noise == pytest.approx(NOISE, rel=0.045 if huber else 0.02)
+    assert sums.noise_lags == (1 if slow else 0)
     left = sums.data - sums.drive.factor @ PULSE
     assert np.mean((left / sums.noise) ** 2) == pytest.approx(1, abs=5 * np.sqrt(2 / left.size))

@@ -23,6 +23,8 @@ References
    doi:10.1002/9780470434697.
 .. [4] P. W. Holland and R. E. Welsch, Robust regression using iteratively reweighted least-squares,
    Comm. Statist. A 6 (1977) 813-827, doi:10.1080/03610927708827533.
+.. [5] L. Ljung, System Identification: Theory for the User, 2nd ed., Prentice Hall 1999, section
+   13.4 (A direct approach).
 """
 
 from __future__ import annotations
@@ -41,8 +43,6 @@ from ...engine.responses import HeldInput, Modes, SampledInput
 from ...engine.window_fit import clipped
 from ...regression.normal_equations import NormalEquations, normal_equations
 from ...signals.excitation import lively_start
-from ...signals.noise_model import MOST_LAGS as MOST_NOISE_LAGS
-from ...signals.noise_model import whitening_filter
 
 MOST_LAGS = 1000
 """Longest response, in samples, that is condensed: time grows with its square."""
@@ -51,6 +51,7 @@ PER_LAG = 20
 _PIECE = 2**17  # samples that are looked at together, to save memory
 _EXCITED = 1e-10  # of the strongest direction of the input; rounding is 1e-15 of it
 _RIDGE = 1e-8  # of the mean square of the input: what it does not excite stays small
+_OWN_PAST = (0, 1, 2, 3, 4, 6, 8, 12, 16, 25)  # samples of an output that may tell its noise
 _TURNS = 5  # of Huber's steps at most, the first from least squares
 
 
@@ -158,15 +159,37 @@ def _noise(
 ) -> FloatArray:
     """Autoregressive noise model, leading 1 included, of the longest record where its input moves.
 
-    It is that of the residual of a free pulse response.
+    The output is regressed on the input and its own past at once, of which the length is chosen by
+    BIC: in a loop a pulse response alone explains noise, as far as the input answers it [5]_.
     """
     longest = int(np.argmax([y.size for y in outputs]))
     y, u = outputs[longest], inputs[longest]
     count = min(y.size, _PIECE)
     start = lively_start(u[None], count)
     y, u = (x[start : start + count] - np.mean(x[start : start + count]) for x in (y, u))
-    pulse = _free_pulse(y, u, lags, turns=_TURNS if huber else 1)
-    return whitening_filter(_left(y, u, pulse), MOST_NOISE_LAGS, 3.0)
+    pulled, orders = y, [own for own in _OWN_PAST if own <= lags]
+    for _ in range(_TURNS if huber else 1):
+        sums = normal_equations(np.stack([u[1:], pulled[:-1]]), pulled[None, 1:], lags)
+        fits = {own: _regressed(sums.take(range(lags + own)), lags) for own in orders}
+        value = {
+            own: sums.rows * np.log(fit[1]) + own * np.log(sums.rows) for own, fit in fits.items()
+        }
+        orders = [min(orders, key=value.__getitem__)]
+        found = fits[orders[0]][0]
+        whiten = np.append(1.0, -found[lags:])
+        pulled, white = y.copy(), lfilter(whiten, [1.0], y)[lags:]
+        pulled[lags:] += _pulled_in(white - fftconvolve(u[1:], found[:lags], "valid"))
+    return whiten
+
+
+def _regressed(sums: NormalEquations, lags: int) -> tuple[FloatArray, float]:
+    """Coefficients by least squares, of so many lags of the input first, and the squares left."""
+    # Directions that the input does not excite stay small; where it rests all are.
+    ridge = np.full(len(sums.gram), SMALLEST)
+    ridge[:lags] = max(_RIDGE * float(np.trace(sums.gram[:lags, :lags])) / lags, SMALLEST)
+    found = np.linalg.solve(sums.gram + np.diag(ridge), sums.cross[:, 0])
+    left = float(sums.power[0, 0] - sums.cross[:, 0] @ found)
+    return np.asarray(found, dtype=np.float64), max(left, SMALLEST)
 
 
 def _left(y: FloatArray, u: FloatArray, pulse: FloatArray) -> FloatArray:
@@ -178,11 +201,7 @@ def _free_pulse(y: FloatArray, u: FloatArray, lags: int, turns: int) -> FloatArr
     """Free pulse response by least squares, and Huber's steps from the second turn on."""
     pulled = y
     for turn in range(turns):
-        sums = normal_equations(u[None], pulled[None], lags)
-        # Directions that the input does not excite stay small; where it rests all are.
-        ridge = max(_RIDGE * float(np.trace(sums.gram)) / lags, SMALLEST)
-        found = np.linalg.solve(sums.gram + ridge * np.eye(lags), sums.cross[:, 0])
-        pulse = np.asarray(found, dtype=np.float64)
+        pulse, _ = _regressed(normal_equations(u[None], pulled[None], lags), lags)
         if turn + 1 < turns:
             pulled = y.copy()
             pulled[lags - 1 :] += _pulled_in(_left(y, u, pulse))
