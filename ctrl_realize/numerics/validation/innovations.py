@@ -117,7 +117,7 @@ def feedback_chance(output: FloatArray, drive: FloatArray, past: int) -> float:
 def answer_chance(output: FloatArray, drive: FloatArray, past: int, first: int = 1) -> float:
     """P-value of the prediction of the input by past outputs (Granger causality), as above.
 
-    The `first` of them are so many samples old: that of the same sample may be a response to it.
+    The latest of them is `first` samples old: that of the same sample may be a response to it.
     """
     past = min(2 * past, output.size // 5)
     here = np.arange(past, output.size)
