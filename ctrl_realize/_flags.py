@@ -55,8 +55,8 @@ def flagged(key: str, /, **values: object) -> Flag:
     Examples
     --------
     >>> from ctrl_realize._flags import flagged
-    >>> flagged("failed_draws", failed=3)
-    Flag(code='failed_draws', message='the estimator raised an error for 3 draws')
+    >>> flagged("few_cycles", count=5.0, fewest=8)
+    Flag(code='few_cycles', message='5.0 cycles of the oscillation; record at least 8')
     """
     code, _, case = key.partition(".")
     return Flag(code, _table()[code][case or "words"].format(**values))

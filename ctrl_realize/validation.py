@@ -1,7 +1,5 @@
-"""Validation of identified models: residuals, prediction, new records, bootstrap."""
+"""Validation of identified models: residuals, prediction, new records."""
 
-from .identification.validation.bootstrap import Bootstrap as Bootstrap
-from .identification.validation.bootstrap import bootstrap as bootstrap
 from .identification.validation.comparison import ModelComparison as ModelComparison
 from .identification.validation.comparison import compare as compare
 from .identification.validation.cross_validation import cross_validate as cross_validate
@@ -16,14 +14,12 @@ from .identification.validation.residuals import analyse_residuals as analyse_re
 from .identification.validation.residuals_result import ResidualAnalysis as ResidualAnalysis
 
 __all__ = [
-    "Bootstrap",
     "DelayComparison",
     "DelayEstimate",
     "ModelComparison",
     "Prediction",
     "ResidualAnalysis",
     "analyse_residuals",
-    "bootstrap",
     "compare",
     "compare_delay_estimates",
     "cross_validate",

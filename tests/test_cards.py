@@ -72,7 +72,6 @@ RESULTS = {
     "margins": lambda: cr.design.margins(PLANT, cr.design.pid(PLANT)),
     "a check of residuals": lambda: cr.validation.analyse_residuals(PLANT, driven()),
     "a check of the delay": lambda: cr.validation.compare_delay_estimates(frf=FRF),
-    "a bootstrap": lambda: cr.validation.bootstrap(STEP, one_lag, repeats=3),
     "a record": lambda: STEP,
     "a step response": lambda: cr.unit_step(STEP),
     "a system": lambda: PLANT,

@@ -33,7 +33,6 @@ MAIN = {
     "impulse_from_frf": lambda odd: cr.impulse_from_frf(odd, 0.1, length=20),
     "compare_frf": lambda odd: cr.compare_frf(odd, FRF),
     "identify_campaign": lambda odd: cr.identify_campaign(odd),
-    "bootstrap": lambda odd: cr.validation.bootstrap(odd, cr.fit_output_error),
     "DelayTracker": lambda odd: cr.DelayTracker(odd, max_delay=5, forgetting_time=10.0),
     "read_record": lambda odd: cr.read_record(odd),
     "load_model": lambda odd: cr.load_model(odd),

@@ -315,22 +315,6 @@ def campaign(seed: int, *, broken: bool = False, twice: bool = False, trend: flo
     return codes(cr.identify_campaign(records, method="scan"))
 
 
-def bootstrap(seed: int, *, fails: bool = False, steps: float = 0.0) -> Codes:
-    """Eight draws of a plain lag, rounded to this many noise standard deviations."""
-    record = step_case("white", "R1", _noise(seed), seed).record
-    if steps:
-        quantum = steps * _noise(seed) * abs(_span(record))
-        record = changed(record, np.round(np.ravel(record.output) / quantum) * quantum)
-    calls = iter(range(100))
-
-    def estimator(drawn: cr.Record) -> cr.DelayedStateSpace:
-        if fails and next(calls) % 5 == 3:
-            raise cr.errors.DataError("made to fail")
-        return cr.fit_output_error(drawn, structures=[(1, 1)])
-
-    return codes(cr.validation.bootstrap(record, estimator, repeats=8))
-
-
 _FIT = FlagCase("fit_output_error", "", "", ordinary, "R1 to R4, white noise 0.1 to 2 %", ordinary)
 
 
@@ -447,9 +431,4 @@ CASES: list[FlagCase] = [
              lambda s: campaign(s, twice=True), "twelve records alike, by the scan", campaign),
     FlagCase("identify_campaign", "amplitude_trend", "delay 6 samples longer at half the height",
              lambda s: campaign(s, trend=6.0), "twelve records alike, by the scan", campaign),
-    FlagCase("bootstrap", "failed_draws", "one draw of five raises",
-             lambda s: bootstrap(s, fails=True), "none raises", bootstrap),
-    FlagCase("bootstrap", "coarse_quantisation", "rounded to five noise std",
-             lambda s: bootstrap(s, steps=5.0), "rounded to half a noise std",
-             lambda s: bootstrap(s, steps=0.5)),
 ]  # fmt: skip

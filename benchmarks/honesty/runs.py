@@ -49,7 +49,6 @@ STUDIES: dict[str, Study] = {
     "scans": Study(step_intervals.scans, 4),
     "views": Study(step_intervals.views),
     "several": Study(step_intervals.several),
-    "redrawn": Study(step_intervals.redrawn),
     "tracked": Study(step_intervals.tracked, 4),
     "pulses": Study(driven_intervals.pulses, 4, by_plant=False),
     "any input": Study(driven_intervals.any_input, by_plant=False),

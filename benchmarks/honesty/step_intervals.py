@@ -1,8 +1,6 @@
-"""What else reports an interval from step records: scans, several records, campaigns, redraws."""
+"""What else reports an interval from step records: scans, several records, campaigns."""
 
 from __future__ import annotations
-
-from functools import partial
 
 import control as ct
 import numpy as np
@@ -136,48 +134,6 @@ def several(kind: str, plant: str, noise: float, seed: int) -> Seen:
 
 def _shared_delay(seed: int) -> float:
     return float(np.random.default_rng([seed, 77]).uniform(30, 45))
-
-
-def redrawn(kind: str, plant: str, noise: float, seed: int) -> Seen:
-    """Bootstrap of the residual of one record, structure given."""
-    case = step_case(kind, plant, noise, seed)
-    structure = STRUCTURES.get(plant, (3, 3))
-    estimator = partial(cr.fit_output_error, structures=[structure])
-    with quietly():
-        # The fewest draws whose outermost hold one more with 95 %.
-        drawn = cr.validation.bootstrap(case.record, estimator, repeats=39, seed=seed)
-    truth = case.delay * DT
-    middle = float(np.median(drawn.dead_times))
-    covered = {
-        "bootstrap: dead time, middle 95 %": inside(drawn.interval, truth),
-        "bootstrap: dead time -+ 1.96 std": float(abs(middle - truth) <= 1.96 * drawn.std),
-    }
-    ends = np.quantile(drawn.gains, [0.025, 0.975], method="weibull")
-    covered["bootstrap: gain, middle 95 %"] = inside((ends[0], ends[1]), case.gain)
-    if plant in PLANTS:
-        exact = cr.delayed_ss(case.gain * PLANTS[plant], dead_time=truth, dt=DT)
-        covered |= _bands(drawn, exact)
-    return Seen("redrawn", kind, plant, noise, seed, covered)
-
-
-def _bands(drawn: cr.validation.Bootstrap, exact: cr.DelayedStateSpace) -> dict[str, float]:
-    """Part of the step, gain and phase bands that holds the plant."""
-    low, high = drawn.step_band(600)
-    step = np.cumsum(np.ravel(exact.markov(600)))[50:]
-    omega = 2 * np.pi * np.geomspace(0.2, 13, 30)
-    response = np.ravel(exact(np.exp(1j * omega * DT)))
-    magnitude = drawn.magnitude_band(omega)
-    phase = drawn.phase_band(omega)
-    # The first sample of the step that moves; before it all models are zero.
-    covered = {
-        "bootstrap: step band, points": np.mean((low[50:] <= step) & (step <= high[50:])),
-        "bootstrap: gain band, points": np.mean(
-            (magnitude[0] <= abs(response)) & (abs(response) <= magnitude[1])
-        ),
-    }
-    angle = np.unwrap(np.angle(response))
-    covered["bootstrap: phase band, points"] = np.mean((phase[0] <= angle) & (angle <= phase[1]))
-    return {name: float(value) for name, value in covered.items()}
 
 
 def tracked(kind: str, plant: str, noise: float, seed: int) -> Seen:

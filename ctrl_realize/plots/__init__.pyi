@@ -2,7 +2,6 @@
 
 from .campaigns import campaign_plot as campaign_plot
 from .campaigns import gain_plot as gain_plot
-from .delays import bootstrap_plot as bootstrap_plot
 from .delays import delay_comparison_plot as delay_comparison_plot
 from .delays import track_plot as track_plot
 from .dispatch import draw as draw

@@ -12,7 +12,6 @@ from matplotlib.lines import Line2D
 from .._wording import in_time, interval_in_time, number_within, time_unit, time_within
 from ..delayed import DelayedStateSpace
 from ..identification.tracking.results import TrackHistory
-from ..identification.validation.bootstrap import Bootstrap
 from ..identification.validation.delay_estimates_result import DelayComparison
 from . import style
 from .shared_docs import documented
@@ -107,68 +106,6 @@ def delay_comparison_plot(
         axes.set_ylim(-0.6, len(names) - 0.4)
         axes.set_xlabel(f"dead time, or bound ◂ [{unit}]")
         return style.finished([axes], [lines], loc="above")
-
-
-@documented("sequence of two Axes")
-def bootstrap_plot(
-    result: Bootstrap,
-    *,
-    ax: style.AxesLike = None,
-    samples: int | None = None,
-    title: str | None = None,
-    **kwargs: Any,
-) -> ct.ControlPlot:
-    """Draw the dead times of all draws, and the band of their unit step responses.
-
-    Parameters
-    ----------
-    result : Bootstrap
-    samples : int, optional
-        Length of the step responses; default: until the model has settled.
-    **kwargs
-        Line properties of the step response for the original data.
-
-    Examples
-    --------
-    >>> from functools import partial
-    >>> import numpy as np
-    >>> import ctrl_realize as cr
-    >>> t = 0.01 * np.arange(300)
-    >>> u = np.where(t < 0.5, 0.0, 2.0)
-    >>> y = np.where(t < 0.625, 0.0, 6 * -np.expm1(-(t - 0.625) / 0.4))
-    >>> record = cr.Record(t, u, y + 0.01 * np.random.default_rng(1).standard_normal(t.size))
-    >>> one_lag = partial(cr.fit_output_error, structures=[(1, 1)])
-    >>> again = cr.validation.bootstrap(record, one_lag, repeats=8)
-    >>> cplt = cr.plots.bootstrap_plot(again)
-    >>> [axes.get_xlabel() for axes in cplt.figure.axes]
-    ['time [s]', 'dead time [ms]']
-    """
-    count = _settled(result) if samples is None else samples
-    low, high = result.step_band(count)
-    own = np.cumsum(np.ravel(result.system.markov(count)))
-    dt = float(result.system.dt)
-    with style.canvas(ax, 2, title=title, size=(8.0, 6.0), sharex=False) as (upper, lower):
-        factor, unit = axis_time_unit(count * dt, upper)
-        time = factor * dt * np.arange(count)
-        upper.fill_between(time, low, high, color=style.BAND, alpha=0.4, label="95 % of the draws")
-        looks = {"color": style.MODEL, "label": "model of the data", **kwargs}
-        lines = upper.plot(time, own, **looks)
-        upper.set_xlabel(f"time [{unit}]")
-        upper.set_ylabel("unit step\nresponse")
-        factor, unit = axis_time_unit(float(result.dead_times.max()), lower)
-        lower.hist(factor * result.dead_times, bins="auto", color=style.MEASURED, alpha=0.6)
-        for limit in result.interval:
-            lower.axvline(factor * limit, color=style.INK, linewidth=1.0)
-        lower.set_xlabel(f"dead time [{unit}]")
-        lower.set_ylabel("draws")
-        return style.finished([upper, lower], [lines, []], loc="lower right")
-
-
-def _settled(result: Bootstrap) -> int:
-    """Samples until the slowest mode has decayed to 1 %, at most 20 000."""
-    slowest = float(np.abs(np.linalg.eigvals(result.system.delay_free.A)).max())
-    lasting = np.log(0.01) / np.log(min(max(slowest, 1e-6), 0.9998))
-    return int(np.clip(result.system.delay + lasting, 10, 20_000))
 
 
 @documented("sequence of two Axes")

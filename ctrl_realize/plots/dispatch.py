@@ -18,7 +18,7 @@ from ..identification.realization.result import Realization
 from ..identification.several_inputs_result import SeveralInputsFit
 from ..io.stored_fit import FitSummary
 from .campaigns import campaign_plot, gain_plot
-from .delays import bootstrap_plot, delay_comparison_plot, track_plot
+from .delays import delay_comparison_plot, track_plot
 from .fits import fit_plot, several_inputs_plot
 from .frequencies import frf_fit_plot, frf_plot, joint_fit_plot, truth_plot
 from .frf_comparison import comparison_plot
@@ -82,7 +82,6 @@ def _first_of_the_set(result: Dataset, **kwargs: Any) -> ct.ControlPlot:
 
 # the annotation of the first argument is the kind of result
 for _plot in (
-    bootstrap_plot,
     campaign_plot,
     comparison_plot,
     delay_comparison_plot,

@@ -26,7 +26,6 @@ RAISED_BY = {
     "identification/realization": "realize",
     "identification/realization/scan_curve": "estimate_delay",
     "identification/state_space_fit": "fit_state_space",
-    "identification/validation/bootstrap": "validation.bootstrap",
     "identification/validation/delay_estimates": "validation.compare_delay_estimates",
     "identification/validation/residuals": "validation.analyse_residuals",
     "valves": "valves.valve_report",

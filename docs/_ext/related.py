@@ -62,7 +62,6 @@ PAGES: dict[str, tuple[str, ...]] = {
     "compare": ("howto/process_models",),
     "validation.ModelComparison": ("howto/process_models",),
     "validation.*elay*": ("howto/check_the_delay",),
-    "validation.*ootstrap": ("howto/trust_delay",),
     "validation.*": ("howto/random_inputs",),
     "compare_frf": ("howto/frequency_responses", "theory/frf_coherence"),
     "fit_frf": ("howto/frequency_responses",),

@@ -1,1 +1,1 @@
-"""Validation of models: residuals, prediction, bootstrap, independent delay estimates."""
+"""Validation of models: residuals, prediction, independent delay estimates."""

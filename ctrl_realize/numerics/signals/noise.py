@@ -213,20 +213,6 @@ def correlation_of_noise(correlation: float, parameters: float) -> tuple[float, 
     return max(lost / parameters, correlation), lost
 
 
-def kept_in_blocks(residual: FloatArray, length: int) -> float:
-    """Fraction of the variance of slow means that remains in blocks of `length` samples.
-
-    Separate blocks are uncorrelated: the autocorrelation at lag k remains in ``1 - k / length`` of
-    the pairs. 1 for white noise.
-    """
-    time = correlation_time(residual)
-    if time == 1.0:
-        return 1.0
-    correlation = _correlation(residual).ravel()
-    pairs_inside = np.clip(1 - np.arange(correlation.size) / length, 0.0, None)
-    return float(np.clip((2 * pairs_inside @ correlation - 1.0) / time, 0.0, 1.0))
-
-
 def _correlation(residual: FloatArray) -> FloatArray:
     """Autocorrelation from lag 0 to where a pair is negative, in pairs: shape (K, 2)."""
     n = residual.size
