@@ -9,7 +9,6 @@ from typing import TypeAlias
 from .base import Actuator
 from .characteristic import Characteristic
 from .limits import Backlash, DeadZone, Resolution, Saturation, SlewRateLimit
-from .lugre import LuGreFriction
 from .stiction import HeStiction, KanoStiction, Stiction
 
 Plain: TypeAlias = "float | int | str | bool | tuple[Plain, ...] | None"
@@ -17,8 +16,8 @@ Plain: TypeAlias = "float | int | str | bool | tuple[Plain, ...] | None"
 _MODELS: dict[str, type[Actuator]] = {
     model.__name__: model
     for model in (
-        Backlash, Characteristic, DeadZone, HeStiction, KanoStiction, LuGreFriction, Resolution,
-        Saturation, SlewRateLimit, Stiction,
+        Backlash, Characteristic, DeadZone, HeStiction, KanoStiction, Resolution, Saturation,
+        SlewRateLimit, Stiction,
     )
 }  # fmt: skip
 _INFINITE = {str(number): number for number in (float("inf"), float("-inf"))}

