@@ -4,11 +4,15 @@ from __future__ import annotations
 
 import json
 import math
+import sys
 from collections.abc import Mapping
-from typing import Any
+from dataclasses import is_dataclass
+from typing import Any, cast, get_args, get_type_hints
 
 import numpy as np
 
+from ..actuators import Actuator
+from ..actuators.plain import from_plain
 from ..errors import FileFormatError
 from ..numerics.arrays import FloatArray
 
@@ -33,6 +37,41 @@ def boolean_free(content: Mapping[str, Any], key: str, kind: Any) -> Any:
     if isinstance(content.get(key), bool):
         raise FileFormatError(f"{key!r} is true or false; expected a number")
     return field(content, key, kind)
+
+
+def of_kind(value: Any, kind: Any) -> Any:
+    """Return plain content as the kind that a type annotation names.
+
+    A number is finite, or one of the texts inf, -inf and nan, which JSON has no numbers for; a
+    dataclass is the list of its fields in their order, and an `Actuator` that of `to_plain`.
+
+    Raises
+    ------
+    ValueError, TypeError
+        Something else.
+
+    Examples
+    --------
+    >>> from ctrl_realize.io.json_content import of_kind
+    >>> of_kind([1, "inf"], tuple[float, float])
+    (1.0, inf)
+    """
+    parts = get_args(kind)
+    if isinstance(value, list | tuple) and is_dataclass(kind):
+        made, kinds = cast("Any", kind), [*get_type_hints(kind).values()][: len(value)]
+        return made(*(of_kind(one, each) for one, each in zip(value, kinds, strict=True)))
+    if isinstance(value, list | tuple) and parts:
+        kinds = [parts[0]] * len(value) if parts[-1] is ... else [*parts]
+        return tuple(of_kind(one, each) for one, each in zip(value, kinds, strict=True))
+    if kind is Actuator:
+        return from_plain(value)
+    # a whole number in a file may exceed the range of doubles
+    number = type(value) in (int, float) and abs(value) <= sys.float_info.max
+    if kind is float and (number or value in ("inf", "-inf", "nan")):
+        return float(value)
+    if value in parts or type(value) is kind:
+        return value
+    raise ValueError(f"got {value!r:.80}; expected {getattr(kind, '__name__', kind)}")
 
 
 def texts(content: Mapping[str, Any], key: str) -> list[str]:

@@ -3,80 +3,34 @@
 from __future__ import annotations
 
 import math
-import sys
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from typing import Any, get_args
+from typing import Any
 
 import numpy as np
 
 from .._parameters import Parameter
 from .._wording import times_in
-from ..actuators.plain import Plain, from_plain, to_plain
+from ..actuators.plain import Plain, to_plain
 from ..errors import FileFormatError
 from ..identification.output_error.actuated.result import ActuatorFit
 from ..results import INTERVAL_LABELS, Flag, IntervalKind, ModelFit
-from .json_content import MAX_TEXT, field
+from .json_content import field, of_kind
 
-_MAX_ROWS = 200
-
-
-def _text(value: Plain) -> str | None:
-    return value if isinstance(value, str) else None
-
-
-def _number(value: Plain) -> float | None:
-    """Accept a number of either sign; one that is not finite is stored as text."""
-    if isinstance(value, str):
-        return float(value) if value in ("inf", "-inf", "nan") else None
-    if isinstance(value, bool) or not isinstance(value, int | float):
-        return None
-    # a whole number in a file may exceed the range of doubles
-    return float(value) if abs(value) <= sys.float_info.max else None
-
-
-def _count(value: Plain) -> int | None:
-    return value if isinstance(value, int) and not isinstance(value, bool) else None
-
-
-def _time(value: Plain) -> float | None:
-    """Accept a time; anything else in its place gives None."""
-    time = _number(value)
-    return time if time is not None and 0 <= time < math.inf else None
-
-
-def _pair(value: Plain) -> tuple[float, float] | None:
-    match value:
-        case (first, last):
-            low, high = _number(first), _number(last)
-            return None if low is None or high is None else (low, high)
-    return None
-
-
-def _times(value: Plain) -> tuple[float, float] | None:
-    """Accept an interval of times, which may be infinite."""
-    ends = _pair(value)
-    if ends is None or any(-math.inf < end < 0 for end in ends) or not ends[0] <= ends[1]:
-        return None
-    return ends
-
-
-def _parameter(row: Plain) -> Parameter | None:
-    """Accept the fields of a parameter in their order."""
-    match row:
-        case (str(name), *numbers, bool(all_structures), str(unit), int(times)) if len(
-            numbers
-        ) == 4 and times in (-1, 0, 1):
-            value, *others = (_number(number) for number in numbers)
-            std, low, high = (np.nan if number is None else number for number in others)
-            if value is not None:
-                return Parameter(name, value, std, low, high, all_structures, unit, times)
-    return None
-
-
-def _closed(value: Plain) -> tuple[float, float] | None:
-    ends = _times(value)
-    return ends if ends is not None and np.isfinite(ends).all() else None
+Ends = tuple[float, float]
+_KEPT: dict[str, Any] = {
+    "delay": float, "order": int, "dead_time": float, "dead_time_interval": Ends, "interval": Ends,
+    "delay_interval": Ends, "total_delay": float, "total_delay_interval": Ends, "gain": float,
+    "gain_interval": Ends, "gain_std_given_structure": float, "onset": float,
+    "interval_kind": IntervalKind, "residual_std": float, "sampling": str, "integrators": int,
+    "input_unit": str, "output_unit": str, "parameters": tuple[Parameter, ...],
+    "actuator": ActuatorFit,
+}  # fmt: skip
+"""Attributes of a `ModelFit` that are stored -> their kinds; also the keys in the file."""
+_ABSENT = {"integrators": 0, "input_unit": "", "output_unit": "", "parameters": ()}
+_TIMES = ("delay", "dead_time", "dead_time_interval", "residual_std")
+_OPEN_TIMES = ("interval", "delay_interval")
+"""Never negative, and intervals of them that may have no upper end."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -122,7 +76,7 @@ class FitSummary(ModelFit):
 
     @property
     def _record_unit(self) -> str:
-        return _text(self._value("time_unit")) or "s"
+        return str(self._value("time_unit") or "s")
 
     @property
     def interval_label(self) -> str:
@@ -136,7 +90,7 @@ class FitSummary(ModelFit):
 
     @property
     def _method(self) -> str:
-        return _text(self._value("method")) or "model with dead time"
+        return str(self._value("method") or "model with dead time")
 
     def __repr__(self) -> str:
         return f"<FitSummary of a {self.kind}>"
@@ -148,45 +102,40 @@ class FitSummary(ModelFit):
         return list(self.rows)
 
 
-def _interval_kind(value: Plain) -> IntervalKind | None:
-    return next((kind for kind in get_args(IntervalKind) if kind == value), None)
+def _read(summary: FitSummary, key: str) -> Any:
+    """Value of an attribute; what a file has in its place gives the value of a fit without it."""
+    absent, value = _ABSENT.get(key), summary._value(key)
+    if value is None:
+        return absent
+    try:
+        found = of_kind(value, _KEPT[key])
+    except (TypeError, ValueError) as error:
+        if key == "actuator":  # without it the model would be simulated as another one
+            raise FileFormatError(f"'actuator' of 'fit': {error}; save the model again") from error
+        return absent
+    if key in (*_TIMES, *_OPEN_TIMES):
+        first, last = np.ravel(found)[[0, -1]]
+        if not 0 <= first <= last or (key in _TIMES and last == math.inf):
+            return absent
+    return found
 
 
-def _parameters(value: Plain) -> tuple[Parameter, ...]:
-    read = [_parameter(row) for row in value] if isinstance(value, tuple) else []
-    return tuple(parameter for parameter in read if parameter is not None)
-
-
-_KEPT: dict[str, Callable[[Plain], object]] = {
-    "delay": _time, "order": _count, "dead_time": _time, "dead_time_interval": _closed,
-    "interval": _times, "delay_interval": _times, "total_delay": _number,
-    "total_delay_interval": _pair, "gain": _number, "gain_interval": _pair,
-    "gain_std_given_structure": _number, "onset": _number, "interval_kind": _interval_kind,
-    "residual_std": _time, "sampling": _text, "integrators": lambda value: _count(value) or 0,
-    "input_unit": lambda value: _text(value) or "", "output_unit": lambda value: _text(value) or "",
-    "parameters": _parameters,
-    "actuator": lambda value: None if value is None else _actuator(value),
-}  # fmt: skip
-"""Attributes of a `ModelFit` that are stored -> what accepts the value in a file."""
-
-
-def _stored(key: str, read: Callable[[Plain], object]) -> property:
+def _stored(key: str) -> property:
     # numpydoc wants the line of a def
     def stored(summary: FitSummary) -> Any:
-        return read(summary._value(key))
+        return _read(summary, key)
 
     return property(stored, doc=f"`ModelFit.{key}`, as the file has it.")
 
 
-for _key, _read in _KEPT.items():
-    setattr(FitSummary, _key, _stored(_key, _read))
+for _key in _KEPT:
+    setattr(FitSummary, _key, _stored(_key))
 
 
 def summary_of(fit: ModelFit | None) -> FitSummary | None:
     """Reduce any fit to plain numbers and text."""
     if fit is None or isinstance(fit, FitSummary):
         return fit
-    # all are attributes of a ModelFit; the list is also that of the keys in the file
     values = {
         key: _plain(getattr(fit, key)) for key in _KEPT if key not in ("parameters", "actuator")
     }
@@ -221,23 +170,6 @@ def _actuator_row(fit: ActuatorFit) -> Plain:
     return _plain((model, fit.actuator_at, rows, fit.starts, fit.evidence))
 
 
-def _actuator(row: Plain) -> ActuatorFit:
-    """Accept the fields of an actuator; a model without it would be simulated as another one."""
-    match row:
-        case (model, ("input" | "stem") as place, tuple() as rows, tuple() as begun, evidence):
-            parameters = [one for one in map(_parameter, rows) if one is not None]
-            starts = [one for one in map(_number, begun) if one is not None]
-            try:
-                found = from_plain(model)
-            except (TypeError, ValueError) as error:
-                raise FileFormatError(f"'actuator' of 'fit': {error}") from error
-            for_it = _number(evidence)
-            return ActuatorFit(
-                found, place, tuple(parameters), tuple(starts), np.nan if for_it is None else for_it
-            )
-    raise FileFormatError("'actuator' of 'fit' is not as it was written; save the model again")
-
-
 def summary_to_json(summary: FitSummary | None) -> dict[str, Any] | None:
     """Convert a summary for JSON."""
     if summary is None:
@@ -267,32 +199,20 @@ def summary_from_json(content: Any) -> FitSummary | None:
     summary = FitSummary(
         kind=field(content, "kind", str),
         title=field(content, "title", str),
-        rows=_pairs(content, "rows"),
+        rows=_texts(content, "rows", tuple[tuple[str, str], ...]),
         values=tuple((str(key), _tupled(value)) for key, value in values.items()),
-        flags=tuple(Flag(code, message) for code, message in _pairs(content, "flags")),
-        choices=_texts(content, "choices"),
+        flags=_texts(content, "flags", tuple[Flag, ...]),
+        choices=_texts(content, "choices", tuple[str, ...]) if "choices" in content else (),
     )
     _ = summary.actuator  # refused here, if at all, and not where it is used
     return summary
 
 
-def _pairs(content: Mapping[str, Any], key: str) -> tuple[tuple[str, str], ...]:
-    rows = field(content, key, list)
-    good = len(rows) <= _MAX_ROWS and all(
-        isinstance(row, list) and len(row) == 2 and all(isinstance(text, str) for text in row)
-        for row in rows
-    )
-    if not good or any(len(text) > 10 * MAX_TEXT for row in rows for text in row):
-        raise FileFormatError(f"{key!r} must contain pairs of texts, at most {_MAX_ROWS}")
-    return tuple((row[0], row[1]) for row in rows)
-
-
-def _texts(content: Mapping[str, Any], key: str) -> tuple[str, ...]:
-    """Texts that are missing in an older file."""
-    rows = field(content, key, list) if key in content else []
-    if len(rows) > _MAX_ROWS or any(not isinstance(text, str) for text in rows):
-        raise FileFormatError(f"{key!r} must hold texts, at most {_MAX_ROWS}")
-    return tuple(rows)
+def _texts(content: Mapping[str, Any], key: str, kind: Any) -> Any:
+    try:
+        return of_kind(content.get(key), kind)
+    except (TypeError, ValueError) as error:
+        raise FileFormatError(f"{key!r}: {error}") from error
 
 
 def _plain(value: Any) -> Plain:
