@@ -20,7 +20,6 @@ from .loops.uncertainty import uncertainty_bound as uncertainty_bound
 from .measured_load import Feedforward as Feedforward
 from .measured_load import feedforward as feedforward
 from .models.approximations import pade_ss as pade_ss
-from .models.approximations import thiran as thiran
 from .models.balanced import BalancedReduction as BalancedReduction
 from .models.balanced import hankel_singular_values as hankel_singular_values
 from .models.balanced import reduce as reduce

@@ -89,7 +89,6 @@ PAGES: dict[str, tuple[str, ...]] = {
     "design.reduce": ("howto/export",),
     "design.to_*": ("howto/export",),
     "design.ContinuousModel": ("howto/export",),
-    "design.thiran": ("howto/export", "conventions"),
     "design.pade_ss": ("howto/export",),
     "design.hankel_singular_values": ("howto/export",),
     "design.BalancedReduction": ("howto/export",),

@@ -6,8 +6,6 @@ import control as ct
 import mpmath as mp
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 import ctrl_realize as cr
 
@@ -56,20 +54,6 @@ def test_pade_is_the_ratio_of_exact_polynomials(order):
         exact = [complex(Q(-1j * mp.mpf(w) * tau) / Q(1j * mp.mpf(w) * tau)) for w in omega]
     np.testing.assert_allclose(delay(1j * omega), exact, atol=1e-13)
     assert np.all(delay.poles().real < 0)
-
-
-@given(order=st.integers(1, 6), delay=st.floats(0.5, 40.0))
-def test_thiran_is_all_pass_and_has_its_delay_at_low_frequency(order, delay):
-    if delay <= order - 1:  # its poles would be outside the circle
-        with pytest.raises(cr.errors.DelayRangeError, match="needs more than"):
-            cr.design.thiran(0.01 * delay, 0.01, order)
-        order = None
-    found = cr.design.thiran(0.01 * delay, 0.01, order)
-    assert order is None or found.delay_free.nstates in (0, order)
-    z = np.exp(1j * np.array([1e-4, 0.5, 2.0, 3.0]))
-    np.testing.assert_allclose(np.abs(found(z)), 1.0, rtol=1e-10)
-    assert -np.angle(found(z[0])) / 1e-4 == pytest.approx(delay, rel=1e-6)
-    assert np.all(np.abs(found.poles()) < 1)
 
 
 @pytest.mark.parametrize(

@@ -15,7 +15,7 @@ from ...numerics.arrays import FloatArray
 from ...numerics.internal_delays import form as forms
 from ...numerics.internal_delays.form import DelayForm
 from ...numerics.internal_delays.merging import ends_apart, paths_apart
-from ...numerics.state_space.fractional_delay import pade_ladder
+from ...numerics.state_space.pade import pade_ladder
 from ...numerics.state_space.sampling import continuous_ends, sample_ends, split_dead_time
 from ..operands import plain
 from ..operators import DelayOperators

@@ -1,6 +1,6 @@
-"""Rational approximations of a dead time: Pade (continuous) and Thiran (discrete).
+"""Pade approximation of a dead time.
 
-The approximant of [1]_ in balanced coordinates, as in [2]_; the all-pass of [3]_ and [4]_.
+The approximant of [1]_ in balanced coordinates, as in [2]_.
 
 References
 ----------
@@ -8,16 +8,12 @@ References
    9.3.1 (Pade approximation of the exponential).
 .. [2] J. Lam, Balanced realization of Pade approximants of exp(-sT), IEEE Trans. Automat. Control
    36 (1991) 1096-1100.
-.. [3] J.-P. Thiran, Recursive digital filters with maximally flat group delay, IEEE Trans. Circuit
-   Theory 18 (1971) 659-664, doi:10.1109/TCT.1971.1083363.
-.. [4] T. I. Laakso, V. Valimaki, M. Karjalainen and U. K. Laine, Splitting the unit delay, IEEE
-   Signal Process. Mag. 13 (1996) 30-60, doi:10.1109/79.482137.
 """
 
 from __future__ import annotations
 
 from fractions import Fraction
-from math import comb, factorial
+from math import factorial
 
 import numpy as np
 
@@ -69,35 +65,3 @@ def pade_ladder(dead_time: float, order: int) -> Ladder:
     D = np.array([[(-1.0) ** n]])
     root = np.sqrt(dead_time)
     return A / dead_time, B / root, -D * B.T / root, D
-
-
-def thiran_denominator(delay: float, order: int) -> FloatArray:
-    r"""Denominator of the all-pass filter with maximally flat group delay at frequency 0.
-
-    ``a_k = (-1)^k C(N, k) prod_{i=0..N} (D - N + i) / (D - N + k + i)`` [1]_; the numerator is the
-    same, reversed. Stable for D > N - 1.
-
-    Parameters
-    ----------
-    delay : float
-        D in samples, > order - 1.
-    order : int
-        N.
-
-    Returns
-    -------
-    ndarray, shape (N + 1,)
-        In z, highest power first.
-
-    References
-    ----------
-    .. [1] J.-P. Thiran, Recursive digital filters with maximally flat group delay, IEEE Trans.
-       Circuit Theory 18 (1971) 659-664.
-    """
-    i = np.arange(order + 1)
-    return np.array(
-        [
-            (-1) ** k * comb(order, k) * np.prod((delay - order + i) / (delay - order + k + i))
-            for k in range(order + 1)
-        ]
-    )
