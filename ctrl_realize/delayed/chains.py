@@ -9,6 +9,8 @@ import numpy as np
 from .._checks import integer
 from ..errors import DelayRangeError, OptionError
 from ..numerics.arrays import ComplexArray, FloatArray, whole_power
+from ..numerics.internal_delays.form import DelayForm, delayed_ends
+from ..numerics.internal_delays.recurrence import absorbed
 
 ON_CIRCLE = 1 - 1e-12
 """Magnitude from which on a point counts as one on the unit circle."""
@@ -41,34 +43,15 @@ def chain_labels(
     return labels
 
 
-def augment(core: Matrices, before: tuple[int, ...], behind: tuple[int, ...]) -> Matrices:
+def augment(core: Matrices, before: Sequence[int], behind: Sequence[int]) -> Matrices:
     """Join core and chains; states [core; u[k-1] ... u[k-d]; y[k-1] ... y[k-q]]."""
-    core_A, core_B, core_C, core_D = core
-    n, m = core_B.shape
-    p = core_C.shape[0]
-    size = n + sum(before) + sum(behind)
-    A, B = np.zeros((size, size)), np.zeros((size, m))
-    C, D = np.zeros((p, size)), np.zeros((p, m))
-    A[:n, :n] = core_A
-    C[:, :n] = core_C
-    at = n
-    for j, d in enumerate(before):
-        if d == 0:
-            B[:n, j], D[:, j] = core_B[:, j], core_D[:, j]
-            continue
-        B[at, j] = 1.0
-        A[np.arange(at + 1, at + d), np.arange(at, at + d - 1)] = 1.0
-        A[:n, at + d - 1], C[:, at + d - 1] = core_B[:, j], core_D[:, j]
-        at += d
-    for i, q in enumerate(behind):
-        if q == 0:
-            continue
-        A[at], B[at] = C[i], D[i]
-        A[np.arange(at + 1, at + q), np.arange(at, at + q - 1)] = 1.0
-        C[i], D[i] = 0.0, 0.0
-        C[i, at + q - 1] = 1.0
-        at += q
-    return A, B, C, D
+    return with_chains(delayed_ends(DelayForm(*core), before, behind))
+
+
+def with_chains(form: DelayForm) -> Matrices:
+    """Matrices of a discrete system, with a chain of states for every delay."""
+    full = absorbed(form, list(range(len(form.delays))))
+    return full.A, full.B, full.C, full.D
 
 
 def powers(points: ComplexArray, delays: tuple[int, ...]) -> ComplexArray:

@@ -11,7 +11,7 @@ import numpy as np
 from ..errors import DelayRangeError
 from ..numerics.arrays import FloatArray
 from ..numerics.internal_delays.form import DelayForm
-from .chains import Matrices
+from .chains import Matrices, with_chains
 from .readers import warn_of_an_interconnection, warn_of_the_reader
 
 MAX_STATES = 20_000
@@ -49,9 +49,9 @@ class DeferredMatrices(ct.StateSpace, ABC):  # type: ignore[misc]  # control is 
     def _form(self) -> DelayForm:
         """Return core and delays, those at inputs and outputs as additional channels."""
 
-    @abstractmethod
     def _make_matrices(self) -> Matrices:
         """Compute A, B, C, D, the delay line's states last."""
+        return with_chains(self._form())
 
     @abstractmethod
     def _name_states(self) -> list[str]:

@@ -12,7 +12,7 @@ import numpy as np
 from .._checks import check_type, system_names
 from ..errors import OptionError, UnsuitableSystemError
 from ..numerics.arrays import ComplexArray, IntArray, read_only
-from .chains import Matrices, augment, chain_labels
+from .chains import Matrices, chain_labels
 from .deferred import DeferredMatrices
 
 MAX_DELAY = 10_000_000
@@ -38,10 +38,6 @@ class CoreAndDelays(DeferredMatrices):
             # A core that itself was made of core and delays has state names of delay lines.
             names = dict.fromkeys([*(f"x[{i}]" for i in range(self._core.nstates)), *chain])
         return list(names)
-
-    def _make_matrices(self) -> Matrices:
-        core = self._core
-        return augment((core.A, core.B, core.C, core.D), self.input_delays, self.output_delays)
 
     def _without_matrices(self) -> str:
         return (

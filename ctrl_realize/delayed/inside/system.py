@@ -17,7 +17,6 @@ from ..._checks import real, system_name
 from ...numerics.arrays import IntArray
 from ...numerics.internal_delays.form import DelayForm
 from ...numerics.internal_delays.merging import ends_apart
-from ...numerics.internal_delays.recurrence import absorbed
 from ...numerics.internal_delays.response import Response
 from ..chains import Matrices
 from ..operands import plain
@@ -165,8 +164,7 @@ class DelaySystem(InsideResponses, InsideConversions, InsideCards, DelayOperator
     def _make_matrices(self) -> Matrices:
         if not self.dt and self.internal_delays:
             raise not_rational("A, B, C, D")
-        full = absorbed(self._form(), list(range(len(self.internal_delays))))
-        return full.A, full.B, full.C, full.D
+        return super()._make_matrices()
 
     def _name_states(self) -> list[str]:
         names = list(self._core.state_labels)

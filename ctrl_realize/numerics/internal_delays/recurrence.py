@@ -11,7 +11,7 @@ import numpy as np
 
 from ..arrays import FloatArray
 from ..state_space.responses import BLOCK, block_operators, simulate
-from .form import DelayForm, with_states
+from .form import DelayForm
 
 SHORT = 16
 """Samples below which a delay is as fast as states of the core."""
@@ -19,16 +19,19 @@ SHORT = 16
 
 def absorbed(form: DelayForm, at: list[int]) -> DelayForm:
     """Turn some delays into shift registers; states [core; w_i[k+1-d] ...], newest sample first."""
-    lengths = np.array([int(form.delays[i]) for i in at], dtype=np.int64)
-    ends = np.cumsum(lengths)
-    first, last = ends - lengths, ends - 1
-    count = int(lengths.sum())
-    reads, writes = np.zeros((len(at), count)), np.zeros((count, len(at)))
-    reads[np.arange(len(at)), last] = 1.0
-    writes[first, np.arange(len(at))] = 1.0
-    shift = np.eye(count, k=-1)
-    shift[first] = 0.0
-    return with_states(form, at, shift, writes, reads)
+    rest = [i for i in range(len(form.delays)) if i not in at]
+    split = form.channels([*rest, *at])
+    n, m, p = form.states, form.inputs + len(rest), form.outputs + len(rest)
+    lengths = np.array(split.delays[len(rest) :], dtype=np.int64)
+    last = n + np.cumsum(lengths) - 1
+    first, size = last - lengths + 1, n + int(lengths.sum())
+    A, B, C = np.zeros((size, size)), np.zeros((size, m)), np.zeros((p, size))
+    A[:n, :n], A[:n, last], B[:n] = form.A, split.B[:, m:], split.B[:, :m]
+    A[first, :n], B[first], A[np.ix_(first, last)] = split.C[p:], split.D[p:, :m], split.D[p:, m:]
+    C[:, :n], C[:, last] = split.C[:p], split.D[:p, m:]
+    shifted = np.setdiff1d(np.arange(n, size), first)
+    A[shifted, shifted - 1] = 1.0
+    return DelayForm(A, B, C, split.D[:p, :m].copy(), split.delays[: len(rest)])
 
 
 def recurrence(form: DelayForm, inputs: FloatArray, state: FloatArray | None = None) -> FloatArray:
