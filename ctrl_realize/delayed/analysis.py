@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import control as ct
 import numpy as np
 
 from .._checks import integer
-from ..numerics.arrays import ComplexArray
+from ..numerics.arrays import ComplexArray, FloatArray
 from ..numerics.internal_delays.dominant import largest
 from ..numerics.internal_delays.form import DelayForm
+from ..numerics.state_space.responses import markov
 from .parts import CoreAndDelays
 
 
@@ -52,19 +51,28 @@ class DelayedAnalysis(CoreAndDelays):
         core = self._core
         return DelayForm(core.A, core.B, core.C, core.D)
 
-    def to_tf(self, *args: Any, **kwargs: Any) -> ct.TransferFunction:
+    def to_tf(self) -> ct.TransferFunction:
         """Transfer function: that of the core, with d further poles at zero.
 
-        python-control's ``ct.tf(sys)`` computes the characteristic polynomial of the augmented
-        matrix, which has no correct digits from d = 50 on. Several channels give a matrix of
-        transfer functions.
+        The denominator has the poles of the core, the numerators are its product with the Markov
+        parameters, so that the relative degree is preserved. python-control's ``ct.tf(sys)``
+        computes the characteristic polynomial of the augmented matrix, which has no correct digits
+        from d = 50 on. Several channels give a matrix of transfer functions.
         """
-        core = ct.tf(self._core, *args, **kwargs)
+        core, n = self._core, self._core.nstates
+        den = np.real(np.poly(np.linalg.eigvals(core.A))) if n else np.ones(1)
+        pulses = markov(core.A, core.B, core.C, core.D, n + 1)
         total = np.add.outer(self.output_delays, self.input_delays)
-        den = [
-            [np.concatenate([core.den[i][j], np.zeros(total[i, j])]) for j in range(core.ninputs)]
-            for i in range(core.noutputs)
-        ]
         return ct.TransferFunction(
-            core.num, den, self.dt, inputs=self.input_labels, outputs=self.output_labels
+            [[_numerator(den, channel) for channel in row] for row in pulses],
+            [[np.concatenate([den, np.zeros(delay)]) for delay in row] for row in total],
+            self.dt,
+            inputs=self.input_labels,
+            outputs=self.output_labels,
+            name=self.name,
         )
+
+
+def _numerator(den: FloatArray, pulses: FloatArray) -> FloatArray:
+    num = np.convolve(den, pulses)[: den.size]
+    return num[np.argmax(num != 0) :] if np.any(num) else np.zeros(1)

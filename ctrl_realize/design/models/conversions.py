@@ -52,32 +52,7 @@ def to_tf(system: Any) -> ct.TransferFunction:
     >>> print(tf.num[0][0], tf.den[0][0])
     [0.1] [ 1.  -0.9  0.   0.   0. ]
     """
-    plant = delayed_system(system, "to_tf", siso=False)
-    core, n = plant.delay_free, plant.delay_free.nstates
-    den = np.real(np.poly(np.linalg.eigvals(core.A))) if n else np.ones(1)
-    pulses = np.asarray(DelayedStateSpace(core, 0).markov(n + 1))
-    pulses = pulses.reshape(core.noutputs, core.ninputs, n + 1)
-    total = np.add.outer(plant.output_delays, plant.input_delays)
-    nums = [
-        [_numerator(den, pulses[i, j]) for j in range(core.ninputs)] for i in range(core.noutputs)
-    ]
-    dens = [
-        [np.concatenate([den, np.zeros(total[i, j])]) for j in range(core.ninputs)]
-        for i in range(core.noutputs)
-    ]
-    return ct.TransferFunction(
-        nums,
-        dens,
-        plant.dt,
-        inputs=plant.input_labels,
-        outputs=plant.output_labels,
-        name=plant.name,
-    )
-
-
-def _numerator(den: FloatArray, pulses: FloatArray) -> FloatArray:
-    num = np.convolve(den, pulses)[: den.size]
-    return num[np.argmax(num != 0) :] if np.any(num) else np.zeros(1)
+    return delayed_system(system, "to_tf", siso=False).to_tf()
 
 
 @dataclass(frozen=True, eq=False, repr=False)
