@@ -6,11 +6,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Literal, TypeAlias
 
+import control as ct
 import numpy as np
 
 from .._checks import positive
 from ..actuators import Actuator, Saturation, Series
 from ..data import Record
+from ..delayed import delayed_ss
 from ..errors import OptionError
 from ..numerics.arrays import FloatArray, locked
 from ..numerics.state_space.sampling import sample_with_dead_time
@@ -228,22 +230,10 @@ class ValveLoop:
         return A.item(), B.item(), C.item(), D.item(), delay
 
     def _radius(self, factor: float) -> float:
-        """Largest magnitude of a pole of the linear loop, with the controller gain times a factor.
-
-        States: that of the process, the commands on their way, and the integral.
-        """
-        A, B, C, D, delay = self._sampled()
+        """Largest magnitude of a pole of the linear loop, controller gain times `factor`."""
+        *core, delay = self._sampled()
         gain, integral_time = self.controller
         part = self.dt / integral_time
-        n = delay + 2
-        arriving = np.eye(n)[1] if delay else np.zeros(n)
-        error = -(C * np.eye(n)[0] + D * arriving)
-        integral = np.eye(n)[-1] + part * error
-        command = factor * gain * (error + integral)
-        loop = np.zeros((n, n))
-        loop[0] = A * np.eye(n)[0] + B * (arriving if delay else command)
-        loop[1:delay] = np.eye(n)[2 : delay + 1]
-        if delay:
-            loop[delay] = command
-        loop[-1] = integral
-        return float(np.abs(np.linalg.eigvals(loop)).max())
+        controller = ct.ss(1, part, factor * gain, factor * gain * (1 + part), self.dt)
+        loop = delayed_ss(ct.ss(*core, self.dt), delay) * controller
+        return float(np.abs(loop.feedback().poles()).max())
