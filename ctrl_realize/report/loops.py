@@ -17,14 +17,9 @@ from .build import write_report
 from .page import Row, Table, headed
 from .sketches import Sketch, sketch
 from .tables import Paths, data_table, settings_tables
-from .verdict import Level, Verdict
+from .verdict import JUDGEMENTS, Level, Verdict
 
 _LEVELS: dict[str, Level] = {"stiction": "poor", "no oscillation": "good"}
-_JUDGEMENTS: dict[Level, str] = {
-    "good": "The loop does not oscillate.",
-    "caution": "The loop may oscillate; the valve is not shown to be the cause.",
-    "poor": "The loop oscillates, and the valve sticks.",
-}
 
 
 def write_loop_report(
@@ -100,7 +95,7 @@ def _verdict(diagnosis: LoopDiagnosis) -> Verdict:
     facts = tuple(row for row in rows if row[0] not in names)
     reasons = (diagnosis.reason, *map(str, diagnosis.flags), *diagnosis.choices)
     sentence = diagnosis.verdict[0].upper() + diagnosis.verdict[1:] + "."
-    return Verdict(level, sentence, facts, reasons, _JUDGEMENTS[level])
+    return Verdict(level, sentence, facts, reasons, JUDGEMENTS["loop"][level])
 
 
 def _sketches(diagnosis: LoopDiagnosis) -> list[Sketch]:

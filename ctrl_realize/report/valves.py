@@ -19,13 +19,8 @@ from .build import write_report
 from .page import Row, Table, headed, pairs
 from .sketches import Sketch, sketch
 from .tables import Paths, data_table, settings_tables
-from .verdict import Level, Verdict
+from .verdict import JUDGEMENTS, Verdict
 
-_JUDGEMENTS: dict[Level, str] = {
-    "good": "All limits are met.",
-    "caution": "Measured, but not judged in full: see below.",
-    "poor": "Limits are not met: see below.",
-}
 _SHOWN = ("dead_time", "t63", "t86", "t98", "overshoot", "gain")
 _FACTS = ("dead_time", "t63", "t86", "overshoot", "dead_band", "resolution",
           "stroke_time_opening", "stroke_time_closing")  # fmt: skip
@@ -109,7 +104,9 @@ def _verdict(result: ValveReport) -> Verdict:
             value, interval = in_words(one.interval, one.definition.unit)
             facts.append((one.definition.name, f"{value} {interval}"))
     reasons = (*map(str, result.flags), *result.choices)
-    return Verdict(result.level, result.verdict, tuple(facts), reasons, _JUDGEMENTS[result.level])
+    return Verdict(
+        result.level, result.verdict, tuple(facts), reasons, JUDGEMENTS["valve"][result.level]
+    )
 
 
 def _sketches(result: ValveReport) -> list[Sketch]:

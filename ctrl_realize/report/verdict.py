@@ -8,6 +8,7 @@ from typing import Literal
 
 import numpy as np
 
+from .._facts import facts
 from .._flags import Flag, marked
 from .._wording import in_time, interval_in_time, number_within, time_within, times_in
 from ..delayed import DelayedStateSpace
@@ -28,22 +29,9 @@ from .facts import (
 
 _CONTRADICTED = "frf_disagrees"
 
-SCANNED = (
-    "the dead time is the delay with the smallest IAE, and the interval shows how flat the "
-    "IAE curve is there; it is not a confidence interval, and fast lags that the model order "
-    "leaves out count as dead time. The output-error fit gives a 95 % interval"
-)
-"""Limitation of any scan, however good the record."""
-
 Level = Literal["good", "caution", "poor"]
 
-_JUDGEMENTS: dict[Level, str] = {
-    "good": "No problems found: the data support this model.",
-    "caution": "Use with care: see the remarks below.",
-    "poor": "Do not rely on this dead time: see the reasons below.",
-}
-_WRONG_MODEL = "Do not rely on this model: see the reasons below."
-_CONTRADICTION = "The measured frequency response contradicts this model: see the reasons below."
+JUDGEMENTS: dict[str, dict[str, str]] = facts("report/verdicts.toml")
 
 
 @dataclass(frozen=True)
@@ -91,7 +79,8 @@ def _verdict(
 ) -> Verdict:
     codes = {_code(flag) for flag in flags}
     level: Level = "caution" if flags else "good"
-    judgement = _JUDGEMENTS[level]
+    words = JUDGEMENTS["model"]
+    judgement = words[level]
     answers = () if system.fit is None else system.fit.verdicts
     if answers:
         said = {one.question: one.level for one in answers}
@@ -102,9 +91,9 @@ def _verdict(
         judgement = " ".join(f"{key[:1].upper()}{key[1:]}: {value}." for key, value in said.items())
         codes -= marked("wrong_dead_time")
     if codes & marked("wrong_model") or not _sign_is_told(system):
-        level, judgement = "poor", _CONTRADICTION if _CONTRADICTED in codes else _WRONG_MODEL
+        level, judgement = "poor", words["contradicted" if _CONTRADICTED in codes else "wrong"]
     elif codes & marked("wrong_dead_time"):
-        level, judgement = "poor", _JUDGEMENTS["poor"]
+        level, judgement = "poor", words["poor"]
     headline = headline_of(system)
     return Verdict(level, headline, tuple(facts), _reasons(flags), judgement, formula_of(system))
 
@@ -135,11 +124,7 @@ def comparison_verdict(system: DelayedStateSpace, comparison: FRFComparison) -> 
     level: Level = "good" if error < CLOSE else "caution" if error < FAR else "poor"
     if level == "good" and flags:
         level = "caution"
-    judgement = {
-        "good": f"Model and measurement agree: the error is below {100 * CLOSE:.0f} %.",
-        "caution": "Use with care: see the errors and remarks below.",
-        "poor": f"Model and measurement disagree: the error is above {100 * FAR:.0f} %.",
-    }[level]
+    judgement = JUDGEMENTS["comparison"][level].format(close=100 * CLOSE, far=100 * FAR)
     return Verdict(
         level, headline, facts_of(system), _reasons(flags), judgement, formula_of(system)
     )
@@ -178,7 +163,8 @@ def _sign_is_told(system: DelayedStateSpace) -> bool:
 
 def _flags_of(system: DelayedStateSpace) -> tuple[Flag | str, ...]:
     flags = () if system.fit is None else system.fit.flags
-    return (*flags, SCANNED) if isinstance(system.fit, DelayScan) else flags
+    scanned = [JUDGEMENTS["model"]["scanned"]] * isinstance(system.fit, DelayScan)
+    return (*flags, *scanned)
 
 
 def _reasons(flags: Sequence[Flag | str]) -> tuple[str, ...]:
