@@ -157,6 +157,24 @@ def test_continuous_first_order_with_dead_time_has_its_closed_form():
     ).stable
 
 
+@pytest.mark.parametrize("apart", [False, True])
+@pytest.mark.parametrize("unit", [1e-6, 1.0, 1e4, 1e6])
+def test_a_loop_with_two_integrators_is_stable_in_every_unit_of_time(unit, apart):
+    # dead time of one unit, simc; the margins do not depend on the unit, the delay margin scales
+    s = ct.tf("s")
+    controller = 5 * (1 + 1 / (8 * unit * s))
+    if apart:  # integrator and dead time in different systems
+        found = cr.design.margins(cr.delay(unit), 0.1 / unit / s * controller)
+    else:
+        found = cr.design.margins(0.1 / unit / s * cr.delay(unit), controller)
+    # |L| = 1 for x = (omega unit)^2 with x^2 = (x + 1/64) / 4
+    omega = np.sqrt((1 / 4 + np.sqrt(1 / 16 + 1 / 64)) / 2)
+    phase = np.arctan(8 * omega) - omega
+    assert found.stable
+    assert np.allclose(found.phase_margin, np.degrees(phase), rtol=1e-9)
+    assert np.allclose(found.delay_margin, unit * phase / omega, rtol=1e-9)
+
+
 @pytest.mark.parametrize("delay", [0, 37, 300])
 def test_margins_of_response_data_are_those_of_the_system(valve, pi_controller, delay):
     plant, pi = valve(delay), pi_controller(0.5, 0.2)

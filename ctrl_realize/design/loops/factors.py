@@ -26,35 +26,38 @@ MAX_FEATURES = 100
 class Factor:
     """One system of a loop.
 
-    ``response(w)`` and ``characteristic(w)`` take the shifted variable w = z - 1 (discrete) or w =
-    s (continuous). Near z = 1, where the poles of oversampled systems are, z - 1 keeps its digits.
-    `hidden_delay` is contained in the response; in samples, or in s in continuous time.
+    ``response(w)`` and ``characteristic(w, rate)`` take the shifted variable w = z - 1 (discrete)
+    or w = s (continuous), and the `rate` of `reflected`. Near z = 1, where the poles of oversampled
+    systems are, z - 1 keeps its digits. `hidden_delay` is contained in the response; in samples,
+    or in s in continuous time.
     """
 
     response: Callable[[ComplexArray], ComplexArray]
-    characteristic: Callable[[ComplexArray], ComplexArray]
+    characteristic: Callable[[ComplexArray, float], ComplexArray]
     delay: int
     hidden_delay: float
     features: ComplexArray
     poles: ComplexArray
 
 
-def factor(system: Any, dt: float, rate: float = 0.0) -> Factor:
-    """Make a `Factor` of one system, a number included; `rate` as in `reflected`."""
+def factor(system: Any, dt: float) -> Factor:
+    """Make a `Factor` of one system, a number included."""
     if isinstance(system, DelayLineController):
         return _line_factor(system)
     if isinstance(system, DelaySystem) and system.dt is not None:
         return _inside_factor(system)
     if isinstance(system, ct.TransferFunction):
-        return _polynomial_factor(system, dt, rate)
+        return _polynomial_factor(system, dt)
     if isinstance(system, ct.StateSpace):
         delay = int(system.delay) if isinstance(system, DelayedStateSpace) else 0
         core = system.delay_free if isinstance(system, DelayedStateSpace) else system
         core = core.core if isinstance(core, DelaySystem) else core  # a gain
-        return _state_space_factor(core, dt, rate, delay)
+        return _state_space_factor(core, dt, delay)
     gain = complex(system)
     none = np.zeros(0, dtype=np.complex128)
-    return Factor(lambda w: np.full(w.size, gain), np.ones_like, 0, 0, none, none)
+    return Factor(
+        lambda w: np.full(w.size, gain), lambda w, rate: np.ones_like(w), 0, 0, none, none
+    )
 
 
 def reflected(
@@ -77,14 +80,12 @@ def reflected(
     return moved, -np.maximum(np.abs(moved.real), 0.1 * rate) + 1j * moved.imag
 
 
-def pole_ratio(
-    poles: ComplexArray, dt: float, rate: float = 0.0
-) -> Callable[[ComplexArray], ComplexArray]:
+def pole_ratio(poles: ComplexArray, dt: float) -> Callable[[ComplexArray, float], ComplexArray]:
     """Make prod (z - p) / (z - q) over the poles p that `reflected` moves to q."""
     origin = 1.0 if dt else 0.0
-    moved, places = (points - origin for points in reflected(poles, dt, rate))
 
-    def ratio(w: ComplexArray) -> ComplexArray:
+    def ratio(w: ComplexArray, rate: float) -> ComplexArray:
+        moved, places = (points - origin for points in reflected(poles, dt, rate))
         value = np.ones(w.size, dtype=np.complex128)
         for p, q in zip(moved, places, strict=True):
             value *= (w - p) / (w - q)
@@ -101,7 +102,7 @@ def in_s_plane(points: ComplexArray, dt: float) -> ComplexArray:
     return np.asarray(np.log(points[np.abs(points) > 0.05]) / dt, dtype=np.complex128)
 
 
-def _state_space_factor(core: ct.StateSpace, dt: float, rate: float, delay: int) -> Factor:
+def _state_space_factor(core: ct.StateSpace, dt: float, delay: int) -> Factor:
     A = np.asarray(core.A, dtype=np.float64)
     shift = 1.0 if dt else 0.0
     # The Schur form of A - I: the slow poles of an oversampled model keep their distance to 1.
@@ -120,9 +121,7 @@ def _state_space_factor(core: ct.StateSpace, dt: float, rate: float, delay: int)
         features = np.concatenate([poles, zeros[np.isfinite(zeros)]])
     # A plain system may contain a delay line: its order bounds the number of turns of the phase.
     hidden = int(np.sum(np.abs(poles) < 1 - 1e-3)) if dt and core.nstates > 8 else 0
-    return Factor(
-        response, pole_ratio(poles, dt, rate), delay, hidden, in_s_plane(features, dt), poles
-    )
+    return Factor(response, pole_ratio(poles, dt), delay, hidden, in_s_plane(features, dt), poles)
 
 
 def _inside_factor(system: DelaySystem) -> Factor:
@@ -133,14 +132,14 @@ def _inside_factor(system: DelaySystem) -> Factor:
     def response(w: ComplexArray) -> ComplexArray:
         return np.asarray(system.horner(w + shift, warn_infinite=False)[0, 0])
 
-    def characteristic(w: ComplexArray) -> ComplexArray:
+    def characteristic(w: ComplexArray, rate: float) -> ComplexArray:
         return system.characteristic(w + shift)
 
     poles = np.exp(features * dt) if dt else features
     return Factor(response, characteristic, 0, dead_time / dt if dt else dead_time, features, poles)
 
 
-def _polynomial_factor(system: ct.TransferFunction, dt: float, rate: float) -> Factor:
+def _polynomial_factor(system: ct.TransferFunction, dt: float) -> Factor:
     num = np.atleast_1d(np.asarray(system.num[0][0], dtype=np.float64))
     den = np.atleast_1d(np.asarray(system.den[0][0], dtype=np.float64))
     num = np.trim_zeros(num, "f") if np.any(num) else np.zeros(1)
@@ -158,17 +157,17 @@ def _polynomial_factor(system: ct.TransferFunction, dt: float, rate: float) -> F
     zeros = np.asarray(np.roots(num), dtype=np.complex128)
     shift = 1.0 if dt else 0.0
     top, bottom = (shifted_polynomial(p, shift) for p in (num, den))
-    ratio = pole_ratio(poles, dt, rate)
+    ratio = pole_ratio(poles, dt)
 
     def response(w: ComplexArray) -> ComplexArray:
         with np.errstate(divide="ignore", invalid="ignore"):
             return np.asarray(top(w) / bottom(w), dtype=np.complex128)
 
-    def characteristic(w: ComplexArray) -> ComplexArray:
+    def characteristic(w: ComplexArray, rate: float) -> ComplexArray:
         # den divided by its roots: if roots of a cluster are inexact the dipole cancels.
         exact = bottom(w)
         rooted = den[0] * np.prod(w[:, None] + shift - poles, axis=1)
-        return np.asarray(ratio(w) * exact / rooted, dtype=np.complex128)
+        return np.asarray(ratio(w, rate) * exact / rooted, dtype=np.complex128)
 
     features = in_s_plane(np.concatenate([poles, zeros]), dt)
     return Factor(response, characteristic, delay, 0, features, poles)
@@ -205,8 +204,8 @@ def _line_factor(system: DelayLineController) -> Factor:
         with np.errstate(divide="ignore", invalid="ignore"):
             return np.asarray(forward / back, dtype=np.complex128)
 
-    def characteristic(w: ComplexArray) -> ComplexArray:
-        return np.asarray(ratio(w) * paths(w)[1], dtype=np.complex128)
+    def characteristic(w: ComplexArray, rate: float) -> ComplexArray:
+        return np.asarray(ratio(w, rate) * paths(w)[1], dtype=np.complex128)
 
     return Factor(
         response,

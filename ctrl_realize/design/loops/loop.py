@@ -11,6 +11,7 @@ closed-loop pole.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import control as ct
@@ -74,17 +75,22 @@ class Loop:
         w = self.variable(omega)
         value = np.ones(omega.size, dtype=np.complex128)
         for part in self.factors:
-            value = value * part.characteristic(w)
+            value = value * part.characteristic(w, self.rate)
         return np.asarray(value, dtype=np.complex128)
 
     def beyond(self, top: float) -> FloatArray:
         """Frequencies from `top` to where no factor of a continuous loop turns any more."""
-        dead_time = self.delay + sum(part.hidden_delay for part in self.factors)
-        sizes = [float(np.abs(part.features).max(initial=0.0)) for part in self.factors]
-        end = 1e4 * max([*sizes, 1 / dead_time if dead_time else 0.0])
+        end = 1e4 * self.rate
         if end <= top:
             return np.zeros(0)
         return np.geomspace(top, end, int(40 * np.log10(end / top)) + 2)
+
+    @cached_property
+    def rate(self) -> float:
+        """Fastest rate of a continuous loop in rad/s: the scale of the distance to the axis."""
+        dead_time = self.delay + sum(part.hidden_delay for part in self.factors)
+        sizes = [float(np.abs(part.features).max(initial=0.0)) for part in self.factors]
+        return max([*sizes, 1 / dead_time if dead_time else 0.0]) or 1.0
 
     @property
     def poles(self) -> ComplexArray:
@@ -161,18 +167,7 @@ def open_loop(plant: Any, controller: Any = None, dead_time: float = 0.0) -> Loo
             "sample the continuous one first (design.to_discrete, or .discretised(dt) of a PID)"
         )
     dt = bases.pop() if bases else 0.0
-    rate = 0.0 if dt else _rate(systems, dead_time)
-    return Loop(tuple(factor(system, dt, rate) for system in systems), dt, dead_time)
-
-
-def _rate(systems: list[Any], dead_time: float) -> float:
-    """Fastest rate of a continuous loop in rad/s: the scale of the distance to the axis."""
-    sizes = [
-        float(np.abs(system.poles()).max(initial=0.0))
-        for system in systems
-        if isinstance(system, (ct.StateSpace, ct.TransferFunction))
-    ]
-    return max([*sizes, 1 / dead_time if dead_time else 0.0]) or 1.0
+    return Loop(tuple(factor(system, dt) for system in systems), dt, dead_time)
 
 
 def _words(dt: float) -> str:

@@ -52,7 +52,7 @@ def characteristic(
     Its zeros are the poles of the system; it has no poles on or outside the border of stability.
     With `settles` it goes to 1 at high frequency also where loops consist of delays and gains only.
     """
-    rate = float(np.abs(np.linalg.eigvals(form.A)).max(initial=0.0)) or 1.0
+    rate = _rate(form)
     out = np.empty(points.size, dtype=np.complex128)
     for start in range(0, points.size, CHUNK):
         part = points[start : start + CHUNK]
@@ -66,6 +66,12 @@ def characteristic(
             values = values / np.linalg.det(lines)
         out[start : start + CHUNK] = values
     return out
+
+
+def _rate(form: DelayForm) -> float:
+    """Fastest rate in rad/s, where the roots of the polynomial are."""
+    total = sum(form.delays)
+    return float(np.abs(np.linalg.eigvals(form.A)).max(initial=1 / total if total else 0.0)) or 1.0
 
 
 def settled_frequency(form: DelayForm, low: float) -> float:
@@ -181,7 +187,7 @@ def _rest(part: DelayForm, omega: float) -> float:
     late = np.exp(-1j * omega * np.asarray(part.delays))
     loops_at = np.linalg.eigvals(late[:, None] * _between_delays(part, at)[0])
     poles = np.linalg.eigvals(part.A)
-    rate = float(np.abs(poles).max(initial=0.0)) or 1.0
+    rate = _rate(part)
     # each factor goes to the positive real axis on the shorter way: 1 - g with |g| < 1, and
     # j w - p, seen from the imaginary axis, along a line beside it
     turned = np.angle(1 - loops_at).sum() + np.angle(omega + 1j * poles).sum()
