@@ -173,7 +173,9 @@ def fit_actuated(
             for lows, highs in (zip(*each, strict=True) for each in unions)
         ),
         records=whole,
-        residual=replace(family, records=whole).linearised(whole.problem, best.parameters).residual,
+        residual=_residual(
+            whole.problem, [replace(best, structure=replace(family, records=whole))]
+        ),
         correlation=correlation,
         variance=variance,
     )
@@ -208,7 +210,7 @@ def _with_actuators(
 def _residual(problem: Problem, found: Sequence[Candidate]) -> FloatArray:
     """Residual (M,) of the closest of some models."""
     best = min(found, key=cost_of)
-    return family_of(best).linearised(problem, best.parameters).residual
+    return np.asarray(family_of(best).evaluate(problem, best.parameters[None]).residual[0])
 
 
 def _spikes(residual: FloatArray, limit: float) -> FloatArray:

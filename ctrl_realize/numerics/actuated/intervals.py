@@ -70,7 +70,7 @@ def profiled(
     family = family_of(found)
     values = () if dead_time_alone else range(family.values.start, family.values.stop)
     for _ in range(_MOST_ROUNDS):
-        jacobian = family.linearised(problem, found.parameters).jacobian
+        jacobian = family.evaluate(problem, found.parameters[None]).jacobian[0]
         errors = LocalErrors(jacobian, jacobian[:, :0]).std(np.eye(len(found.parameters)), variance)
         ends, best = [], found
         for index in (0, *values):

@@ -25,21 +25,23 @@ References
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from ..arrays import ComplexArray, FloatArray
 from ..signals.sines import Sines
-from .local_terms import solve_upper, triangle
+from .local_terms import LocalTerms, solve_upper, triangle
 from .modal import RealModes, moved_amplitudes, partial_fractions
 from .poles import poles_from_parameters
-from .problem import Compressed, Eliminated, Evaluation, Family, Problem, Structure
+from .problem import Compressed, Eliminated, Evaluation, Family, Mapped, Problem, Structure
 from .responses import StepSequence
 
 
 def eliminate(problem: Problem, structure: Structure, parameters: FloatArray) -> Eliminated:
     """Eliminate the linear terms at parameters (B, 1 + n), and leave derivatives aside."""
     if isinstance(structure, Family):
-        return structure.evaluate(problem, parameters)
+        return structure.compress(problem, parameters)
     models, q = _Models(problem, structure, parameters), problem.regressors.shape[1]
     columns = models.columns(slopes=False)
     if models.local is None:
@@ -55,46 +57,98 @@ def eliminate(problem: Problem, structure: Structure, parameters: FloatArray) ->
 def compress(problem: Problem, structure: Structure, parameters: FloatArray) -> Compressed:
     """Eliminate the linear terms at parameters (B, 1 + n), in as few rows as can be."""
     if isinstance(structure, Family):
-        return evaluate(problem, structure, parameters)
-    models, q = _Models(problem, structure, parameters), problem.regressors.shape[1]
-    columns, count = models.columns(), structure.zeros + 1
+        return structure.compress(problem, parameters)
+    return compress_mapped(problem, structure, Mapped(parameters))
+
+
+def compress_mapped(problem: Problem, structure: Structure, mapped: Mapped) -> Compressed:
+    """`compress` for models of a structure that depend on other parameters."""
+    models, q = _Models(problem, structure, mapped.theta), problem.regressors.shape[1]
+    columns, parts = models.columns(), []
     if models.local is None:
-        left = triangle(columns)[:, q:, q:]
-        residual, numerator, basis = _eliminated(models.linear(left))
-        derivative = left[:, :, :-1] @ models.slopes(numerator)
+        left, q = triangle(columns)[:, q:, q:], 0
+        k = left.shape[2]
     else:
-        free, k = models.free_slopes(), columns.shape[2]
-        parts = models.local.reduced(np.concatenate([columns, free], axis=2))
+        k = columns.shape[2]
+        parts = models.local.reduced(np.concatenate([columns, models.free_slopes()], axis=2))
         left = np.concatenate([part.left for part in parts], axis=1)
-        residual, weights, basis = _eliminated(models.linear(left[:, :, :k], q))
-        numerator = weights[:, :count]
-        derivative = left[:, :, q : k - 1] @ models.slopes(numerator)
+    linear, count = models.linear(left[:, :, :k], q), structure.zeros + 1
+    residual, weights, basis, gain = _within(linear, mapped)
+    derivative = left[:, :, q : k - 1] @ models.slopes(weights[:, :count])
+    if models.local is not None:
         remainder = models.remainder(weights, k)
         moved = [
             part.left[:, :, k:] @ models.moved(models.local.amplitudes(part, remainder))
             for part in parts
         ]
         derivative[:, :, 1:] += np.concatenate(moved, axis=1)
+    derivative = mapped.along(derivative, linear[:, :, :count], gain)
     cost = np.add.reduce(residual * residual, axis=1)
-    return Compressed(cost, numerator, residual, _orthogonal(derivative, basis))
+    return Compressed(cost, weights[:, :count], residual, _orthogonal(derivative, basis))
 
 
 def evaluate(problem: Problem, structure: Structure, parameters: FloatArray) -> Evaluation:
     """Eliminate the linear terms at parameters (B, 1 + n), in the rows of the problem."""
     if isinstance(structure, Family):
         return structure.evaluate(problem, parameters)
-    models, q = _Models(problem, structure, parameters), problem.regressors.shape[1]
+    return evaluate_mapped(problem, structure, Mapped(parameters))
+
+
+def evaluate_mapped(problem: Problem, structure: Structure, mapped: Mapped) -> Evaluation:
+    """`evaluate` for models of a structure that depend on other parameters."""
+    models, q = _Models(problem, structure, mapped.theta), problem.regressors.shape[1]
     columns, count = models.columns(), structure.zeros + 1
     linear = models.linear(columns, q)
-    left = linear if models.local is None else models.local.without(linear)
-    residual, weights, basis = _eliminated(left)
-    derivative = columns[:, :, q:-1] @ models.slopes(weights[:, :count])
-    if models.local is not None:
+
+    def slopes(numerator: FloatArray, gain: FloatArray | None) -> FloatArray:
+        made = columns[:, :, q:-1] @ models.slopes(numerator)
+        return mapped.along(made, linear[:, :, :count], gain)
+
+    dpoles = models.dfree if mapped.dtheta is None else models.dfree @ mapped.dtheta[:, 1:]
+    return _in_rows(linear, count, mapped, slopes, models.local, dpoles)
+
+
+def evaluate_shaped(
+    problem: Problem,
+    shape: FloatArray,
+    slopes: FloatArray,
+    gains: tuple[float, float],
+    poles: ComplexArray,
+    dpoles: ComplexArray,
+) -> Evaluation:
+    """`evaluate` for gains times shapes (B, m), which have derivatives (B, m, k).
+
+    Free responses have poles (B, n) with derivatives (B, n, k). The numerator is the gain.
+    """
+    fixed = np.append(problem.weighted_regressors, problem.weighted_data[:, None], axis=1)
+    made = problem.weighted(np.append(shape[:, :, None], slopes, axis=2))
+    linear = np.append(made[:, :, :1], np.tile(fixed, (len(shape), 1, 1)), axis=2)
+    local = None if problem.segments is None else problem.local_terms(poles)
+    mapped = Mapped(shape, numerator=np.ones((len(shape), 1)), gains=gains)
+    return _in_rows(
+        linear, 1, mapped, lambda gain, _: gain[:, :, None] * made[:, :, 1:], local, dpoles
+    )
+
+
+def _in_rows(
+    linear: FloatArray,
+    count: int,
+    mapped: Mapped,
+    slopes: Callable[[FloatArray, FloatArray | None], FloatArray],
+    local: LocalTerms | None,
+    dpoles: ComplexArray,
+) -> Evaluation:
+    """Eliminate columns (B, m, k), the first of which are `count` of the numerator."""
+    left = linear if local is None else local.without(linear)
+    residual, weights, basis, gain = _within(left, mapped)
+    derivative = slopes(weights[:, :count], gain)
+    if local is not None:
         remainder = linear[:, :, -1] - (linear[:, :, :-1] @ weights[:, :, None])[:, :, 0]
-        derivative[:, :, 1:] += models.local.moved(remainder, models.dfree)
+        moved = local.moved(remainder, dpoles)  # of a structure, without the dead time
+        derivative[:, :, derivative.shape[2] - moved.shape[2] :] += moved
     sensitivity = np.sqrt(np.einsum("bmp,bmp->bp", derivative, derivative))
-    if models.local is not None:
-        derivative = models.local.without(derivative)
+    if local is not None:
+        derivative = local.without(derivative)
     return Evaluation(
         np.add.reduce(residual * residual, axis=1),
         weights[:, :count],
@@ -210,6 +264,29 @@ def _eliminated(columns: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray
     q, r = np.linalg.qr(columns)
     inside = np.swapaxes(q, 1, 2) @ data
     return (data - q @ inside)[:, :, 0], solve_upper(r, inside[:, :, 0]) / norm, q
+
+
+def _within(
+    linear: FloatArray, mapped: Mapped
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray | None]:
+    """`_eliminated`; where only the gain of a numerator is free, the best within its bounds."""
+    if mapped.numerator is None:
+        return *_eliminated(linear), None
+    count = mapped.numerator.shape[1]
+    unit = linear[:, :, :count] @ mapped.numerator[:, :, None]
+    linear = np.concatenate([unit, linear[:, :, count:]], axis=2)
+    residual, weights, basis = _eliminated(linear)
+    (low, high), best = mapped.gains, weights[:, 0]
+    gain, held = np.clip(best, low, high), (best <= low) | (best >= high) | ~unit.any(axis=(1, 2))
+    if held.any():
+        # The sum of squares is a parabola of the gain: the best one is at the bound.
+        rest, basis[held] = linear[held], 0.0
+        rest[:, :, -1] -= gain[held, None] * rest[:, :, 0]
+        residual[held] = rest[:, :, -1]
+        if rest.shape[2] > 2:
+            residual[held], weights[held, 1:], basis[held, :, 1:] = _eliminated(rest[:, :, 1:])
+    numerator = gain[:, None] * mapped.numerator
+    return residual, np.concatenate([numerator, weights[:, 1:]], axis=1), basis, gain
 
 
 def _orthogonal(columns: FloatArray, basis: FloatArray) -> FloatArray:

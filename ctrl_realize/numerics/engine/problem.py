@@ -209,3 +209,36 @@ class Family(Structure, ABC):
     @abstractmethod
     def evaluate(self, problem: Problem, parameters: FloatArray) -> Evaluation:
         """Eliminate the linear terms at parameters (B, k)."""
+
+    def compress(self, problem: Problem, parameters: FloatArray) -> Compressed:
+        """Eliminate the linear terms at parameters (B, k), in as few rows as can be."""
+        return self.evaluate(problem, parameters)
+
+
+@dataclass(frozen=True, eq=False)
+class Mapped:
+    """B models of a structure that depend on parameters (k,), and their derivatives.
+
+    ``theta`` (B, 1 + n) are dead time and pole parameters, ``dtheta`` (B, 1 + n, k) their
+    derivatives; without them, they are the parameters themselves. ``numerator`` (B, z + 1) is that
+    for gain 1, with a gain within ``gains``, and ``dnumerator`` (B, z + 1, k) its derivatives;
+    without it, the numerator is free.
+    """
+
+    theta: FloatArray
+    dtheta: FloatArray | None = None
+    numerator: FloatArray | None = None
+    dnumerator: FloatArray | None = None
+    gains: tuple[float, float] = (-np.inf, np.inf)
+
+    def along(self, slopes: FloatArray, powers: FloatArray, gain: FloatArray | None) -> FloatArray:
+        """Derivatives (B, m, k) by the parameters from those by theta (B, m, 1 + n).
+
+        ``powers`` (B, m, z + 1) are the responses to powers of s in the numerator.
+        """
+        if self.dtheta is None:
+            return slopes
+        found: FloatArray = slopes @ self.dtheta
+        if gain is not None and self.dnumerator is not None:
+            found += powers @ (gain[:, None, None] * self.dnumerator)
+        return found

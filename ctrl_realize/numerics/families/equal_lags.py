@@ -28,10 +28,10 @@ from ..arrays import FloatArray
 from ..constants import Z_95
 from ..engine.eliminate import eliminate
 from ..engine.poles import lag_sum
-from ..engine.problem import Bounds, Problem, Structure
+from ..engine.problem import Bounds, Mapped, Problem, Structure
 from ..engine.profile import dead_time_error
 from ..engine.structures import Candidate, Scales
-from .shaped import LagFamily, Mapped, lowest, paired
+from .shaped import LagFamily, lowest, paired
 
 SHORTEST, LONGEST = 4, 8
 """Shorter ones have few parameters when they are free; of longer ones rounding shows."""
@@ -63,22 +63,22 @@ class LagChain:
 class _Law:
     """Law of the rates of a chain, and the bounds of the shape.
 
-    ``rates(order, shape)`` are logarithms of the rates (n,), and their derivatives.
+    ``rates(order, shape)`` are logarithms of the rates (..., n), and their derivatives.
     """
 
-    rates: Callable[[int, float], tuple[FloatArray, FloatArray]]
+    rates: Callable[[int, float | FloatArray], tuple[FloatArray, FloatArray]]
     low: float
     first: float
     high: float
 
 
-def _spread_rates(order: int, square: float) -> tuple[FloatArray, FloatArray]:
+def _spread_rates(order: int, square: float | FloatArray) -> tuple[FloatArray, FloatArray]:
     # The square of half the range, because the response is an even function of the range.
-    half, away = float(np.sqrt(square)), np.linspace(-1, 1, order)
+    half, away = np.sqrt(square), np.linspace(-1, 1, order)
     return np.log1p(half * away), away / (2 * half * (1 + half * away))
 
 
-def _diffusion_rates(order: int, shift: float) -> tuple[FloatArray, FloatArray]:
+def _diffusion_rates(order: int, shift: float | FloatArray) -> tuple[FloatArray, FloatArray]:
     number = np.arange(1, order + 1) - shift
     return 2 * np.log(number / (1 - shift)), 2 / (1 - shift) - 2 / number
 
@@ -93,15 +93,17 @@ class _Chain(LagFamily):
 
     law: _Law
 
-    def mapped(self, x: FloatArray) -> Mapped:
-        """Model with gain 1, and its derivatives."""
-        rates, by_shape = self.law.rates(self.order, float(x[2]))
-        slopes = np.column_stack([np.zeros(self.order), -np.ones(self.order), by_shape])
-        theta, dtheta = paired(rates - x[1], slopes)
-        level = np.array([np.exp(np.sum(rates - x[1]))])
+    def mapped(self, parameters: FloatArray) -> Mapped:
+        """Models at parameters (B, 3), and their derivatives."""
+        x = parameters
+        rates, by_shape = self.law.rates(self.order, x[:, 2:])
+        slopes = np.stack([np.zeros_like(rates), -np.ones_like(rates), by_shape], axis=2)
+        theta, dtheta = paired(rates - x[:, 1:2], slopes)
+        level = np.exp(np.sum(rates - x[:, 1:2], axis=1, keepdims=True))
+        first = np.tile(np.eye(1, 3), (len(x), 1, 1))
         return Mapped(
-            np.append(x[0], theta), np.append(np.eye(1, 3), dtheta, axis=0),
-            level, level * slopes.sum(axis=0)[None],
+            np.append(x[:, :1], theta, axis=1), np.append(first, dtheta, axis=1),
+            level, level[:, :, None] * slopes.sum(axis=1, keepdims=True), self.gains,
         )  # fmt: skip
 
 

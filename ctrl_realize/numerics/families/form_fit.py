@@ -20,13 +20,13 @@ import numpy as np
 
 from ..arrays import FloatArray
 from ..constants import SMALLEST
-from ..engine.problem import Bounds, Problem
+from ..engine.problem import Bounds, Mapped, Problem
 from ..engine.static_gain import INTEGRATOR, LocalErrors
 from ..engine.structures import FASTEST, LEAST_DAMPING, SLOWEST, Candidate, Scales
 from .equal_lags import TANKS
 from .physical import ProcessParameter
 from .process_form import ProcessForm
-from .shaped import LagFamily, Mapped, lowest, paired
+from .shaped import LagFamily, lowest, paired
 
 _AT_BOUND = 1e-4  # part of a parameter by which it may be away from a bound that it is at
 
@@ -62,7 +62,7 @@ class FormFamily(LagFamily):
         """Values by name, with their standard errors: 0 where they are fixed, NaN at a bound."""
         x = self.ordered(x)
         values, sizes = self.values(x)
-        values["gain"] = self.linearised(problem, x).gain
+        values["gain"] = self.gain(problem, x)
         scale = dict(zip(self.names, sizes, strict=True)) | {"gain": 1.0}
         slopes, _ = self.directions(problem, x)
         gradient = np.diag([scale[name] for name in self.varied])
@@ -82,32 +82,36 @@ class FormFamily(LagFamily):
         """Names of the parameters x; the gain is not among them."""
         return self.form.names[1:]
 
-    def mapped(self, x: FloatArray) -> Mapped:
-        """Model with gain 1, and its derivatives."""
-        form, every = self.form, np.eye(x.size)
+    def mapped(self, parameters: FloatArray) -> Mapped:
+        """Models at parameters (B, k), and their derivatives."""
+        form, x, (count, k) = self.form, parameters, parameters.shape
+        every = np.tile(np.eye(k), (count, 1, 1))
         lags = np.ones(form.lags, dtype=np.int64) if form.equal else np.arange(1, 1 + form.lags)
-        rates, slopes = -x[lags], -every[lags]
+        rates, slopes = -x[:, lags], -every[:, lags]
         if form.equal:
             rates = rates + TANKS.rates(form.lags, TANKS.low)[0]
-        growth, dgrowth = float(rates.sum()), slopes.sum(axis=0)
+        growth, dgrowth = rates.sum(axis=1, keepdims=True), slopes.sum(axis=1, keepdims=True)
         if form.integrator:
-            rates = np.append(rates, np.log(SLOWEST / self.scales.length))
-            slopes = np.append(slopes, np.zeros((1, x.size)), axis=0)
+            slowest = np.log(SLOWEST / self.scales.length)
+            rates = np.append(rates, np.full((count, 1), slowest), axis=1)
+            slopes = np.append(slopes, np.zeros((count, 1, k)), axis=1)
         theta, dtheta = paired(rates, slopes)
         if form.pair:
-            first, at = theta.size % 2, form.lags + 1
-            theta = np.insert(theta, first, [-x[at], x[at + 1]])
-            dtheta = np.insert(dtheta, first, [-every[at], every[at + 1]], axis=0)
-            growth, dgrowth = growth - 2 * x[at], dgrowth - 2 * every[at]
+            first, at = theta.shape[1] % 2, [form.lags + 1, form.lags + 2]
+            sign = np.array([-1.0, 1.0])
+            theta = np.insert(theta, [first, first], sign * x[:, at], axis=1)
+            dtheta = np.insert(dtheta, [first, first], sign[:, None] * every[:, at], axis=1)
+            growth, dgrowth = growth - 2 * x[:, at[:1]], dgrowth - 2 * every[:, at[:1]]
         # The numerator of a monic denominator.
         level = np.exp(growth)
-        numerator, dnumerator = np.array([level]), level * dgrowth[None]
+        numerator, dnumerator = level, level[:, :, None] * dgrowth
         if form.lead:
-            lead, by_lead = x[-1] * self.scales.rise, every[-1] * self.scales.rise
-            numerator = np.array([level, level * lead])
-            dnumerator = level * np.stack([dgrowth, lead * dgrowth + by_lead])
-        return Mapped(np.append(x[0], theta), np.append(every[:1], dtheta, axis=0), numerator,
-                      dnumerator)  # fmt: skip
+            lead, by_lead = x[:, -1:] * self.scales.rise, every[:, -1:] * self.scales.rise
+            second = lead[:, :, None] * dnumerator + level[:, :, None] * by_lead
+            numerator = np.append(numerator, level * lead, axis=1)
+            dnumerator = np.append(dnumerator, second, axis=1)
+        theta, dtheta = np.append(x[:, :1], theta, axis=1), np.append(every[:, :1], dtheta, axis=1)
+        return Mapped(theta, dtheta, numerator, dnumerator, self.gains)
 
     def coordinates(self, values: Mapping[str, float]) -> FloatArray:
         """Parameters x (k,) of values by name."""
@@ -187,7 +191,7 @@ def fit_form(
         starts += [np.append(0.5 * x[0], x[1:]) for x in starts]
     best = lowest(problem, family, np.array(starts), scales.dt)
     x = family.ordered(best.parameters)
-    values = family.values(x)[0] | {"gain": family.linearised(problem, x).gain}
+    values = family.values(x)[0] | {"gain": family.gain(problem, x)}
     limits = _limits(form, scales).items()
     ends = tuple(n for n, (low, high) in limits if low < high and _at_end(values[n], low, high))
     return Candidate(replace(family, at_bound=ends), x, best.cost)

@@ -77,7 +77,7 @@ def with_profiled_lags(
     family = form_family(form, scales)
     values = {"dead_time": 0.0} | {p.name: p.value for p in parameters} | dict(form.fixed)
     x = family.coordinates(values)
-    best = Candidate(family, x, float(np.sum(family.linearised(problem, x).residual ** 2)))
+    best = Candidate(family, x, float(family.compress(problem, x[None]).cost[0]))
     order = [family.names.index(name) for name in free]
 
     def excess(place: int, start: FloatArray, log_lag: float) -> tuple[FloatArray, float]:

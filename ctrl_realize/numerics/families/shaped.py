@@ -1,39 +1,34 @@
-"""Families of models whose response is a gain times a shape, and those of them that are lags.
+"""Families of models with few parameters: by a map to a structure, or by a shape of their own.
 
-The gain enters linearly. Where it has bounds, the best one within them is that of least squares,
-clipped: for given other parameters the sum of squares is a parabola of the gain. What is left is
-Kaufman's form of variable projection [1]_.
-
-Lags have rates, a pair and a zero that depend on few parameters. Real poles are paired as in
-`engine.poles`, neighbours together: a pair of rates f >= s has omega = sqrt(f s) and
+Lags have rates, a pair and a zero that depend on few parameters: a family maps these to dead time,
+poles and numerator of a structure, which the engine eliminates and differentiates. Real poles are
+paired as in `engine.poles`, neighbours together: a pair of rates f >= s has omega = sqrt(f s) and
 zeta = cosh(log(f / s) / 2), so that derivatives with respect to logarithms of rates are finite for
-equal ones. The response and its derivatives are those of partial fractions [2]_.
+equal ones.
+
+Others have a response that is a gain times a shape. The gain enters linearly. Where it has bounds,
+the best one within them is that of least squares, clipped: for given other parameters the sum of
+squares is a parabola of the gain. What is left is Kaufman's form of variable projection [1]_.
 
 References
 ----------
 .. [1] L. Kaufman, A variable projection method for solving separable nonlinear least squares
    problems, BIT 15 (1975) 49-57, doi:10.1007/BF01932995.
-.. [2] K. J. Astrom and B. Wittenmark, Computer-Controlled Systems, 3rd ed., Prentice Hall 1997,
-   section 2.3.
 """
 
 from __future__ import annotations
 
 from abc import abstractmethod
-from dataclasses import dataclass
-from typing import NamedTuple
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ..arrays import ComplexArray, FloatArray
-from ..constants import SMALLEST
 from ..engine.compared_fits import CLOSE
 from ..engine.descend import descend
-from ..engine.local_terms import solve_upper
-from ..engine.modal import moved_amplitudes, partial_fractions
+from ..engine.eliminate import compress_mapped, evaluate_mapped, evaluate_shaped
 from ..engine.newton import settle
-from ..engine.poles import poles_from_parameters
-from ..engine.problem import Evaluation, Family, Problem
+from ..engine.problem import Compressed, Evaluation, Family, Mapped, Problem
 from ..engine.structures import Candidate, apart
 
 _OTHERS = 1  # ends beside the best that are followed to their minimum, if they are as close
@@ -54,32 +49,6 @@ class UnitResponse:
 
 
 @dataclass(frozen=True, eq=False)
-class Linearised:
-    """One model without its linear terms, in units of the noise.
-
-    ``unit`` (m,) and ``slopes`` (m, k) are the response with gain 1 and the derivatives of the
-    model, both orthogonal to the regressors; `within`: the gain is not at a bound.
-    """
-
-    gain: float
-    within: bool
-    numerator: FloatArray
-    regression: FloatArray
-    residual: FloatArray
-    unit: FloatArray
-    slopes: FloatArray
-    sensitivity: FloatArray
-
-    @property
-    def jacobian(self) -> FloatArray:
-        """Minus the derivative of the residual (m, k)."""
-        square = float(self.unit @ self.unit)
-        if not self.within or square == 0:
-            return self.slopes
-        return self.slopes - np.outer(self.unit, (self.unit @ self.slopes) / square)
-
-
-@dataclass(frozen=True, eq=False)
 class ShapedFamily(Family):
     """Models with a gain within bounds, and a shape that depends on the parameters (k,)."""
 
@@ -95,129 +64,92 @@ class ShapedFamily(Family):
 
     def directions(self, problem: Problem, x: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Derivatives of model, and of `theta` and numerator, by parameters and gain."""
-        model = self.linearised(problem, x)
-        return np.column_stack([model.slopes, model.unit]), self.tangent(x, model.gain)
-
-    def linearised(self, problem: Problem, x: FloatArray) -> Linearised:
-        """Eliminate gain, regressors and local terms at x (k,)."""
-        response = self.response(problem, x)
-        data = problem.weighted_data
-        shape = problem.weighted(response.values[:, None])
-        columns = np.column_stack([shape, problem.weighted_regressors])
-        remainder = np.column_stack([columns, data])
-        terms = None
-        if problem.segments is not None:
-            terms = problem.local_terms(response.poles[None])
-            remainder = terms.without(remainder[None])[0]
-        q, r = problem.regressor_basis if terms is None else np.linalg.qr(remainder[:, 1:-1])
-        inside = q.T @ remainder
-        unit, resolved = (remainder[:, [0, -1]] - q @ inside[:, [0, -1]]).T
-        square = float(unit @ unit)
-        best = float(unit @ resolved) / square if square > 0 else 0.0
-        gain = float(np.clip(best, *self.gains))
-        size = np.maximum(np.linalg.norm(r, axis=0), SMALLEST)
-        forced = (inside[:, -1] - gain * inside[:, 0])[None]
-        regression = solve_upper((r / size)[None], forced)[0] / size
-        slopes = gain * problem.weighted(response.slopes)
-        if terms is not None:
-            free = data - columns @ np.append(gain, regression)
-            slopes += terms.moved(free[None], response.dpoles[None])[0]
-        sensitivity = np.linalg.norm(slopes, axis=0)
-        if terms is not None:
-            slopes = terms.without(slopes[None])[0]
-        slopes -= q @ (q.T @ slopes)
-        return Linearised(
-            gain=gain,
-            within=self.gains[0] < best < self.gains[1],
-            numerator=gain * response.numerator,
-            regression=regression,
-            residual=resolved - gain * unit,
-            unit=unit,
-            slopes=slopes,
-            sensitivity=sensitivity,
+        unit = self.response(problem, x)
+        numerator = self._evaluated(problem, [unit], self.gains).numerator
+        gain = float(numerator[0, 0] / unit.numerator[0])
+        # Of the gain, which is a parameter here, nothing is eliminated.
+        held = replace(
+            unit,
+            values=gain * unit.values,
+            slopes=np.column_stack([gain * unit.slopes, unit.values]),
+            dpoles=np.column_stack([unit.dpoles, np.zeros_like(unit.poles)]),
         )
+        return self._evaluated(problem, [held], (1.0, 1.0)).jacobian[0], self.tangent(x, gain)
 
     def evaluate(self, problem: Problem, parameters: FloatArray) -> Evaluation:
         """Eliminate the linear terms at parameters (B, k)."""
-        models = [self.linearised(problem, x) for x in parameters]
-        return Evaluation(
-            cost=np.array([model.residual @ model.residual for model in models]),
-            residual=np.stack([model.residual for model in models]),
-            jacobian=np.stack([model.jacobian for model in models]),
-            sensitivity=np.stack([model.sensitivity for model in models]),
-            numerator=np.stack([model.numerator for model in models]),
-            regression=np.stack([model.regression for model in models]),
-        )
+        return self._evaluated(problem, [self.response(problem, x) for x in parameters], self.gains)
 
-
-class Mapped(NamedTuple):
-    """Dead time and pole parameters (1 + n,), numerator (z + 1,), and their derivatives."""
-
-    theta: FloatArray
-    dtheta: FloatArray
-    numerator: FloatArray
-    dnumerator: FloatArray
+    def _evaluated(
+        self, problem: Problem, units: list[UnitResponse], gains: tuple[float, float]
+    ) -> Evaluation:
+        parts = zip(*((u.values, u.slopes, u.poles, u.dpoles) for u in units), strict=True)
+        shape, slopes, poles, dpoles = (np.stack(part) for part in parts)
+        state = evaluate_shaped(problem, shape, slopes, gains, poles, dpoles)
+        return replace(state, numerator=state.numerator * [u.numerator for u in units])
 
 
 @dataclass(frozen=True, eq=False)
-class LagFamily(ShapedFamily):
-    """Rational models, the numerator of which is a gain times a shape."""
+class MappedFamily(Family):
+    """Models of a structure with dead time and poles that depend on the parameters."""
 
     @abstractmethod
-    def mapped(self, x: FloatArray) -> Mapped:
-        """Model with gain 1, and its derivatives with respect to the parameters (k,)."""
+    def mapped(self, parameters: FloatArray) -> Mapped:
+        """Models at parameters (B, k), and their derivatives."""
 
     def theta(self, parameters: FloatArray) -> FloatArray:
         """Dead time and pole parameters (1 + n,) of one model."""
-        return self.mapped(parameters).theta
+        return np.asarray(self.mapped(parameters[None]).theta[0])
 
-    def tangent(self, x: FloatArray, gain: float) -> FloatArray:
-        """Derivatives of `theta` and numerator with respect to parameters and gain."""
-        theta, dtheta, shape, dshape = self.mapped(x)
-        along = np.concatenate([dtheta, gain * dshape])
-        return np.column_stack([along, np.append(np.zeros(theta.size), shape)])
+    def evaluate(self, problem: Problem, parameters: FloatArray) -> Evaluation:
+        """Eliminate the linear terms at parameters (B, k)."""
+        return evaluate_mapped(problem, self.plain, self.mapped(parameters))
 
-    def response(self, problem: Problem, x: FloatArray) -> UnitResponse:
-        """Response with gain 1, and its derivatives."""
-        theta, dtheta, numerator, dnumerator = self.mapped(x)
-        known, zeros, n = problem.known, numerator.size - 1, theta.size - 1
-        free, by_parameters = poles_from_parameters(theta[None, 1:])
-        poles = np.append(free[0], known.poles)[None]
-        static, mode, slope = problem.drive.modes(theta[:1], poles)
-        residues, gain, dresidues = partial_fractions(poles, known.numerator, zeros + 1)
-        amplitudes = residues[0] @ numerator
-        moved = moved_amplitudes(poles, amplitudes[None], dresidues, numerator[None])[0, :, :n]
-        dpoles = by_parameters[0] @ dtheta[1:]
-        # Derivatives through the amplitudes, the static part, and the modes.
-        weights = residues[0] @ dnumerator + moved @ dpoles
-        weights -= np.outer(amplitudes * poles[0], dtheta[0])
-        level = gain[0] * (dnumerator[0] - numerator[0] * (1 / free[0] @ dpoles).real)
-        stretch = amplitudes[:n, None] * dpoles
-        return UnitResponse(
-            _real(mode[0], amplitudes) + gain[0] * numerator[0] * static[0],
-            _real(mode[0], weights) + _real(slope[0, :, :n], stretch) + np.outer(static[0], level),
-            numerator,
-            free[0],
-            dpoles,
-        )
+    def compress(self, problem: Problem, parameters: FloatArray) -> Compressed:
+        """Eliminate the linear terms at parameters (B, k), in as few rows as can be."""
+        return compress_mapped(problem, self.plain, self.mapped(parameters))
 
 
-def _real(modes: FloatArray, weights: FloatArray) -> FloatArray:
-    """Real part of a product of modes, which may be real."""
-    return np.asarray((modes @ (weights if np.iscomplexobj(modes) else weights.real)).real)
+@dataclass(frozen=True, eq=False)
+class LagFamily(MappedFamily):
+    """Rational models, the numerator of which is a gain times a shape."""
+
+    gains: tuple[float, float]
+
+    def gain(self, problem: Problem, x: FloatArray) -> float:
+        """Best gain of a model x (k,)."""
+        unit = self.mapped(x[None]).numerator
+        assert unit is not None
+        return float(self.compress(problem, x[None]).numerator[0, 0] / unit[0, 0])
+
+    def directions(self, problem: Problem, x: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Derivatives of model, and of `theta` and numerator, by parameters and gain."""
+        unit, gain = self.mapped(x[None]), self.gain(problem, x)
+        assert unit.dtheta is not None
+        assert unit.numerator is not None
+        assert unit.dnumerator is not None
+        dtheta = np.concatenate([unit.dtheta, np.zeros_like(unit.theta)[:, :, None]], axis=2)
+        along = [gain * unit.dnumerator, unit.numerator[:, :, None]]
+        dnumerator = np.concatenate(along, axis=2)
+        # Of the gain, which is a parameter here, nothing is eliminated.
+        held = Mapped(unit.theta, dtheta, gain * unit.numerator, dnumerator, (1.0, 1.0))
+        state = evaluate_mapped(problem, self.plain, held)
+        return state.jacobian[0], np.concatenate([dtheta[0], dnumerator[0]])
 
 
 def paired(log_rates: FloatArray, slopes: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Pole parameters (r,) of real poles with rates (r,), and derivatives, from theirs (r, k)."""
-    order = np.argsort(log_rates, kind="stable")
-    a, da = log_rates[order], slopes[order]
-    odd = a.size % 2
+    """Pole parameters (B, r) of real poles with log rates (B, r); derivatives, from (B, r, k)."""
+    order = np.argsort(log_rates, axis=1, kind="stable")
+    theta = np.take_along_axis(log_rates, order, axis=1)
+    dtheta = np.take_along_axis(slopes, order[:, :, None], axis=1)
+    odd = theta.shape[1] % 2
     slow, fast = slice(odd, None, 2), slice(odd + 1, None, 2)
-    half = (a[fast] - a[slow]) / 2
-    theta, dtheta = a.copy(), da.copy()
-    theta[slow], dtheta[slow] = (a[fast] + a[slow]) / 2, (da[fast] + da[slow]) / 2
-    theta[fast] = np.log(np.cosh(half))
-    dtheta[fast] = np.tanh(half)[:, None] * (da[fast] - da[slow]) / 2
+    half = (theta[:, fast] - theta[:, slow]) / 2
+    dhalf = (dtheta[:, fast] - dtheta[:, slow]) / 2
+    theta[:, slow] += half
+    dtheta[:, slow] += dhalf
+    theta[:, fast] = np.log(np.cosh(half))
+    dtheta[:, fast] = np.tanh(half)[:, :, None] * dhalf
     return theta, dtheta
 
 

@@ -13,41 +13,37 @@ References
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from ..arrays import FloatArray
 from ..constants import CHI2_95
-from ..engine.eliminate import eliminate, evaluate
-from ..engine.problem import Bounds, Evaluation, Family, Problem
+from ..engine.eliminate import eliminate
+from ..engine.problem import Bounds, Mapped, Problem
 from ..engine.static_gain import local_errors
 from ..engine.structures import LEAST_DAMPING, SLOWEST, SLOWEST_PAIR, Candidate, Scales
-from .shaped import lowest, paired
+from .shaped import MappedFamily, lowest, paired
 
 _APART = 0.03  # in logarithm: poles that are nearly equal have no derivatives by differences
 
 
 @dataclass(frozen=True, eq=False)
-class SlowLags(Family):
+class SlowLags(MappedFamily):
     """Poles over x = (dead time, log rates of real ones, log omega and log zeta of pairs)."""
 
     pairs: int
     length: float
 
-    def mapped(self, x: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Dead time and pole parameters (1 + n,), and their derivatives (1 + n, 1 + n)."""
-        every = np.eye(x.size)
-        real = slice(1, x.size - 2 * self.pairs)
-        theta, slopes = paired(x[real], every[real])
-        return (
-            np.concatenate([x[:1], theta, x[real.stop :]]),
-            np.concatenate([every[:1], slopes, every[real.stop :]]),
+    def mapped(self, parameters: FloatArray) -> Mapped:
+        """Models at parameters (B, 1 + n), and their derivatives."""
+        x, every = parameters, np.tile(np.eye(parameters.shape[1]), (len(parameters), 1, 1))
+        real = slice(1, x.shape[1] - 2 * self.pairs)
+        theta, slopes = paired(x[:, real], every[:, real])
+        return Mapped(
+            np.concatenate([x[:, :1], theta, x[:, real.stop :]], axis=1),
+            np.concatenate([every[:, :1], slopes, every[:, real.stop :]], axis=1),
         )
-
-    def theta(self, parameters: FloatArray) -> FloatArray:
-        """Dead time and pole parameters (1 + n,) of one model."""
-        return self.mapped(parameters)[0]
 
     def directions(self, problem: Problem, x: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Directions of the structure without bounds, about lags that are just not equal."""
@@ -60,13 +56,6 @@ class SlowLags(Family):
         own = np.linalg.qr(errors.own)[0]
         slopes = errors.slopes - own @ (own.T @ errors.slopes)
         return slopes, np.eye(slopes.shape[1])
-
-    def evaluate(self, problem: Problem, parameters: FloatArray) -> Evaluation:
-        """Eliminate the linear terms at parameters (B, 1 + n)."""
-        theta, slopes = (np.stack(part) for part in zip(*map(self.mapped, parameters), strict=True))
-        state = evaluate(problem, self.plain, theta)
-        sensitivity = np.einsum("bp,bpq->bq", state.sensitivity, np.abs(slopes))
-        return replace(state, jacobian=state.jacobian @ slopes, sensitivity=sensitivity)
 
 
 def fit_slow_lags(

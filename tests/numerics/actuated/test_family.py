@@ -21,8 +21,7 @@ def test_errors_of_gain_and_total_delay_count_what_the_actuator_leaves_open(plac
     output = 2 * family.unit(x[None])[0]
     problem = Records((ActuatedRecord(command, dt, output, np.ones((300, 1))),)).problem
     found = static_gain(problem, Candidate(family, x, 0.0), variance, length)
-    model = family.linearised(problem, x)
-    columns = np.column_stack([model.slopes, model.unit])
+    columns = family.directions(problem, x)[0]
     covariance = variance * np.linalg.inv(columns.T @ columns)
     assert found.gain == pytest.approx(2)
     assert found.total == pytest.approx(0.73 + 1.25)

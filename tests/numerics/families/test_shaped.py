@@ -38,6 +38,10 @@ def case():
 def assert_exact(problem, family, x):
     """The gradient of the sum of squares is the limit of its differences."""
     state = family.evaluate(problem, x[None])
+    short = family.compress(problem, x[None])
+    assert_allclose(short.cost, state.cost, rtol=1e-10)
+    products = [one.jacobian[0].T @ one.jacobian[0] for one in (short, state)]
+    assert_allclose(*products, rtol=0, atol=1e-9 * products[1].max())
     slope = -2 * state.jacobian[0].T @ state.residual[0]
     moves = 1e-5 * np.diag(np.maximum(np.abs(x), 1.0))
     ahead, behind = (family.evaluate(problem, x + way * moves).cost for way in (1, -1))
@@ -79,13 +83,17 @@ def test_a_gain_within_bounds_is_the_best_one_or_at_a_bound(case):
     form = ProcessForm("P2D", 2, bounds={"gain": (0.0, 0.9)})
     bounded, free = form_family(form, scales), form_family(ProcessForm("P2D", 2), scales)
     x = free.coordinates(VALUES)
-    best = free.linearised(problem, x)
-    assert best.gain > 0.9  # of a plant with gain 1
-    model = bounded.linearised(problem, x)
-    assert model.gain == 0.9
+    best = free.gain(problem, x)
+    assert best > 0.9  # of a plant with gain 1
+    assert bounded.gain(problem, x) == pytest.approx(0.9, rel=1e-14)
     # Of all gains up to there no other one leaves less.
-    lost = [np.sum((best.residual + (best.gain - g) * best.unit) ** 2) for g in (0.9, 0.89)]
-    assert_allclose(np.sum(model.residual**2), lost[0], rtol=1e-12)
+    residual, unit = (
+        free.evaluate(problem, x[None]).residual[0],
+        free.directions(problem, x)[0][:, -1],
+    )
+    lost = [np.sum((residual + (best - g) * unit) ** 2) for g in (0.9, 0.89)]
+    for cost in (bounded.evaluate(problem, x[None]).cost, bounded.compress(problem, x[None]).cost):
+        assert_allclose(cost, lost[0], rtol=1e-12)
     assert lost[1] > lost[0]
 
 

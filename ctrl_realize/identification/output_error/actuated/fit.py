@@ -192,7 +192,7 @@ def _replaced(
 def _estimate(result: OutputErrorFit, scales: Scales, found: ActuatedFit) -> OutputErrorEstimate:
     best, family = found.best, family_of(found.best)
     structure, setting = family.plain, (found.variance, scales.length)
-    numerator = family.linearised(found.problem, best.parameters).numerator
+    numerator = family.evaluate(found.problem, best.parameters[None]).numerator[0]
     static = static_gain(found.problem, best, *setting)
     parameters = fitted_parameters(found.problem, best, numerator, *setting)
     measured = found.records.output
