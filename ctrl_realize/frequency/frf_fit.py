@@ -9,7 +9,7 @@ import control as ct
 import numpy as np
 
 from .._checks import numbers
-from .._wording import in_time, interval_in_time, time_within
+from .._wording import in_time, interval_in_time, time_and_interval, time_within
 from ..numerics.arrays import ComplexArray, FloatArray
 from ..results import Flag, FractionalDelayFit, IntervalKind
 
@@ -213,8 +213,5 @@ class FRFFit(FractionalDelayFit):
         return f"std {in_time(self.std_given_structure, 2)} given this structure"
 
     def __repr__(self) -> str:
-        low, high = self.interval
-        return (
-            f"<FRFFit order {self.order}, dead time {1e3 * self.dead_time:.5g} ms "
-            f"({1e3 * low:.5g} to {1e3 * high:.5g} ms)>"
-        )
+        told = time_and_interval(self.dead_time, *self.interval)
+        return f"<FRFFit order {self.order}, dead time {told}>"

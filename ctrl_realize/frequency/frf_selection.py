@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from .._flags import Flag, flagged
-from .._wording import plainly
+from .._wording import in_time, plainly
 from ..delayed import DelayedStateSpace, delayed_ss
 from ..numerics.arrays import locked, read_only
 from ..numerics.constants import Z_95
@@ -109,7 +109,9 @@ def chosen_model(
         used = round(min(used / dt, 1e9)) * dt
         if abs(used - best.dead_time) > 1e-9 * dt:
             flags.append(
-                flagged("dead_time_rounded", used=1e3 * used, dead_time=1e3 * best.dead_time)
+                flagged(
+                    "dead_time_rounded", used=in_time(used, 5), dead_time=in_time(best.dead_time, 5)
+                )
             )
     result = FRFFit(
         order=n,
@@ -159,7 +161,7 @@ def _leading_phase(
     dead_time = earlier.dead_time - lead
     if dead_time <= -half_radian and earlier.cost <= _FAR_BETTER * min(as_is):
         left = 100 * np.sqrt(earlier.cost / min(as_is))
-        yield flagged("phase_leads", order=n, dead_time=1e3 * dead_time / unit, left=left)
+        yield flagged("phase_leads", order=n, dead_time=in_time(dead_time / unit), left=left)
 
 
 def _of_lower_orders(
@@ -208,10 +210,11 @@ def _cover(
     flags = []
     low, high = max(low, 0.0), min(high, bound)
     if high >= (1 - 1e-9) * bound:
-        flags.append(flagged("delay_at_bound.frf", bound=1e3 * bound))
+        flags.append(flagged("delay_at_bound.frf", bound=in_time(bound, 4)))
     chosen = interval[1] - interval[0]
     worth = max(0.5 * chosen, _SHARE * best.dead_time, _SMALL_WIDTH * shortest)
     if high - low - chosen > worth:
-        wide = 1e3 * (high - low)
-        flags.append(flagged("structures_disagree.frf", wide=wide, chosen=1e3 * chosen))
+        flags.append(
+            flagged("structures_disagree.frf", wide=in_time(high - low), chosen=in_time(chosen))
+        )
     return (low, high), flags

@@ -233,12 +233,22 @@ def test_two_mass_set_up_has_three_samples_beyond_its_hold(shared_data):
     assert 3.3 < fit.interval[1] / dt < 5.5
 
 
+def test_times_of_a_slow_plant_are_told_in_seconds():
+    slow = 1e4
+    frf = cr.MeasuredFRF(second_order(S, tau=0.05), F / slow)
+    fit = cr.fit_frf(frf, (2, 3)).fit
+    assert repr(fit).startswith("<FRFFit order 2, dead time 500.0") and repr(fit).endswith(" s)>")
+    early = cr.MeasuredFRF(second_order(S, tau=-0.05), F / slow)
+    flags = {flag.code: str(flag) for flag in cr.fit_frf(early, (2, 3)).fit.flags}
+    assert "negative dead time of -500 s" in flags["phase_leads"]
+
+
 def test_hydrophone_answers_before_its_input_and_that_is_said(shared_data):
     frf = cr.read_frf(shared_data / "hydrophone" / "frf.csv")
     fit = cr.fit_frf(frf, 4, relative_degree=1, band_hz=(1e6, 60e6)).fit
     assert fit.dead_time == 0
     assert [flag.code for flag in fit.flags] == ["phase_leads"]
-    assert "-7.3e-06 ms" in str(fit.flags[0]) or "-7.26e-06 ms" in str(fit.flags[0])
+    assert "dead time of -0.0073 µs" in str(fit.flags[0]) or "-0.00726 µs" in str(fit.flags[0])
 
 
 def test_resonances_over_three_decades_are_found_in_noise():

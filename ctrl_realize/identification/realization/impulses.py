@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike
 
 from ..._checks import integer
 from ..._flags import Flag, flagged
+from ..._wording import in_time
 from ...data import ImpulseResponse
 from ...errors import DataError, DelayRangeError, OptionError, OrderError
 from ...numerics.arrays import FloatArray
@@ -149,6 +150,6 @@ def filter_flags(impulse: ImpulseResponse) -> tuple[Flag, ...]:
             "filter_delay",
             filter=still,
             samples=still.group_delay,
-            time=1e3 * still.group_delay * impulse.dt,
+            time=in_time(still.group_delay * impulse.dt),
         ),
     )
