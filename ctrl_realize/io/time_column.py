@@ -13,7 +13,7 @@ from ..numerics.arrays import FloatArray
 from ..numerics.signals.counters import clock_change, clock_unit
 from .columns import holds_numbers
 from .tables import Table
-from .text.dates import have_offset, in_utc, stamps_of
+from .text.dates import direction, have_offset, in_utc, stamps_of
 from .units import checked_time_unit, plain_unit, sample_time_unit, to_seconds, unit_named
 
 # from here on neighbouring integers are the same double
@@ -161,7 +161,7 @@ def _since_first(
         except (DataError, OptionError) as error:
             raise type(error)(f"{table.path}: {table.title(index)}: {error}") from error
     elif stamps.dtype.kind == "M":
-        order = -1 if stamps[0] > stamps[-1] else 1  # historians list the newest sample first
+        order = direction(stamps)  # historians list the newest sample first
         row, hours = clock_change(stamps[::order])
         if hours:
             place = table.place(row if order == 1 else stamps.size - 1 - row)

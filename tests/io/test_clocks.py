@@ -149,7 +149,8 @@ ZONES = {  # where and when a clock is set, and its shown form
 def logged(path, zone, first, form, dt, order=1):
     """Twelve hours of a clock on the wall; returns the seconds that have passed."""
     t = np.arange(0, 12 * 3600, dt, dtype=float)
-    start = pd.Timestamp(first, tz=zone).tz_convert("UTC")
+    start = first if isinstance(first, pd.Timestamp) else pd.Timestamp(first, tz=zone)
+    start = start.tz_convert("UTC")
     wall = pd.DatetimeIndex(start + pd.to_timedelta(t, unit="s")).tz_convert(zone).strftime(form)
     rows = [f"{at};{k % 7};{k}" for k, at in enumerate(wall)][::order]
     path.write_text("\n".join(["Timestamp;u;y", *rows]) + "\n")
@@ -175,6 +176,20 @@ def test_a_clock_that_is_set_is_named_and_put_right(tmp_path, kind, dt, order):
     assert part.time[-1] == 36000.0
     (whole,) = cr.io.read_records(path, time_zone=zone)
     assert whole.n_samples == t.size
+
+
+@pytest.mark.parametrize("order", [1, -1])
+@pytest.mark.parametrize("first", ["2025-10-26 00:55", "2025-10-26 00:10"])
+def test_a_test_of_minutes_in_which_the_clock_is_set_back(tmp_path, first, order):
+    path = tmp_path / "a.csv"
+    utc = pd.Timestamp(first, tz="UTC")
+    t = logged(path, "Europe/Berlin", utc, "%Y-%m-%d %H:%M:%S", 10.0, order)
+    rows = path.read_text().splitlines()
+    kept = [row for row in rows[1:] if int(row.split(";")[2]) < 360]  # an hour
+    path.write_text("\n".join([rows[0], *kept]) + "\n")
+    with pytest.warns(DataWarning, match="set back by an hour for summer time"):
+        np.testing.assert_array_equal(cr.read_record(path).time, t[:360])
+    np.testing.assert_array_equal(cr.read_record(path, time_zone="Europe/Berlin").time, t[:360])
 
 
 def test_tags_in_a_long_table_share_the_hour_that_comes_twice(tmp_path):

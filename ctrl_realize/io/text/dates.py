@@ -96,13 +96,17 @@ def in_utc(stamps: Stamps, zone: str) -> Stamps:
         raise OptionError(
             f"time_zone={zone!r} is not known; expected a name such as 'Europe/Berlin'"
         ) from error
-    turned = -1 if stamps.size and stamps[0] > stamps[-1] else 1
+    turned = direction(stamps)
     ordered = stamps[::turned]
+    back = np.flatnonzero(np.diff(ordered) < np.timedelta64(0))
     # equal stamps: an hour apart in a table of hours, or those of several signals at one time
     once = np.r_[True, ordered[1:] != ordered[:-1]][: stamps.size]
-    for new in (np.ones_like(once), once):
+    tries: list[tuple[Any, Any]] = [(np.ones_like(once), "infer"), (once, "infer")]
+    if back.size == 1:  # only a part of the hour is there twice
+        tries.append((tries[0][0], np.arange(stamps.size) <= back[0]))
+    for new, summer in tries:
         try:
-            local = pd.DatetimeIndex(ordered[new]).tz_localize(zone, ambiguous="infer")
+            local = pd.DatetimeIndex(ordered[new]).tz_localize(zone, ambiguous=summer)
         except Exception as error:  # pandas 2 raises errors of pytz
             reason = error
             continue
@@ -112,6 +116,11 @@ def in_utc(stamps: Stamps, zone: str) -> Stamps:
         f"time_zone={zone!r} does not fit the stamps: {reason}; expected an hour that comes twice, "
         "in order of time, where summer time ends"
     ) from reason
+
+
+def direction(stamps: Stamps) -> int:
+    """1 for stamps in order, -1 for the newest first; a clock may be set in between."""
+    return -1 if np.sum(np.diff(stamps) < np.timedelta64(0)) > stamps.size / 2 else 1
 
 
 def have_offset(cell: str) -> bool:
