@@ -1,6 +1,7 @@
 """The command line: what it writes, what it says, and how it ends."""
 
 import html
+import json
 import subprocess
 import sys
 from contextlib import redirect_stderr, redirect_stdout
@@ -117,6 +118,18 @@ def test_a_model_is_kept_where_no_controller_can_be_tuned(tmp_path, capsys):
     assert "no controller: a PID controller needs the sign of the gain" in said.err
     assert main(["tune", *words]) == 2
     assert "needs the sign of the gain" in capsys.readouterr().err
+
+
+def test_json_is_written_into_a_new_folder_and_not_in_place_of_one(folder, tmp_path, capsys):
+    words = ["identify", str(folder / "step_0.csv"), *FAST, "--json"]
+    assert main([*words, str(tmp_path / "new" / "model.json")]) == 0
+    told = json.loads((tmp_path / "new" / "model.json").read_text(encoding="utf-8"))
+    assert told["status"] == "identified"
+    capsys.readouterr()
+    assert main([*words, str(tmp_path / "new")]) == 2
+    said = capsys.readouterr()
+    assert said.out == ""  # refused before any work
+    assert "is a folder; expected a file to write" in said.err
 
 
 def test_the_report_of_identify_has_the_controller_if_it_is_wanted(folder, tmp_path, capsys):

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import CtrlRealizeError
-from ..io.atomic import write_text
+from ..io.atomic import refuse_irregular, write_text
 from ..report.programs import refusal, summary
 from .terminal import one_line, say
 
@@ -21,6 +21,8 @@ Told = list[dict[str, Any]]
 
 def told_as_json(target: str, work: Callable[[Told], int]) -> int:
     """Run, and write the result or why there is none; with ``-`` other texts are on stderr."""
+    if target != "-":
+        refuse_irregular(Path(target))
     told: Told = []
     said: list[str] = []
     shown, failed, code = warnings.showwarning, None, 2
@@ -45,6 +47,7 @@ def told_as_json(target: str, work: Callable[[Told], int]) -> int:
     if target == "-":
         say(text)
     else:
+        Path(target).parent.mkdir(parents=True, exist_ok=True)
         write_text(Path(target), text + "\n")
     if failed is not None:
         raise failed

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from ..errors import CtrlRealizeError, OptionError
 from ..io import CampaignStore
-from ..io.atomic import refuse_irregular
+from ..io.atomic import raise_for, refuse_irregular
 from .manifest import NAME as MANIFEST
 from .manifest import Run, refuse_other_results, result_files, write_manifest
 from .terminal import complain, printable
@@ -60,8 +60,8 @@ def appearing(folder: Path, run: Run | None = None) -> Iterator[Path]:
     target.parent.mkdir(parents=True, exist_ok=True)
     place = target if target.exists() else target.parent
     staged = place / f".{target.name[:40]}-{secrets.token_hex(6)}.tmp"
-    staged.mkdir()
     try:
+        staged.mkdir()
         yield staged
         if run is not None:
             write_manifest(staged, run)
@@ -69,10 +69,11 @@ def appearing(folder: Path, run: Run | None = None) -> Iterator[Path]:
             _move_into(staged, target, result_files(target) if run is not None else [])
         else:
             staged.rename(target)
-    except BaseException:
+    except BaseException as error:
         shutil.rmtree(staged, ignore_errors=True)
         for parent in made:
             _remove_if_empty(parent)
+        raise_for(target, staged, error)
         raise
 
 

@@ -54,8 +54,8 @@ def replaced_when_complete(path: str | os.PathLike[str]) -> Iterator[Path]:
     refuse_irregular(target)
     # Created directly, not by tempfile, so that the file gets the permissions of any new file.
     temporary = target.with_name(f".{target.name[:40]}-{secrets.token_hex(8)}.tmp")
-    os.close(os.open(temporary, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o666))
     try:
+        os.close(os.open(temporary, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o666))
         yield temporary
         with temporary.open("rb+") as written:
             os.fsync(written.fileno())
@@ -65,10 +65,21 @@ def replaced_when_complete(path: str | os.PathLike[str]) -> Iterator[Path]:
     except BaseException as error:
         with suppress(OSError):
             temporary.unlink()
-        if isinstance(error, OSError) and error.errno and error.filename is None:
-            # a full disk; the system names no file
-            raise OSError(error.errno, error.strerror, str(target)) from error
+        raise_for(target, temporary, error)
         raise
+
+
+def raise_for(target: Path, temporary: Path, error: BaseException) -> None:
+    """Name the target in an error that names its temporary file, or, as a full disk, none.
+
+    Raises
+    ------
+    OSError
+    """
+    if not isinstance(error, OSError) or not error.errno:
+        return
+    if error.filename is None or str(error.filename) == str(temporary):
+        raise OSError(error.errno, error.strerror, str(target)) from error
 
 
 def refuse_irregular(path: Path) -> None:

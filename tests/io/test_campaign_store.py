@@ -183,6 +183,20 @@ def test_after_a_failure_the_old_file_is_whole_and_the_folder_clean(tmp_path, re
     assert names(tmp_path) == ["a.txt"]
 
 
+def test_an_error_names_the_file_that_was_asked_for(tmp_path):
+    target = tmp_path / "nowhere" / "a.txt"
+    with pytest.raises(FileNotFoundError) as refused:
+        write_text(target, "text")
+    assert refused.value.filename == str(target)
+    with (  # noqa: PT012
+        pytest.raises(OSError, match="no folder") as refused,
+        appearing(tmp_path / "out") as staged,
+    ):
+        staged.rmdir()
+        raise OSError(20, "no folder", staged)
+    assert refused.value.filename == str(tmp_path / "out")
+
+
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="the system has no named pipes")
 def test_what_is_no_regular_file_is_not_replaced(tmp_path):
     pipe, link = tmp_path / "pipe", tmp_path / "link"
