@@ -1,8 +1,8 @@
 """Common base of all results: a card in a notebook, the same card as text, a plot.
 
-A result is a frozen dataclass. It has a title (`_title`) and lists its numbers with their units
-(`_rows`); it may have `choices`, what was chosen automatically and why, and `flags`, warnings about
-the result.
+A result is a frozen dataclass. It has a title (`_heading`, or `_title` where the title depends on
+the numbers) and lists its numbers with their units (`_rows`); it may have `choices`, what was
+chosen automatically and why, and `flags`, warnings about the result.
 """
 
 from __future__ import annotations
@@ -96,9 +96,10 @@ class Result(Drawable):
     else:
         choices = ()
         flags = ()
+    _heading = ""
 
     def _title(self) -> str:
-        return type(self).__name__
+        return self._heading or type(self).__name__
 
     def _rows(self) -> list[tuple[str, str]]:
         raise AssertionError(f"{type(self).__name__} does not list its numbers")

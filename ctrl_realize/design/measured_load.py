@@ -59,8 +59,7 @@ class Feedforward(Result):
     uncovered: float
     peak: float
 
-    def _title(self) -> str:
-        return "Feedforward from a measured load"
+    _heading = "Feedforward from a measured load"
 
     def _rows(self) -> list[tuple[str, str]]:
         late = f", {in_time(self.delay)} later" if self.delay else ""

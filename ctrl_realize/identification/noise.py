@@ -98,8 +98,7 @@ class NoiseModel(Result):
             ("correlation time", f"{self.correlation_time:.3g} samples"),
         ]
 
-    def _title(self) -> str:
-        return "Noise of a fit"
+    _heading = "Noise of a fit"
 
     def __repr__(self) -> str:
         return f"<NoiseModel order {self.coefficients.size}, innovations {self.std:.4g}>"

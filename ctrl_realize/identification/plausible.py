@@ -87,8 +87,7 @@ class PlausibleModels(Result):
             ("dead times", interval_in_time(min(waits), max(waits))),
         ]
 
-    def _title(self) -> str:
-        return "Models that the data do not rule out"
+    _heading = "Models that the data do not rule out"
 
     def __repr__(self) -> str:
         return f"<PlausibleModels {len(self)} models>"

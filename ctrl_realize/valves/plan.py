@@ -71,8 +71,7 @@ class ValveTestPlan(PlannedInput):
         result = valve_report(given, **{"command_range": self.command_range, **options})
         return _with_plan(result, self)
 
-    def _title(self) -> str:
-        return "Plan of a valve test"
+    _heading = "Plan of a valve test"
 
     def _rows(self) -> list[tuple[str, str]]:
         return [

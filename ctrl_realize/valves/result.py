@@ -254,8 +254,7 @@ class ValveReport(Result):
         ]  # fmt: skip
         return pd.DataFrame(rows, index=[one.key for one in self.metrics])
 
-    def _title(self) -> str:
-        return "Valve test"
+    _heading = "Valve test"
 
     def _rows(self) -> list[tuple[str, str]]:
         rows = [("verdict", self.verdict)]

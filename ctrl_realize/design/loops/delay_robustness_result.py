@@ -114,8 +114,7 @@ class DelayRobustness(Result):
             }
         )
 
-    def _title(self) -> str:
-        return "Robustness to the dead time"
+    _heading = "Robustness to the dead time"
 
     def _rows(self) -> list[tuple[str, str]]:
         low, high = self.dead_time_interval

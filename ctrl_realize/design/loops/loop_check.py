@@ -131,8 +131,7 @@ class LoopCheck(Result):
             rows.append(("at worst", f"Ms {self.worst.ms:.3g}, at {self.worst}"))
         return rows
 
-    def _title(self) -> str:
-        return "Closed loop on the design model"
+    _heading = "Closed loop on the design model"
 
     def _rows(self) -> list[tuple[str, str]]:
         return self.rows()

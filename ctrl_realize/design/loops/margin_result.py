@@ -106,8 +106,7 @@ class Margins(Result):
             return float("nan")
         return float(self.phase_crossovers[np.argmin(np.abs(np.log(self.gain_margins)))])
 
-    def _title(self) -> str:
-        return "Stability margins"
+    _heading = "Stability margins"
 
     def _rows(self) -> list[tuple[str, str]]:
         verdict = "stable" if self.stable else f"UNSTABLE ({self.unstable_poles} poles)"

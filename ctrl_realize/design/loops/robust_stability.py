@@ -63,8 +63,7 @@ class UncertaintyBound(Result):
         """Test a controller with this bound, see `robust_stability`."""
         return robust_stability(self, controller)
 
-    def _title(self) -> str:
-        return "Multiplicative uncertainty"
+    _heading = "Multiplicative uncertainty"
 
     def _rows(self) -> list[tuple[str, str]]:
         above = np.flatnonzero(self.bound >= 1)
@@ -121,8 +120,7 @@ class RobustnessCheck(Result):
     nominal: Margins
     performance: float
 
-    def _title(self) -> str:
-        return "Robust stability"
+    _heading = "Robust stability"
 
     def _rows(self) -> list[tuple[str, str]]:
         worst = f"{self.performance:.4g}" if np.isfinite(self.performance) else "unbounded"

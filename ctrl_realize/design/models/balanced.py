@@ -66,8 +66,7 @@ class BalancedReduction(ModelFit):
 
     _method = "balanced truncation"
 
-    def _title(self) -> str:
-        return "Balanced truncation"
+    _heading = "Balanced truncation"
 
     def _rows(self) -> list[tuple[str, str]]:
         return [

@@ -109,8 +109,7 @@ class ProcessModel(Result):
         below = ["s"] * self.integrating + lags
         return f"{self.gain:.4g} exp(-{self.dead_time:.4g} s) / {' '.join(below)}"
 
-    def _title(self) -> str:
-        return "Process model"
+    _heading = "Process model"
 
     def _rows(self) -> list[tuple[str, str]]:
         rows = [("model", self.formula), ("method", self.method)]

@@ -59,8 +59,7 @@ class KalmanPredictor(Result):
     poles: ComplexArray
     dt: float
 
-    def _title(self) -> str:
-        return "Kalman predictor"
+    _heading = "Kalman predictor"
 
     def _rows(self) -> list[tuple[str, str]]:
         largest = float(np.abs(self.poles).max(initial=0.0))

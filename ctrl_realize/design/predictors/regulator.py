@@ -83,8 +83,7 @@ class PredictorLQR(Result):
     dt: float
     check: LoopCheck | None = None
 
-    def _title(self) -> str:
-        return "LQR through the dead time"
+    _heading = "LQR through the dead time"
 
     def _rows(self) -> list[tuple[str, str]]:
         largest = float(np.abs(self.poles).max(initial=0.0))

@@ -124,8 +124,7 @@ class PIDComparison(Result):
         """Whether a controller is unstable somewhere within the intervals."""
         return any(flag.code == "unstable_within_interval" for flag in self._flags(i))
 
-    def _title(self) -> str:
-        return "PID rules"
+    _heading = "PID rules"
 
     def _rows(self) -> list[tuple[str, str]]:
         return [

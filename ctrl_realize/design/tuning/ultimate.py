@@ -65,8 +65,7 @@ class UltimateGain(Result):
     def _held(self) -> str:
         return f"behind a hold of {self.dt:.4g} s" if self.dt else "continuous"
 
-    def _title(self) -> str:
-        return "Ultimate gain and period"
+    _heading = "Ultimate gain and period"
 
     def _rows(self) -> list[tuple[str, str]]:
         with times_in(self.time_unit):

@@ -178,8 +178,7 @@ class TrackHistory(Result):
         """Delay in samples, not rounded."""
         return self.dead_time / self.dt
 
-    def _title(self) -> str:
-        return "Tracked delay"
+    _heading = "Tracked delay"
 
     def _rows(self) -> list[tuple[str, str]]:
         resolved = np.flatnonzero(self.resolved)

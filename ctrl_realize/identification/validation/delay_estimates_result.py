@@ -138,8 +138,7 @@ class DelayComparison(Result):
             rows["samples"] = rows["value"] / self.dt
         return rows
 
-    def _title(self) -> str:
-        return "Comparison of delay estimates"
+    _heading = "Comparison of delay estimates"
 
     def _rows(self) -> list[tuple[str, str]]:
         rows = [

@@ -134,8 +134,7 @@ class LoopDiagnosis(Result):
         rows = [{name: getattr(one, name) for name in columns} for one in self.methods]
         return pd.DataFrame(rows, index=[one.key for one in self.methods])
 
-    def _title(self) -> str:
-        return "Loop diagnosis"
+    _heading = "Loop diagnosis"
 
     def _rows(self) -> list[tuple[str, str]]:
         rows = [("verdict", self.verdict), ("because", self.reason)]
