@@ -34,7 +34,6 @@ from .frf_operands import (
     blocks,
     check_shapes,
     common_hold,
-    is_number,
     last_axis,
     matmul,
     one_hold,
@@ -146,27 +145,23 @@ class FRFAlgebra(ct.FrequencyResponseData):  # type: ignore[misc]  # control is 
 
     def __add__(self, other: Any) -> Any:
         """Parallel connection; errors of two measured responses are independent."""
-        if other is self:
-            return self * 2
+        return self * 2 if other is self else self._sum(other, 1)
+
+    def __radd__(self, other: Any) -> Any:
+        return self + other
+
+    def __sub__(self, other: Any) -> Any:
+        return self * 0 if other is self else self._sum(other, -1)
+
+    def _sum(self, other: Any, sign: int) -> Any:
         one, two = self._operand(), self._other(other)
         if two is None:
             return NotImplemented
         check_shapes(one, two, same=True)
         # An exact path keeps noise and hold of the measured one.
         hold = one.hold if not two.measured else common_hold(one, two, "a sum")
-        return self._made(
-            "a sum", one.values + two.values, one.spread + two.spread, (one, two), hold
-        )
-
-    def __radd__(self, other: Any) -> Any:
-        return self + other
-
-    def __sub__(self, other: Any) -> Any:
-        if other is self:
-            return self * 0
-        if isinstance(other, (ct.InputOutputSystem, np.ndarray)):
-            return self + -1 * other
-        return self + -other if is_number(other) else NotImplemented
+        values = one.values + sign * two.values
+        return self._made("a sum", values, one.spread + two.spread, (one, two), hold)
 
     def __rsub__(self, other: Any) -> Any:
         return (self * -1) + other

@@ -36,11 +36,6 @@ class Operand:
         return self.values.shape[:2] == (1, 1)
 
 
-def is_number(value: Any) -> bool:
-    """Whether something is a number of Python or NumPy."""
-    return isinstance(value, (int, float, complex, np.number))
-
-
 def power(values: ComplexArray) -> FloatArray:
     """Square of the magnitude."""
     return np.asarray(values.real**2 + values.imag**2)
