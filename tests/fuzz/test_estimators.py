@@ -148,7 +148,6 @@ WAYS = {
     "method": of("auto", "regularized", "least_squares", "okid"),
     "kernel": of("DC", "other"),
     "start": of("rest", "unknown", 3),
-    "arx_order": lambda rng: rng.randint(-1, 30),
 }
 
 

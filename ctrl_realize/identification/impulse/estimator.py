@@ -54,7 +54,7 @@ def choose_estimate(group: tuple[Record, ...], count: int, start: str) -> Choice
         # The simulation needs every sample of the input.
         return Choice("regularized", kernels, "")
     try:
-        arx = through_arx(first, count, start, None)
+        arx = through_arx(first, count, start)
     except DataError:
         return Choice("regularized", kernels, "")
     smooth_error = _error(group, splits, smooth, count)

@@ -13,7 +13,7 @@ from ..._flags import Flag, flagged
 from ...data import Record
 from ...data.given import as_records
 from ...data.impulse_estimate import ImpulseEstimate
-from ...errors import DataError, DataWarning, OptionError
+from ...errors import DataError, DataWarning
 from ...numerics.blas_threads import single_threaded
 from ...numerics.signals.onset import correlation_onset
 from .estimator import Choice, choose_estimate
@@ -44,7 +44,6 @@ def impulse_from_io(
     method: Method = "auto",
     kernel: Kernel = "auto",
     start: Start = "unknown",
-    arx_order: int | None = None,
 ) -> ImpulseEstimate:
     """Estimate the unit-pulse response from input and output signals of any shape.
 
@@ -62,20 +61,18 @@ def impulse_from_io(
     method : {"auto", "regularized", "least_squares", "okid"}
         ``"regularized"`` uses a prior of exponential decay, tuned by its marginal likelihood.
         ``"least_squares"`` has no prior and needs an input that excites every lag. ``"okid"`` uses
-        an ARX model of high order, for plants whose response is longer than `length` free
-        parameters can describe. ``"auto"``: ``"okid"`` if it halves the prediction error of
-        ``"regularized"`` on the held-back last third of the data, otherwise ``"regularized"``.
+        an ARX model of high order (up to 128, chosen by BIC), for plants whose response is longer
+        than `length` free parameters can describe. ``"auto"``: ``"okid"`` if it halves the
+        prediction error of ``"regularized"`` on the held-back last third of the data, otherwise
+        ``"regularized"``.
     kernel : {"auto", "TC", "DC", "SS"}
         Prior of the regularized method. TC allows a jump at lag 0, SS is smooth, DC estimates the
         correlation of neighbours; ``"auto"``: TC or SS, whichever has the larger marginal
         likelihood, for each output separately.
     start : {"unknown", "rest"}
-        Input before the record: unknown (the first ``length - 1`` outputs, or ``arx_order`` for
-        OKID, are then only used as past values), or steady state at the first sample of the input,
-        which uses every sample.
-    arx_order : int, optional
-        Order of the ARX model of OKID, at least the delay plus the order of the plant. Default:
-        chosen by BIC, up to 128.
+        Input before the record: unknown (the first ``length - 1`` outputs, or as many as the order
+        of the ARX model, are then only used as past values), or steady state at the first sample of
+        the input, which uses every sample.
 
     Returns
     -------
@@ -133,10 +130,6 @@ def impulse_from_io(
     method = one_of(method, "method", ("auto", "regularized", "least_squares", "okid"))
     kernel = one_of(kernel, "kernel", ("auto", "TC", "DC", "SS"))
     start = one_of(start, "start", ("unknown", "rest"))
-    if arx_order is not None and method != "okid":
-        raise OptionError(
-            f"arx_order={arx_order!r} is an argument of method='okid', not of {method!r}"
-        )
     group = as_group(records)
     longest = max(record.n_samples for record in group)
     most = max(min(int(LONGEST * longest), MOST_UNKNOWNS // group[0].ninputs), 2)
@@ -147,7 +140,7 @@ def impulse_from_io(
         count = integer(length, "length", 2)
     chosen = choose_estimate(group, count, start) if method == "auto" else None
     while True:
-        found = _estimate(group, count, start, chosen, (method, kernel, arx_order))
+        found = _estimate(group, count, start, chosen, method, kernel)
         tail = _tail_flags(found)
         if length is not None or not tail or count == most:
             break
@@ -192,16 +185,16 @@ def _estimate(
     count: int,
     start: str,
     chosen: Choice | None,
-    asked: tuple[str, str, int | None],
+    method: str,
+    kernel: str,
 ) -> PulseRegression:
     """Estimate by the requested or the chosen method."""
-    method, kernel, arx_order = asked
     kernels = (kernel,) * group[0].noutputs
     if chosen is not None:
         method = chosen.method
         kernels = chosen.kernels if kernel == "auto" else kernels
     if method == "okid":
-        return through_arx(group, count, start, arx_order)
+        return through_arx(group, count, start)
     if method == "least_squares":
         return without_prior(group, count, start)
     return with_prior(group, count, start, kernels)

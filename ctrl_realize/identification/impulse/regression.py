@@ -11,7 +11,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import fdtrc, ndtri
 
-from ..._checks import integer
 from ..._flags import Flag, flagged
 from ...data import Record
 from ...errors import DataError
@@ -125,18 +124,13 @@ def with_prior(
     )
 
 
-def through_arx(
-    group: tuple[Record, ...], count: int, start: str, arx_order: int | None
-) -> PulseRegression:
+def through_arx(group: tuple[Record, ...], count: int, start: str) -> PulseRegression:
     """Estimate an ARX model of high order and expand it to `count` Markov parameters (OKID)."""
     m, p = group[0].ninputs, group[0].noutputs
     total = sum(record.n_samples for record in group)
-    if arx_order is None:
-        # At least five equations for each parameter, as the asymptotics of BIC require.
-        most = min(count - 1, total // (5 * (m + p)) - 1)
-        orders = tuple(q for q in OKID_ORDERS if q <= most) or (1,)
-    else:
-        orders = (integer(arx_order, "arx_order", 1),)
+    # At least five equations for each parameter, as the asymptotics of BIC require.
+    most = min(count - 1, total // (5 * (m + p)) - 1)
+    orders = tuple(q for q in OKID_ORDERS if q <= most) or (1,)
     while True:
         top = orders[-1]
         of_signals = partial(arx_equations, na=top, nb=top + 1)
@@ -147,7 +141,7 @@ def through_arx(
         if len(orders) == 1:
             raise DataError(
                 f"the input does not excite {m * (top + 1) - excited} of the {m * (top + 1)} lags "
-                f"of an ARX model of order {top}; choose a smaller arx_order, or a richer input"
+                f"of an ARX model of order {top}; use a richer input, or method='regularized'"
             )
         orders = orders[:-1]
     if not np.all(np.diag(equations.gram) > 0):
@@ -175,8 +169,7 @@ def through_arx(
     if growth > MOST_GROWTH:
         raise DataError(
             f"the ARX model of order {order} is unstable: its pulse response grows by "
-            f"1e{growth:.0f} within {count} samples; choose another arx_order, or "
-            "method='regularized'"
+            f"1e{growth:.0f} within {count} samples; use method='regularized'"
         )
     markov, std = arx_markov(fit, count), arx_markov_std(fit, count)
     # Largest of all parameters, in standard deviations, that is exceeded by chance in 1 % of cases.
