@@ -161,13 +161,11 @@ class DelayLineController(ShownSystem, DelayOperators):
 
     def _card(self) -> Card:
         largest = float(np.abs(self.inner_poles).max(initial=0.0))
+        line = f"{self.line_length} samples = {in_time(self.line_length * self.dt, 4)}"
         rows = [
             ("signals", f"{self.input_labels[0]} → {self.output_labels[0]}"),
             ("inner states", f"{self.inner_poles.size}, the slowest with |z| = {largest:.4g}"),
-            (
-                "line of past outputs",
-                f"{self.line_length} samples = {in_time(self.line_length * self.dt, 4)}",
-            ),
+            ("line of past outputs", line),
             ("sample time", in_time(self.dt, 6)),
         ]
         return Card(f"Controller {self.name} with a delay line", rows)

@@ -69,13 +69,9 @@ class Feedforward(Result):
             ("lag", f"{in_time(self.lag)}{late}"),
         ]
         if self.uncovered:
-            rows.append(
-                (
-                    "what it leaves",
-                    f"the load acts {in_time(self.uncovered)} before the plant input can: up to "
-                    f"{self.peak:.3g} of the output for each unit of the load",
-                )
-            )
+            left = f"up to {self.peak:.3g} of the output for each unit of the load"
+            early = f"the load acts {in_time(self.uncovered)} before the plant input can"
+            rows.append(("what it leaves", f"{early}: {left}"))
         return rows
 
     def __repr__(self) -> str:

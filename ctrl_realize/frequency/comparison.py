@@ -116,13 +116,11 @@ class FRFComparison(Result):
             "gain_error_db": self.gain_error_db,
             "phase_error_deg": self.phase_error_deg,
             "relative_error": self.relative_error,
+            "coherence": self.coherence,
+            "std": self.std,
+            "trusted": self.trusted,
         }
-        if self.coherence is not None:
-            columns["coherence"] = self.coherence
-        if self.std is not None:
-            columns["std"] = self.std
-        columns["trusted"] = self.trusted
-        return pd.DataFrame(columns)
+        return pd.DataFrame({name: one for name, one in columns.items() if one is not None})
 
     def _title(self) -> str:
         return f"FRF comparison: {self.name}"
@@ -130,6 +128,8 @@ class FRFComparison(Result):
     def _rows(self) -> list[tuple[str, str]]:
         inside = self.trusted
         worst = int(np.argmax(np.where(inside, self.relative_error, -1.0)))
+        largest = f"largest {100 * self.max_relative_error:.3g} % at "
+        largest += hertz(self.frequency_hz[worst])
         source = {
             "coherence": "high coherence",
             "std": "small standard deviation",
@@ -140,23 +140,12 @@ class FRFComparison(Result):
             ("points", f"{int(inside.sum())} of {inside.size}"),
             ("gain error", _rms_max(self.gain_error_db[inside], "dB")),
             ("phase error", _rms_max(self.phase_error_deg[inside], "deg")),
-            (
-                "relative error",
-                f"{100 * self.rms_relative_error:.3g} % rms, largest "
-                f"{100 * self.max_relative_error:.3g} % at {hertz(self.frequency_hz[worst])}",
-            ),
+            ("relative error", f"{100 * self.rms_relative_error:.3g} % rms, {largest}"),
         ]
         if self.relative_noise is not None:
             rows.append(("noise of the FRF", f"{100 * self.relative_noise:.3g} % rms"))
-        rows.append(
-            (
-                "hold",
-                "zero-order hold divided out of the model (half a sample of lag)"
-                if self.hold
-                else "not divided out",
-            )
-        )
-        return rows
+        divided = "zero-order hold divided out of the model (half a sample of lag)"
+        return [*rows, ("hold", divided if self.hold else "not divided out")]
 
     def __repr__(self) -> str:
         return (

@@ -181,6 +181,10 @@ class FRFFit(FractionalDelayFit):
             for p, error in zip(self.poles, self.pole_std, strict=True)
             if p.imag >= 0
         ]
+        ends = f"{self.frequency_hz[0]:.4g} to {self.frequency_hz[-1]:.4g} Hz"
+        size = f"{self.weighted_rms:.3g} x"
+        if not self.noise_known:
+            size = f"{100 * self.weighted_rms:.3g} % of"
         hold = []
         if self.hold_time is not None:
             hold.append(("hold", f"zero-order hold of {in_time(self.hold_time)}, divided out"))
@@ -191,17 +195,8 @@ class FRFFit(FractionalDelayFit):
             ("structure", f"order {self.order}, relative degree {self.relative_degree}"),
             ("poles", ", ".join(shown)),
             ("gain", f"{self.gain:.5g}"),
-            (
-                "points",
-                f"{self.frequency_hz.size}, {self.frequency_hz[0]:.4g} to "
-                f"{self.frequency_hz[-1]:.4g} Hz",
-            ),
-            (
-                "weighted residual",
-                f"{self.weighted_rms:.3g} x {unit}"
-                if self.noise_known
-                else f"{100 * self.weighted_rms:.3g} % of {unit}",
-            ),
+            ("points", f"{self.frequency_hz.size}, {ends}"),
+            ("weighted residual", f"{size} {unit}"),
             *hold,
         ]
 

@@ -260,19 +260,13 @@ class ValveReport(Result):
         rows = [("verdict", self.verdict)]
         for one in self.metrics:
             if one.interval.is_known:
-                told = in_words(one.interval, one.definition.unit)
-                rows.append(
-                    (one.definition.name, " ".join(filter(None, (*told, where_in_words(one)))))
-                )
+                told = *in_words(one.interval, one.definition.unit), where_in_words(one)
+                rows.append((one.definition.name, " ".join(filter(None, told))))
         for group in self.groups:
             t86 = group.estimates["t86"]
-            rows.append(
-                (
-                    f"T86, {words_of(group)}",
-                    " ".join(in_words(t86, "s")) if t86.is_known
-                    else f"unknown: {group.moved} of {group.count} moved, {group.settled} settled",
-                )
-            )  # fmt: skip
+            unknown = f"unknown: {group.moved} of {group.count} moved, {group.settled} settled"
+            found = " ".join(in_words(t86, "s")) if t86.is_known else unknown
+            rows.append((f"T86, {words_of(group)}", found))
         return rows
 
     def _notes(self) -> list[str]:

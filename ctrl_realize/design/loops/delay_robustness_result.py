@@ -118,12 +118,9 @@ class DelayRobustness(Result):
 
     def _rows(self) -> list[tuple[str, str]]:
         low, high = self.dead_time_interval
+        samples = f" ({self.nominal} samples)" if self.dt else ""
         return [
-            (
-                "nominal",
-                in_time(self.nominal_dead_time, 4)
-                + (f" ({self.nominal} samples)" if self.dt else ""),
-            ),
+            ("nominal", in_time(self.nominal_dead_time, 4) + samples),
             ("interval", interval_in_time(low, high)),
             ("over the interval", "stable" if self.stable else "UNSTABLE somewhere"),
             ("worst modulus margin", f"{self.worst_modulus_margin:.4g}"),

@@ -116,13 +116,11 @@ class LoopCheck(Result):
         found = self.margins
         if not found.stable:
             return [("on the design model", "UNSTABLE")]
-        rows = [
-            (
-                "on the design model",
-                f"stable, Ms {found.ms:.3g}, phase margin {found.phase_margin:.3g} deg, "
-                f"delay margin {in_time(found.delay_margin, 3)}",
-            )
-        ]
+        reached = (
+            f"stable, Ms {found.ms:.3g}, phase margin {found.phase_margin:.3g} deg, "
+            f"delay margin {in_time(found.delay_margin, 3)}"
+        )
+        rows = [("on the design model", reached)]
         if self.robustness is not None:
             word = "stable" if self.stable_within_interval else "UNSTABLE somewhere"
             interval = interval_in_time(*self.robustness.dead_time_interval)

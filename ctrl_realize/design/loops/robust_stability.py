@@ -124,13 +124,11 @@ class RobustnessCheck(Result):
 
     def _rows(self) -> list[tuple[str, str]]:
         worst = f"{self.performance:.4g}" if np.isfinite(self.performance) else "unbounded"
+        factor = f"{self.margin:.4g} (at {self.omega_critical:.4g} rad/s)"
         return [
             ("nominal loop", "stable" if self.nominal.stable else "UNSTABLE"),
             ("all plants within the bound", "stable" if self.robust else "NOT guaranteed"),
-            (
-                "largest factor on the bound",
-                f"{self.margin:.4g} (at {self.omega_critical:.4g} rad/s)",
-            ),
+            ("largest factor on the bound", factor),
             ("worst sensitivity peak", f"{worst} (nominal {self.nominal.ms:.4g})"),
         ]
 

@@ -216,13 +216,8 @@ class PIDAlgorithm(Result):
         if self.td:
             rows += [("td", in_time(self.td, 4)), ("tf", in_time(self.tf, 4))]
         low, high = self.output_limits
-        rows += [
-            (
-                "set-point weights",
-                f"{self.setpoint_weight:g}, derivative {self.derivative_weight:g}",
-            ),
-            ("output limits", f"{low:g} to {high:g}"),
-        ]
+        weights = f"{self.setpoint_weight:g}, derivative {self.derivative_weight:g}"
+        rows += [("set-point weights", weights), ("output limits", f"{low:g} to {high:g}")]
         if tracking := self.coefficients.tracking:
             rows.append(("tracking time", in_time(self.dt / tracking, 4)))
         return [*rows, ("sample time", f"{in_time(self.dt, 6)}, {self.method} rule")]

@@ -92,11 +92,7 @@ class JointFit(OutputErrorFit):
         ]
         for what, fit in (("records", self.record_fit), ("frequency response", self.frf_fit)):
             flags = ", ".join(flag.code for flag in fit.flags)
-            rows.append(
-                (
-                    f"{what} alone",
-                    f"dead time {time_within(fit.dead_time, *fit.interval)}, order {fit.order}, "
-                    f"gain {fit.gain:.4g}" + (f"; flags: {flags}" if flags else ""),
-                )
-            )
+            found = f"dead time {time_within(fit.dead_time, *fit.interval)}, order {fit.order}"
+            found += f", gain {fit.gain:.4g}" + (f"; flags: {flags}" if flags else "")
+            rows.append((f"{what} alone", found))
         return super()._rows() + rows

@@ -164,13 +164,9 @@ class OrderScan(Result):
             low, high = self.delay_intervals[i]
             value = self.last_singular_value(order)
             noise = f", {value / self.noise_floor:.2f} x noise" if self.noise_floor else ""
-            rows.append(
-                (
-                    f"order {order}",
-                    f"delay {self.delays[i]} ({low}...{high}) samples, "
-                    f"IAE {self.iae[i, self.delays[i]]:.4g}, singular value {value:.4g}{noise}",
-                )
-            )
+            found = f"delay {self.delays[i]} ({low}...{high}) samples"
+            found += f", IAE {self.iae[i, self.delays[i]]:.4g}, singular value {value:.4g}{noise}"
+            rows.append((f"order {order}", found))
         return rows
 
     def __repr__(self) -> str:

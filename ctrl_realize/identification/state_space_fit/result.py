@@ -125,9 +125,8 @@ class StateSpaceFit(ModelFit):
     _method = "state-space fit of all channels"
 
     def _title(self) -> str:
-        return (
-            f"State-space fit: {len(self.output_delays)} outputs, {len(self.input_delays)} inputs"
-        )
+        outputs, inputs = len(self.output_delays), len(self.input_delays)
+        return f"State-space fit: {outputs} outputs, {inputs} inputs"
 
     def _rows(self) -> list[tuple[str, str]]:
         return [
@@ -147,13 +146,9 @@ class StateSpaceFit(ModelFit):
             (self.interval_label, interval_in_time(*self.interval)),
         ]
         if self.lags is not None:
-            rows.append(
-                (
-                    "instead of",
-                    f"a transfer function of order {self.lags.order} with dead time "
-                    f"{in_time(self.lags.dead_time, 4)}, residual std {self.lags.residual:.3g}",
-                )
-            )
+            other = f"a transfer function of order {self.lags.order} with dead time "
+            other += f"{in_time(self.lags.dead_time, 4)}, residual std {self.lags.residual:.3g}"
+            rows.append(("instead of", other))
         return rows
 
     def __repr__(self) -> str:

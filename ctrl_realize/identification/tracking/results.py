@@ -107,15 +107,10 @@ class TrackPoint(ModelFit):
 
     def _rows(self) -> list[tuple[str, str]]:
         low, high = self.delay_interval
+        ratio = f"{self.gain_ratio:.4g} +- {2 * self.gain_std:.2g}"
         return [
             ("delay", f"{self.delay} samples ({low} to {high}), {in_time(self.dead_time, 4)}"),
-            (
-                "gain",
-                (
-                    f"{self.gain_ratio:.4g} +- {2 * self.gain_std:.2g} times that of the initial "
-                    "model"
-                ),
-            ),
+            ("gain", f"{ratio} times that of the initial model"),
             ("pole speed ratios", ", ".join(f"{s:.3g}" for s in self.pole_speed_ratios) or "kept"),
             ("residual std", f"{self.noise_std:.3g}"),
             ("resolved", "yes" if self.resolved else f"no: {self.reason}"),
