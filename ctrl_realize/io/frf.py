@@ -21,7 +21,7 @@ from .text_options import TextOptions
 from .units import plain_unit
 
 _NAMES = facts("io/words.toml")["frf"]
-_IN_HZ = {"hz": 1.0, "khz": 1e3, "mhz": 1e6, "rad/s": 1 / (2 * np.pi)}
+_IN_HZ = {"mHz": 1e-3, "hz": 1.0, "khz": 1e3, "MHz": 1e6, "rad/s": 1 / (2 * np.pi)}
 _UNITS = {"frequency": tuple(_IN_HZ), "magnitude": ("", "db"), "phase": ("deg", "rad")}
 
 
@@ -54,8 +54,8 @@ def read_frf(
     Columns are identified by their names (``frequency_hz``, ``omega``, ``magnitude_db``, ``phase
     [rad]``, ``real``, ``imag``, ``coherence``, ``std``); without a header, three columns are
     frequency, magnitude and phase. Units are taken from the header; default: frequency in Hz
-    (``omega``: rad/s), magnitude as a ratio and phase in degrees. If the values contradict this, it
-    is an error.
+    (``omega``: rad/s), magnitude as a ratio and phase in degrees. If the values contradict this, or
+    the frequency is in rad/s and the phase has no unit, it is an error.
 
     Parameters
     ----------
@@ -77,7 +77,7 @@ def read_frf(
         Columns of the coherence, and of the standard deviation of the complex response, in its
         unit.
     frequency_unit : str, optional
-        ``"Hz"``, ``"kHz"``, ``"MHz"`` or ``"rad/s"``.
+        ``"mHz"``, ``"Hz"``, ``"kHz"``, ``"MHz"`` or ``"rad/s"``.
     magnitude_unit : str, optional
         ``"abs"`` or ``"dB"``.
     phase_unit : str, optional
@@ -185,15 +185,20 @@ def _columns(table: Table, asked: Mapping[str, Any]) -> dict[str, int]:
     return {part: index for part, index in columns.items() if part in kept}
 
 
-def _frequency_hz(table: Table, index: int, unit: str | None) -> FloatArray:
+def _frequency_unit(table: Table, index: int, unit: str | None) -> str:
     column = table.columns[index]
-    if unit is None:
-        named_omega = plain_name(column.name) in ("omega", "ω", "w")
-        unit = plain_unit(column.unit) or ("rad/s" if named_omega else "hz")
+    if unit is not None:
+        return unit
+    named_omega = plain_name(column.name) in ("omega", "ω", "w")
+    return plain_unit(column.unit) or ("rad/s" if named_omega else "hz")
+
+
+def _frequency_hz(table: Table, index: int, unit: str | None) -> FloatArray:
+    unit = _frequency_unit(table, index, unit)
     if unit not in _IN_HZ:
         raise OptionError(
-            f"{table.path}: {table.title(index)} is in {unit!r}; give frequency_unit='Hz', "
-            "'kHz', 'MHz' or 'rad/s'"
+            f"{table.path}: {table.title(index)} is in {unit!r}; give frequency_unit='mHz', "
+            "'Hz', 'kHz', 'MHz' or 'rad/s'"
         )
     return table.numbers(index) * _IN_HZ[unit]
 
@@ -206,7 +211,8 @@ def _response(
     if "real" in columns:
         return table.numbers(columns["real"]) + 1j * table.numbers(columns["imag"])
     magnitude = _magnitude(table, columns["magnitude"], units["magnitude"])
-    phase = _phase(table, columns["phase"], units["phase"])
+    radians = _frequency_unit(table, columns["frequency"], units["frequency"]) == "rad/s"
+    phase = _phase(table, columns["phase"], units["phase"], radians)
     return np.asarray(magnitude * np.exp(1j * phase), dtype=np.complex128)
 
 
@@ -225,15 +231,15 @@ def _magnitude(table: Table, index: int, unit: str | None) -> FloatArray:
     return values
 
 
-def _phase(table: Table, index: int, unit: str | None) -> FloatArray:
-    """Phase in rad."""
+def _phase(table: Table, index: int, unit: str | None, radians: bool) -> FloatArray:
+    """Phase in rad; `radians` tells whether the frequency is in rad/s, as in python-control."""
     values = table.numbers(index)
     unit = plain_unit(table.columns[index].unit) if unit is None else unit
     if unit not in ("", "deg", "rad"):
         raise OptionError(
             f"{table.path}: {table.title(index)} is in {unit!r}; give phase_unit='deg' or 'rad'"
         )
-    if not unit and values.any() and np.abs(values).max() <= 2 * np.pi:
+    if not unit and values.any() and (radians or np.abs(values).max() <= 2 * np.pi):
         raise OptionError(
             f"{table.path}: {table.title(index)} could be in degrees or in radians; give "
             "phase_unit='deg' or 'rad'"

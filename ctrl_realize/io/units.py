@@ -35,8 +35,10 @@ _CLOSING = "])}>"
 
 def plain_unit(text: str) -> str:
     """Normalise a unit: ``"Sec" -> "s"``, ``"µs" -> "us"``, ``"Degrees" -> "deg"``."""
-    # MHz is the only unit here that depends on its capital letter, and mHz is not in use
-    lower = bare_unit(text).lower()
+    bare = bare_unit(text)
+    lower = bare.lower()
+    if lower == "mhz":  # the only unit here that depends on its capital letter
+        return "MHz" if bare[0] == "M" else bare
     return _SPELLINGS.get(lower, lower)
 
 

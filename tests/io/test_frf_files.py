@@ -34,6 +34,8 @@ WRITTEN = {
     "omega in Hz": written("w [Hz],mag,phase [rad]", F, abs(G), PHASE),
     "rad/s": written("frequency [rad/s],|G|,phase/deg", OMEGA, abs(G), np.rad2deg(PHASE)),
     "kHz": written("Freq (kHz),Mag,Phase (Degrees)", F / 1e3, abs(G), np.rad2deg(PHASE)),
+    "MHz": written("freq_MHz,re,im", F / 1e6, G.real, G.imag),
+    "mHz": written("Frequency [mHz],re,im", F * 1e3, G.real, G.imag),
     "decibels": written(
         "f_hz,magnitude_db,phase_deg", F, 20 * np.log10(abs(G)), np.rad2deg(PHASE)
     ),
@@ -68,6 +70,14 @@ def test_columns_and_units_are_chosen(tmp_path):
     ("text", "kwargs", "error", "match"),
     [
         (written("f,gain,phase", F, abs(G), PHASE), {}, OptionError, "in degrees or in radians"),
+        # MATLAB's bode gives rad/s and degrees, python-control rad/s and radians
+        (
+            written("omega,mag,phase", OMEGA, abs(G), 10 * PHASE),
+            {},
+            OptionError,
+            "in degrees or in radians; give phase_unit",
+        ),
+        (written("f_mhz,re,im", F, F, F), {}, OptionError, "in 'mhz'; give frequency_unit='mHz'"),
         (written("f,gain,phase_deg", F, -F, F), {}, OptionError, "negative values; is it in dB"),
         (written("f,gain_dB,phase_deg", F, 1e3 * F, PHASE), {}, DataError, "10000 dB"),
         (written("f,gain,phase [turns]", F, F, F), {}, OptionError, "in 'turns'; give phase_unit"),
