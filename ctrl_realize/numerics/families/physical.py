@@ -126,11 +126,6 @@ def fitted_parameters(
     )
 
 
-def without_errors(found: tuple[ProcessParameter, ...]) -> tuple[ProcessParameter, ...]:
-    """Parameters whose standard errors are not those of the curvature: of a law or a median."""
-    return tuple(ProcessParameter(one.name, one.value) for one in found)
-
-
 def _factors(roots: ComplexArray, real: str, pair: str) -> list[tuple[str, float, int, complex]]:
     """Name, value, and derivative with respect to one root, of time constants and damping.
 

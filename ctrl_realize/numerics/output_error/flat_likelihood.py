@@ -15,6 +15,7 @@ References
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -88,9 +89,10 @@ def moved(
         followed=followed_by(fits, fixed, state.numerator[0]),
         static=static,
         delay_estimates=estimates,
-        process=found.process._replace(
-            parameters=process_parameters(
-                fixed.poles, state.numerator[0], dead_time, fits.scales.length
-            )
+        process=replace(
+            found.process,
+            find=partial(
+                process_parameters, fixed.poles, state.numerator[0], dead_time, fits.scales.length
+            ),
         ),
     )

@@ -34,7 +34,6 @@ from ..families.equal_lags import (
     still_improving,
 )
 from ..families.flow import DispersedFlow
-from ..families.physical import without_errors
 from .extrapolation import least_extrapolating
 from .friction import latest_slip
 from .margins import CloseDecision, close_choices, close_exclusions
@@ -121,7 +120,7 @@ def likelihood_fit(
         close += close_exclusions(fits, _charged_level(fits, choice), own_structure)
     process = found.process
     if choice.chain is not None or choice.flow is not None:
-        process = process._replace(parameters=without_errors(process.parameters))
+        process = process.without_errors()
     distributed = DistributedLags(
         choice.chain,
         unlimited,

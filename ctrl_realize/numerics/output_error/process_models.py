@@ -64,7 +64,7 @@ def process_fit(
         found = likelihood_fit(fits, adequate=adequate, near=near)
         form = next(form for form in forms if form.structure == found.structure)
         if np.count_nonzero(found.poles.imag > 0) == int(form.pair):
-            process = _with_profiles(fits, ProcessEstimate(found.process.parameters, form))
+            process = _with_profiles(fits, ProcessEstimate(found.process.find, form))
             return replace(found, process=process, others=others.told(others.better))
     like = list(fits.candidates.values())
     fitted = [fit_form(fits.problem, form, fits.scales, like) for form in forms]
@@ -132,10 +132,10 @@ def fit_without_fast_lags(
 def _with_profiles(fits: WindowFit, process: ProcessEstimate) -> ProcessEstimate:
     """Profiled intervals of lags where the curvature does not describe them."""
     assert process.form is not None
-    return process._replace(
-        parameters=with_profiled_lags(
-            fits.problem, fits.scales, process.form, process.parameters, fits.error_variance
-        )
+    setting = fits.problem, fits.scales, process.form
+    return replace(
+        process,
+        find=lambda: with_profiled_lags(*setting, process.parameters, fits.error_variance),
     )
 
 

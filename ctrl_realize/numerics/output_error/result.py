@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Literal, NamedTuple, TypeAlias
 
 import numpy as np
@@ -210,16 +210,35 @@ class DistributedLags(NamedTuple):
 _PLAIN_LAGS = DistributedLags()
 
 
-class ProcessEstimate(NamedTuple):
-    """The model as a process model: its parameters, with standard errors if they are known.
+@dataclass(frozen=True, eq=False)
+class ProcessEstimate:
+    """The model as a process model.
 
     `form` is the form that was prescribed, if it is not a plain structure, and `at_bound` lists its
-    parameters that are at a bound.
+    parameters that are at a bound. `find` has the parameters once somebody asks: the profiles of
+    lags take a third of the time of a fit.
     """
 
-    parameters: tuple[ProcessParameter, ...]
+    find: Callable[[], tuple[ProcessParameter, ...]]
     form: ProcessForm | None = None
     at_bound: tuple[str, ...] = ()
+
+    def __getstate__(self) -> dict[str, object]:
+        """What is stored or sent: the parameters, and not the fit that has them."""
+        return {"parameters": self.parameters, "form": self.form, "at_bound": self.at_bound}
+
+    @cached_property
+    def parameters(self) -> tuple[ProcessParameter, ...]:
+        """The parameters, with standard errors if they are known."""
+        with one_blas_thread():
+            return self.find()
+
+    def without_errors(self) -> ProcessEstimate:
+        """The same, where standard errors are not those of the curvature: of a law or a median."""
+        return replace(
+            self,
+            find=lambda: tuple(ProcessParameter(one.name, one.value) for one in self.parameters),
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -375,13 +394,13 @@ def assembled(
     """
     problem, family = fits.problem, chosen.structure
     numerator = evaluate(problem, family, chosen.parameters[None]).numerator[0]
+    variance = fits.error_variance
     if isinstance(family, FormFamily):
-        parameters = family.parameters(problem, chosen.parameters, fits.error_variance)
-        process = ProcessEstimate(parameters, family.form, family.at_bound)
+        find = partial(family.parameters, problem, chosen.parameters, variance)
+        process = ProcessEstimate(find, family.form, family.at_bound)
     else:
-        process = ProcessEstimate(
-            fitted_parameters(problem, chosen, numerator, fits.error_variance, fits.scales.length)
-        )
+        setting = problem, chosen, numerator, variance, fits.scales.length
+        process = ProcessEstimate(partial(fitted_parameters, *setting))
     interval = interval.rounded(chosen.dead_time, fits.scales)
     static = static or fits.static(chosen)
     charged = {s: fits.criterion[s] + needless_parameters(s) for s in profiles}

@@ -15,6 +15,7 @@ References
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from scipy.optimize import minimize_scalar
@@ -66,6 +67,7 @@ def in_rounded_data(
         return found
     dead_time, reach = best.candidate.dead_time, Z_95 * best.std
     numerator = best.linear[: start.structure.zeros + 1]
+    setting = fits.problem, best.candidate, numerator, fits.variance, scales.length
     return replace(
         found,
         dead_time=dead_time,
@@ -77,11 +79,7 @@ def in_rounded_data(
         static=fits.static(best.candidate),
         followed=followed_by(fits, best.candidate, numerator),
         residual=found.residual._replace(rounded=best.noise),
-        process=found.process._replace(
-            parameters=fitted_parameters(
-                fits.problem, best.candidate, numerator, fits.variance, scales.length
-            )
-        ),
+        process=replace(found.process, find=partial(fitted_parameters, *setting)),
     )
 
 

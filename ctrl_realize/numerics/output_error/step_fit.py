@@ -77,7 +77,6 @@ from ..engine.structures import (
 from ..engine.window_fit import WindowFit, among, fit_window, with_noise_of_residual
 from ..families.equal_lags import LagChain
 from ..families.flow import DispersedFlow
-from ..families.physical import without_errors
 from ..signals.noise_model import continues
 from .before_the_step import fitted_from_rest
 from .coloured import in_coloured_noise
@@ -298,9 +297,7 @@ def _robust_fit(
     interval = DelayInterval(low, high, (high - low) / (2 * Z_95))
     own = profiles[chosen.structure]
     found = assembled(fits, fixed, False, estimates, profiles, interval, own, static=static)
-    return replace(
-        found, process=found.process._replace(parameters=without_errors(found.process.parameters))
-    )
+    return replace(found, process=found.process.without_errors())
 
 
 def _unseen(fits: WindowFit, model: Candidate) -> float:

@@ -25,6 +25,7 @@ from ....numerics.output_error.any_input.stretch import WHITE
 from ....numerics.output_error.result import (
     Followed,
     OutputErrorEstimate,
+    ProcessEstimate,
     Residual,
     StructureFit,
 )
@@ -227,7 +228,7 @@ def _estimate(result: OutputErrorFit, scales: Scales, found: ActuatedFit) -> Out
         followed=Followed(complete, complete, structure, complete),
         profile=profile,
         latest=result.estimate.latest,
-        process=result.estimate.process._replace(parameters=parameters),
+        process=ProcessEstimate(lambda: parameters),
         static=static,
         load=result.data.load,
     )

@@ -143,8 +143,10 @@ def fit_lags(data: SampledData, requested: Requested) -> tuple[SampledWindow, Ou
         curves[chosen.structure],
     )  # fmt: skip
     form = forms[fitted.index(fits.candidates[chosen.structure])]
-    lags = with_profiled_lags(problem, scales, form, found.process.parameters, fits.error_variance)
-    process = ProcessEstimate(lags, form if requested.forms else None)
+    setting = problem, scales, form, found.process.parameters, fits.error_variance
+    process = ProcessEstimate(
+        partial(with_profiled_lags, *setting), form if requested.forms else None
+    )
     plain = {s.plain: _plain(one) for s, one in fits.candidates.items()}
     plainly = replace(fits, candidates=plain, criterion=fits.criteria(plain))
     better = _better(part, min(fitted, key=partial(_value, fits)), within)
