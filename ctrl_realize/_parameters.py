@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ._facts import facts
 from ._wording import number_within, numbers_alike
 from .errors import OptionError
 from .numerics.constants import Z_95
@@ -20,7 +19,23 @@ if TYPE_CHECKING:
 SECONDS: dict[str, float] = {"ms": 1e-3, "s": 1.0, "min": 60.0, "h": 3600.0, "day": 86400.0}
 """Seconds in a unit of time of results."""
 
-_LABELS: dict[str, str] = facts("parameters.toml")
+_LABELS = {
+    "gain": "gain",
+    "dead_time": "dead time",
+    "lag": "lag",
+    "pair_time": "time constant of the pair",
+    "pair_damping": "damping of the pair",
+    "lead": "lead",
+    "zero_time": "time constant of the zeros",
+    "zero_damping": "damping of the zeros",
+    "slew_rate": "slew rate",
+    "slew_rate_opening": "slew rate opening",
+    "slew_rate_closing": "slew rate closing",
+    "dead_band": "dead band",
+    "travel_low": "lower end of travel",
+    "travel_high": "upper end of travel",
+    "flow_at": "flow at",
+}
 
 _LETTERS = {"dead": "L", "lag": "T", "pair_time": "Tw", "lead": "Tz", "zero_time": "Tz"}
 """Beginning of a time's name -> its letter beside a transfer function, as in MATLAB's process

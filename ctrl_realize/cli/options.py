@@ -5,28 +5,14 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Any, TypeAlias, cast
+from typing import Annotated, Any, TypeAlias
 
 import typer
 
 from .._facts import facts
 from .arguments import option_of, options_of
 
-_TOLD = facts("cli/options.toml")
-
-
-def _option(name: str, **more: Any) -> Any:
-    """Option of typer as the table tells it."""
-    row, made = dict(_TOLD[name]), cast("Any", typer.Option)
-    return made(*row.pop("option", ()), **row, **more)
-
-
-def _form(name: str | None) -> str | None:
-    if name is not None and name.startswith("-"):  # the name was left out, and this is an option
-        raise typer.BadParameter(
-            f"expected a form, such as ideal or siemens_pid_compact; got {name}"
-        )
-    return name
+_OPTION = typer.Option
 
 
 Files = Annotated[
@@ -37,21 +23,68 @@ MaybeFiles = Annotated[
     list[Path] | None,
     typer.Argument(help="Records, a measured frequency response, or saved work."),
 ]
-NoBrowser = Annotated[bool, _option("no_browser")]
-Port = Annotated[int, _option("port")]
-Folder = Annotated[Path, _option("folder")]
-MaybeFolder = Annotated[Path | None, _option("maybe_folder")]
-Overwrite = Annotated[bool, _option("overwrite")]
-NoReport = Annotated[bool, _option("no_report")]
-Frf = Annotated[Path | None, _option("frf")]
-Joint = Annotated[bool, _option("joint")]
-Separate = Annotated[bool, _option("separate")]
-Jobs = Annotated[int | None, _option("jobs")]
-Require = Annotated[list[str] | None, _option("require")]
-Tune = Annotated[str | None, _option("tune", callback=_form)]
-Json = Annotated[str | None, _option("json")]
-Limit = Annotated[list[str] | None, _option("limit")]
-SetPoint = Annotated[str | None, _option("set_point")]
+NoBrowser = Annotated[bool, _OPTION("--no-browser", help="Say the address, and open no browser.")]
+Port = Annotated[int, _OPTION("--port", min=0, max=65535, help="Port; 0: a free one.")]
+Folder = Annotated[Path, _OPTION("--output", "-o", help="Output folder.")]
+MaybeFolder = Annotated[
+    Path | None, _OPTION("--output", "-o", help="Output folder for table, report and figures.")
+]
+Overwrite = Annotated[
+    bool, _OPTION("--overwrite", help="Overwrite the results of another run in the folder.")
+]
+
+# how to identify
+Frf = Annotated[Path | None, _OPTION(help="Measured frequency response to compare the model with.")]
+Joint = Annotated[
+    bool, _OPTION("--joint", help="Fit one model to all records, and to the --frf if given.")
+]
+Separate = Annotated[
+    bool, _OPTION("--separate", help="Treat the records as different plants: one folder each.")
+]
+Jobs = Annotated[
+    int | None,
+    _OPTION(help="Number of processes; -1: all cores. Default: all cores for 12 records or more."),
+]
+Require = Annotated[
+    list[str] | None,
+    _OPTION(help="Exit with 4 unless the verdict on dead-time, gain or tuning is good; "
+            "repeatable."),
+]  # fmt: skip
+NoReport = Annotated[
+    bool, _OPTION("--no-report", help="Write models and tables alone, without report and figures.")
+]
+
+
+def _form(name: str | None) -> str | None:
+    if name is not None and name.startswith("-"):  # the name was left out, and this is an option
+        raise typer.BadParameter(
+            f"expected a form, such as ideal or siemens_pid_compact; got {name}"
+        )
+    return name
+
+
+Tune = Annotated[
+    str | None,
+    _OPTION(metavar="FORM", callback=_form, help="Tune a PI, too, and tell what to enter in "
+            "this form, such as siemens_pid_compact; see the command tune."),
+]  # fmt: skip
+
+Json = Annotated[
+    str | None,
+    _OPTION("--json", metavar="FILE", help="Write model, verdicts and flags as JSON; -: to "
+            "stdout, with everything else on stderr."),
+]  # fmt: skip
+
+# how to judge a valve
+Limit = Annotated[
+    list[str] | None,
+    _OPTION(help="Permitted values, such as t86=0.5, gain=0.9:1.1, t86@2=0.4 (steps of 2 %); "
+            "repeatable."),
+]  # fmt: skip
+# how to judge a loop
+SetPoint = Annotated[
+    str | None, _OPTION("--set-point", help="Column of the set point, if it moves.")
+]
 
 Given: TypeAlias = dict[str, Any]
 """Arguments of Python for the options of a group that were given, see `files.with_options`."""
@@ -65,7 +98,10 @@ GROUPS: dict[str, dict[str, Any]] = {
     ),
     "tests": {
         **options_of("io/records.py", "read_records"),
-        "split": Annotated[bool, _option("split")],
+        "split": Annotated[
+            bool, _OPTION("--split", help="A file holds several tests: split it where its time "
+                          "jumps."),
+        ],
     },
     "record": _RECORD,
     "valve_test": {name: option for name, option in _RECORD.items() if name != "missing"},
@@ -79,11 +115,22 @@ GROUPS: dict[str, dict[str, Any]] = {
         name: _RECORD.get(name, option) for name, option in _FREQUENCY_RESPONSE.items()
     },
     "tuned": {
-        **{name: Annotated[str | None, _option(name)] for name in ("rule", "kind")},
+        "rule": Annotated[
+            str | None,
+            _OPTION(help="simc (default: as fast as is robust), lambda, imc, amigo, "
+                    "ziegler_nichols, cohen_coon, "
+                    "tyreus_luyben, optimal, ...; see design.pid."),
+        ],
+        "kind": Annotated[str | None, _OPTION(help="P, PI (default), PD or PID.")],
         **options_of("design/tuning/pid.py", "pid", "method dt name"),
     },
     "entered": {
-        "form": Annotated[str | None, _option("form")],
+        "form": Annotated[
+            str | None,
+            _OPTION(help="Form in which the numbers are entered: ideal (default), series, "
+                    "parallel, proportional_band, siemens_pid_compact, rockwell_pide_dependent, "
+                    "emerson_deltav_series, ...; see design.pid_forms."),
+        ],
         **options_of("design/tuning/delivery.py", "as_form", "time_unit"),
     },
     "compared": options_of("frequency/compare.py", "compare_frf"),
