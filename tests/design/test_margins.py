@@ -157,6 +157,14 @@ def test_continuous_first_order_with_dead_time_has_its_closed_form():
     ).stable
 
 
+@pytest.mark.parametrize("dt", [0, 0.1])
+def test_a_loop_of_gain_zero_is_stable_with_every_gain_and_delay(dt):
+    found = cr.design.margins(ct.tf([0.0], [1.0, 0.5], dt) if dt else 0 * cr.delay(0.3))
+    assert found.stable
+    assert found.modulus_margin == 1
+    assert found.gain_margin == found.delay_margin == np.inf
+
+
 @pytest.mark.parametrize("apart", [False, True])
 @pytest.mark.parametrize("unit", [1e-6, 1.0, 1e4, 1e6])
 def test_a_loop_with_two_integrators_is_stable_in_every_unit_of_time(unit, apart):

@@ -161,7 +161,8 @@ def unit_crossings(curve: Curve, grid: FloatArray, values: ComplexArray) -> Floa
 def negative_axis_crossings(curve: Curve, grid: FloatArray, values: ComplexArray) -> FloatArray:
     """Frequencies where the curve crosses the negative real axis (phase crossovers), increasing."""
     below = values.imag < 0
-    unit = values / np.abs(values)
+    with np.errstate(invalid="ignore"):  # a loop of gain 0 has no direction
+        unit = values / np.abs(values)
     left = (unit[1:] + unit[:-1]).real < 0
     at = np.flatnonzero((below[1:] != below[:-1]) & left)
 
