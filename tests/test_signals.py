@@ -191,6 +191,16 @@ def test_a_table_may_have_its_time_in_a_column_and_missing_values():
         (frame.loc[[0, 3, 1]], {"output": "u", "time": "when"}, TimeAxisError, "jumps back"),
         (bad, {"output": "y", "time": "when"}, DataError, "to_numeric"),
         (bad.set_index("y"), {"output": "u"}, DataError, "to_datetime"),
+        (frame, {"output": "y"}, OptionError, "counts its rows; give time=, .* 'when', 'u', 'y'"),
+        (frame[["u", "y"]][1:], {"output": "y"}, OptionError, "counts its rows"),
+        (frame.rename_axis("time_ms"), {"output": "y"}, OptionError, "'time_ms'; numbers are sec"),
+        (frame, {"output": "y", "time": "t [min]"}, OptionError, "the columns 'when'"),
+        (
+            frame.assign(**{"t [min]": [0, 1, 2, 3]}),
+            {"output": "y", "time": "t [min]"},
+            OptionError,
+            r"'t \[min\]'; numbers are seconds: convert and rename min",
+        ),
         (U, {"output": "y"}, DataError, "got a ndarray"),
     ):
         with pytest.raises(error, match=match):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -12,6 +13,10 @@ from ..numerics.arrays import FloatArray
 
 if TYPE_CHECKING:
     import pandas as pd
+
+
+_NO_SECONDS = re.compile(r"[ _/(\[](ms|[uµμ]s|ns|min|minutes|h|hours|days?)[)\]]?$")
+"""A name of a time that ends in another unit than s."""
 
 
 def signals_of_frame(
@@ -30,6 +35,7 @@ def signals_of_frame(
             converts = "; frame.to_pandas() converts it"
         raise DataError(f"expected a pandas DataFrame, got a {kind}{converts}")
     stamps = frame.index if time is None else _column(frame, time, "time")
+    _refuse_others(stamps, frame)
     inputs, outputs = _labels(input, "input"), _labels(output, "output")
     u, y = _signals(frame, inputs, "input"), _signals(frame, outputs, "output")
     return _seconds(stamps), u, y, inputs, outputs
@@ -82,6 +88,24 @@ def _numbers(column: pd.Series[Any], label: str) -> FloatArray:
             f"column {label!r} holds {column.dtype} values that are not numbers ({error}); convert "
             "it, for instance with pandas.to_numeric(column, errors='coerce')"
         ) from error
+
+
+def _refuse_others(stamps: Any, frame: pd.DataFrame) -> None:
+    """Refuse numbers that are no seconds: another unit in their name, or a count of the rows."""
+    if stamps.dtype.kind not in "iuf":
+        return
+    if found := _NO_SECONDS.search(str(stamps.name)):
+        raise OptionError(
+            f"the time of the table is {stamps.name!r}; numbers are seconds: convert and rename "
+            f"{found[1]}, or give dates or durations (pandas.to_timedelta)"
+        )
+    counts = stamps.name is None and stamps.dtype.kind != "f" and len(stamps) > 1
+    if counts and np.median(np.diff(stamps)) == 1:
+        names = ", ".join(repr(name) for name in list(frame.columns)[:20])
+        raise OptionError(
+            f"the index of the table counts its rows; give time=, one of its columns {names}, or "
+            "an index in s, such as frame.set_axis(0.5 * np.arange(len(frame)))"
+        )
 
 
 def _seconds(stamps: Any) -> FloatArray:

@@ -68,8 +68,8 @@ class RecordConversions(Drawable):
         input, output : str or sequence of str
             Columns of the signals; their names become the labels.
         time : str, optional
-            Column of time; default: the index. Dates (a `DatetimeIndex`) and durations are
-            counted in s from the first row, numbers are s.
+            Column of time; default: the index, unless it counts the rows. Dates (a
+            `DatetimeIndex`) and durations are counted in s from the first row, numbers are s.
         reference : str or sequence of str, optional
             Columns of the set points, one for each output.
         **options
@@ -79,7 +79,8 @@ class RecordConversions(Drawable):
         Raises
         ------
         OptionError
-            The table has no such column.
+            The table has no such column, an index that counts its rows, or a time that its name
+            says to be in another unit than s, such as ``time_ms``.
         DataError, TimeAxisError
             As for `Record`.
 
