@@ -267,3 +267,14 @@ def test_a_counter_that_starts_again_is_named_and_joined(tmp_path):
         cr.read_record(path, wrap=1024, missing="keep")
     with pytest.raises(OptionError, match="wrap"):
         cr.read_record(path, wrap=-1)
+
+
+@pytest.mark.parametrize("form", ["%Y-%m-%d %H:%M:%S UTC", "%Y-%m-%dT%H:%M:%S.%f GMT"])
+def test_the_zone_of_universal_time_may_be_in_words(tmp_path, form):
+    path = tmp_path / "a.csv"
+    t = 60.0 * np.arange(300)
+    stamps = pd.Timestamp("2025-03-10 09:00") + pd.to_timedelta(t, unit="s")
+    rows = [f"{at};{k % 7};{k}" for k, at in enumerate(stamps.strftime(form))]
+    path.write_text("\n".join(["Timestamp;u;y", *rows]) + "\n")
+    np.testing.assert_array_equal(cr.read_record(path).time, t)
+    np.testing.assert_array_equal(cr.read_record(path, time_zone="Europe/Berlin").time, t)

@@ -52,6 +52,7 @@ def stamps_of(cells: list[str], time_format: str | None) -> Dates:
     """
     if time_format is not None:
         return Dates(_parsed(cells, time_format), time_format)
+    cells = [re.sub(r" (UTC|GMT)$", "", cell) for cell in cells]  # as stamps without zone are read
     stamps = _parsed(cells, "ISO8601")
     if not np.isnat(stamps).all():
         return Dates(stamps, "ISO 8601")
