@@ -145,3 +145,12 @@ def test_performance_in_continuous_time_is_the_limit_of_short_samples():
     for name in ("setpoint_error", "load_error", "settling_time"):
         # half a sample of the hold, of some 60
         assert getattr(continuous, name) == pytest.approx(getattr(sampled, name), rel=0.03)
+
+
+def test_the_setpoint_error_in_continuous_time_has_its_closed_form():
+    # L = exp(-tau s) / (4 tau s): no overshoot, since the gain of 1/4 is below 1/e, so that the
+    # integral of the absolute error is that of the error, 4 tau
+    plant = ct.tf([1], [0.08, 1]) * cr.delay(0.029)
+    found = design.performance(plant, design.PIDController(0.08 / 4 / 0.029, 0.08))
+    assert found.overshoot == 0
+    assert found.setpoint_error == pytest.approx(4 * 0.029, rel=3e-4)
