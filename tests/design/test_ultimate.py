@@ -68,6 +68,17 @@ def test_a_sign_that_is_given_stands_above_that_of_the_static_gain():
     assert found.period == pytest.approx(right.period, rel=0.02)
 
 
+@pytest.mark.parametrize(("unit", "name"), [(1e-6, "µs"), (1e-3, "ms"), (1.0, "s")])
+def test_times_are_told_in_a_unit_of_their_size(unit, name):
+    # an integrator: the period is four dead times and two samples of the hold
+    plant = design.ProcessModel(1.0 / unit, 0.0, 5.0 * unit, integrating=True).system(2.0 * unit)
+    told = design.ultimate(plant)
+    assert f"period 24 {name}, behind a hold of 2 {name}>" in repr(told)
+    rule = design.compare_pid(plant, ["simc"], ["PI"])
+    error = rule.performance[0].setpoint_error / unit
+    assert f"set-point {error:.3g} {name}, overshoot" in rule.report()
+
+
 def test_intervals_are_the_extremes_over_the_plausible_models():
     heater = cr.bench.heater()
     sys = cr.identify(heater.step_record(rng=1))

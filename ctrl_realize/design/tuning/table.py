@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from ..._checks import one_of
+from ..._wording import in_time, times_in
 from ...delayed import DelayedStateSpace
 from ...errors import OptionError
 from ...numerics.blas_threads import single_threaded
@@ -127,16 +128,16 @@ class PIDComparison(Result):
     _heading = "PID rules"
 
     def _rows(self) -> list[tuple[str, str]]:
-        return [
-            (
-                f"{c.kind} {c.rule}",
-                f"Ms {m.ms:.3g}, phase {m.phase_margin:.3g} deg, IAE load {p.load_error:.3g} s, "
-                f"set-point {p.setpoint_error:.3g} s, overshoot {100 * p.overshoot:.3g} %"
-                if m.stable
-                else "UNSTABLE",
+        rows = []
+        for c, m, p in zip(self.controllers, self.margins, self.performance, strict=True):
+            with times_in(c.time_unit):
+                load, setpoint = in_time(p.load_error), in_time(p.setpoint_error)
+            told = (
+                f"Ms {m.ms:.3g}, phase {m.phase_margin:.3g} deg, IAE load {load}, "
+                f"set-point {setpoint}, overshoot {100 * p.overshoot:.3g} %"
             )
-            for c, m, p in zip(self.controllers, self.margins, self.performance, strict=True)
-        ]
+            rows.append((f"{c.kind} {c.rule}", told if m.stable else "UNSTABLE"))
+        return rows
 
     def _notes(self) -> list[str]:
         refused = [f"{kind} {rule}: {reason}" for rule, kind, reason in self.refused]

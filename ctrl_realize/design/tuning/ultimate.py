@@ -63,7 +63,7 @@ class UltimateGain(Result):
     time_unit: str = "s"
 
     def _held(self) -> str:
-        return f"behind a hold of {self.dt:.4g} s" if self.dt else "continuous"
+        return f"behind a hold of {in_time(self.dt, 4)}" if self.dt else "continuous"
 
     _heading = "Ultimate gain and period"
 
@@ -81,7 +81,8 @@ class UltimateGain(Result):
         return rows
 
     def __repr__(self) -> str:
-        return f"<UltimateGain: gain {self.gain:.4g}, period {self.period:.4g} s, {self._held()}>"
+        period = in_time(self.period, 4)
+        return f"<UltimateGain: gain {self.gain:.4g}, period {period}, {self._held()}>"
 
 
 @single_threaded
