@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from typing import Any, NamedTuple, NoReturn
 
 import numpy as np
@@ -188,7 +189,10 @@ def _parsed_dates(
     elif time_format is None and all(re.fullmatch(_CLOCK, cell) for cell in cells[:3]):
         return _parsed_times_of_day(table, index, cells, unit), ""
     try:
-        stamps, form, doubt = stamps_of(cells, time_format)
+        if time_format is None and all(re.match(r"-?\d+ days?\b", cell) for cell in cells[:3]):
+            stamps, form, doubt = _durations(cells), "0 days 00:00:00", ""
+        else:
+            stamps, form, doubt = stamps_of(cells, time_format)
     except OptionError as error:
         raise OptionError(f"{table.path}: {table.title(index)}: {error}") from error
     bad = np.isnat(stamps)
@@ -202,6 +206,14 @@ def _parsed_dates(
     return stamps, doubt
 
 
+def _durations(cells: Sequence[str]) -> np.ndarray[Any, Any]:
+    """Durations as pandas writes them, NaT where a cell is none."""
+    import pandas as pd
+
+    found = pd.to_timedelta(pd.Series(cells, dtype=str), errors="coerce")
+    return np.asarray(found.to_numpy(dtype="timedelta64[ns]"))
+
+
 def _are_times_of_day(cells: list[str]) -> bool:
     return all(re.fullmatch(rf"({_CLOCK})( ?[AaPp][Mm])?", cell) for cell in cells[:3])
 
@@ -213,8 +225,6 @@ def _parsed_times_of_day(
 
     ``12:34`` may be hours and minutes, or minutes and seconds: `unit` is that of the first number.
     """
-    import pandas as pd
-
     shorts = [bool(re.fullmatch(_SHORT, cell)) for cell in cells]
     first = _FIRST.get(unit.lower(), plain_unit(unit))
     if any(shorts) and not all(shorts):
@@ -229,8 +239,7 @@ def _parsed_times_of_day(
             "time_unit='min', the unit of the first field"
         )
     ends = ("", "") if not any(shorts) else ("00:", "") if first == "min" else ("", ":00")
-    whole = pd.Series([ends[0] + cell + ends[1] for cell in cells], dtype=str)
-    stamps = pd.to_timedelta(whole, errors="coerce").to_numpy(dtype="timedelta64[ns]")
+    stamps = _durations([ends[0] + cell + ends[1] for cell in cells])
     if np.isnat(stamps).any():
         row = int(np.argmax(np.isnat(stamps)))
         raise DataError(

@@ -278,3 +278,17 @@ def test_the_zone_of_universal_time_may_be_in_words(tmp_path, form):
     path.write_text("\n".join(["Timestamp;u;y", *rows]) + "\n")
     np.testing.assert_array_equal(cr.read_record(path).time, t)
     np.testing.assert_array_equal(cr.read_record(path, time_zone="Europe/Berlin").time, t)
+
+
+@pytest.mark.parametrize("start", ["0 s", "1 days 23:59:30", "-2 days"])
+def test_durations_are_read_as_pandas_writes_them(tmp_path, start):
+    t = 0.5 * np.arange(200)
+    frame = pd.DataFrame({"u": np.arange(200) % 7, "y": np.arange(200)})
+    frame.index = pd.Index(pd.Timedelta(start) + pd.to_timedelta(t, unit="s"), name="time")
+    frame.to_csv(tmp_path / "a.csv")
+    record = cr.read_record(tmp_path / "a.csv")
+    np.testing.assert_allclose(record.time - record.time[0], t, rtol=0, atol=1e-9)
+    text = (tmp_path / "a.csv").read_text().splitlines()
+    (tmp_path / "a.csv").write_text("\n".join([*text[:50], "0 days soon,1,2", *text[50:]]) + "\n")
+    with pytest.raises(DataError, match=r"line 51: '0 days soon' is neither .* 0 days 00:00:00"):
+        cr.read_record(tmp_path / "a.csv")
