@@ -181,6 +181,10 @@ def test_a_loop_with_two_integrators_is_stable_in_every_unit_of_time(unit, apart
     assert found.stable
     assert np.allclose(found.phase_margin, np.degrees(phase), rtol=1e-9)
     assert np.allclose(found.delay_margin, unit * phase / omega, rtol=1e-9)
+    name = "µs" if unit < 1 else "s"
+    number, told = repr(found).removesuffix(">").rpartition("delay ")[2].split()
+    assert told == name
+    assert float(number) * (1e-6 if unit < 1 else 1) == pytest.approx(found.delay_margin, rel=1e-3)
 
 
 @pytest.mark.parametrize("delay", [0, 37, 300])

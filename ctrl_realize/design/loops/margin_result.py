@@ -134,7 +134,7 @@ class Margins(Result):
         state = "stable" if self.stable else "unstable"
         return (
             f"<Margins {state}: gain {self.gain_margin:.4g}, phase {self.phase_margin:.4g} deg, "
-            f"modulus {self.modulus_margin:.4g}, delay {self.delay_margin:.4g} s>"
+            f"modulus {self.modulus_margin:.4g}, delay {in_time(self.delay_margin, 4)}>"
         )
 
 

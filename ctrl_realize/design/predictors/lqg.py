@@ -114,7 +114,7 @@ def lqg(
     >>> plant = cr.delayed_ss(ct.ss([[1.02]], [[1.0]], [[0.1]], [[0.0]], 0.01), 10)
     >>> controller = cr.design.lqg(plant, 1.0, 1.0, 1.0, 1.0)
     >>> cr.design.margins(plant, controller)
-    <Margins stable: gain 2.323, phase 44.23 deg, modulus 0.5479, delay 0.138 s>
+    <Margins stable: gain 2.323, phase 44.23 deg, modulus 0.5479, delay 138 ms>
     """
     plant = delayed_system(system, "lqg", siso=False)
     check_sign(plant, "lqg")

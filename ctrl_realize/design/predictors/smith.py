@@ -158,7 +158,7 @@ def smith_predictor(
     >>> predictor.nstates                       # 1 + 1 + 10
     12
     >>> cr.design.margins(plant, predictor)
-    <Margins stable: gain 2.387, phase 64.42 deg, modulus 0.5772, delay 0.1622 s>
+    <Margins stable: gain 2.387, phase 64.42 deg, modulus 0.5772, delay 162.2 ms>
 
     In continuous time:
 

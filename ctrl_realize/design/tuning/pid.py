@@ -155,7 +155,7 @@ def pid(
     >>> plant = ct.tf([1], [0.08, 1]) * cr.delay(0.029)
     >>> controller = cr.design.pid(plant)
     >>> controller.check.margins
-    <Margins stable: gain 3.142, phase 61.35 deg, modulus 0.6287, delay 0.06211 s>
+    <Margins stable: gain 3.142, phase 61.35 deg, modulus 0.6287, delay 62.11 ms>
     """
     given = locals()
     options = TuningOptions(**{one.name: given[one.name] for one in fields(TuningOptions)})
