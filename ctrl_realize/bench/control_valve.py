@@ -325,20 +325,12 @@ class Valve:
             moved = self._motion.of_sine(
                 omega, self.sine_amplitude, _SINE_MEAN_MA, time, dead_times
             )
-            sweep.append(
-                tuple(
-                    recorded(
-                        self,
-                        time,
-                        current,
-                        mean_mm + moved[k % differing],
-                        generator,
-                        f"valve_sine_{point:03d}_{k + 1}",
-                        spikes=False,
-                    )
-                    for k in range(repeats)
-                )
-            )
+            records = []
+            for k in range(repeats):
+                name, position = f"valve_sine_{point:03d}_{k + 1}", mean_mm + moved[k % differing]
+                one = recorded(self, time, current, position, generator, name, spikes=False)
+                records.append(one)
+            sweep.append(tuple(records))
         return tuple(sweep)
 
     def _sine_time(self, frequency_hz: float, span: float) -> FloatArray:

@@ -10,7 +10,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .._checks import check_finite, numbers, one_of, positive, real, spelled_out
+from .._checks import check_finite, finite, numbers, one_of, positive, real, spelled_out
 from .._shown import html_card, text_card
 from .._wording import ASSUMED, in_time, shown_unit, times_in
 from ..errors import DataError, OptionError, TimeAxisError
@@ -354,21 +354,19 @@ class Record(RecordConversions):
         """
         levels = []
         for what, given, signal in (("input", input, self.input), ("output", output, self.output)):
-            level = numbers(given, f"the baseline of the {what}")
-            check_finite(level, f"the baseline of the {what}")
+            level = finite(given, f"the baseline of the {what}")
             if level.size != np.atleast_2d(signal).shape[0]:
                 raise DataError(
                     f"the baseline of the {what} has {level.size} values; expected one for each "
                     f"of the {np.atleast_2d(signal).shape[0]} signals"
                 )
             levels.append(level.reshape(signal[..., :1].shape))
+        aim = self.reference
         return self.__replace__(
             time=np.r_[self.time[0] - self.dt, self.time],
             input=np.concatenate([levels[0], self.input], axis=-1),
             output=np.concatenate([levels[1], self.output], axis=-1),
-            reference=None
-            if self.reference is None
-            else np.concatenate([self.reference[..., :1], self.reference], axis=-1),
+            reference=None if aim is None else np.concatenate([aim[..., :1], aim], axis=-1),
         )
 
 

@@ -87,14 +87,8 @@ class DelayLineController(ShownSystem, DelayOperators):
         pulses: Pulses | None = None,
     ) -> None:
         n, d = E.shape
-        self._begin(
-            [f"x[{i}]" for i in range(n)],
-            n + d,
-            float(dt),
-            name=name,
-            inputs=[inputs],
-            outputs=[outputs],
-        )
+        states = [f"x[{i}]" for i in range(n)]
+        self._begin(states, n + d, float(dt), name=name, inputs=[inputs], outputs=[outputs])
         self._parts = tuple(read_only(M) for M in (A, B, C, D, E, h))
         self._pulses = None if pulses is None else tuple(read_only(M) for M in pulses)
         self._schur = schur_form(self._parts[0])

@@ -108,11 +108,8 @@ def chosen_model(
         # more than any model can hold are refused when it is made
         used = round(min(used / dt, 1e9)) * dt
         if abs(used - best.dead_time) > 1e-9 * dt:
-            flags.append(
-                flagged(
-                    "dead_time_rounded", used=in_time(used, 5), dead_time=in_time(best.dead_time, 5)
-                )
-            )
+            exact = in_time(best.dead_time, 5)
+            flags.append(flagged("dead_time_rounded", used=in_time(used, 5), dead_time=exact))
     result = FRFFit(
         order=n,
         relative_degree=r,

@@ -51,12 +51,9 @@ def by_scan(
     if order is None:
         # A Hankel matrix of few samples allows few orders.
         room = (impulse.n_samples - 1 - reach) // 2
+        tried = [n for n in SCANNED_ORDERS if n <= room] or [1]
         orders = scan_orders(
-            impulse,
-            [n for n in SCANNED_ORDERS if n <= room] or [1],
-            max_delay=reach,
-            samples=samples,
-            feedthrough=feedthrough,
+            impulse, tried, max_delay=reach, samples=samples, feedthrough=feedthrough
         )
         choices.append(f"order {orders.order}: its last singular value is {_against_noise(orders)}")
         system = orders.system()
@@ -85,12 +82,8 @@ def by_paper(
             f"(samples={behind}, max_delay={reach}), the record has {step.n_samples}; give "
             "samples= and max_delay=, or use method='scan', which adapts them to the record"
         )
-    impulse = impulse_from_step(
-        step,
-        cutoff_hz=SETTINGS.cutoff_hz if cutoff_hz == "auto" else cutoff_hz,
-        zero_phase=False,
-        difference="central",
-    )
+    cutoff = SETTINGS.cutoff_hz if cutoff_hz == "auto" else cutoff_hz
+    impulse = impulse_from_step(step, cutoff_hz=cutoff, zero_phase=False, difference="central")
     system = estimate_delay(
         impulse,
         SETTINGS.order if order is None else order,

@@ -45,11 +45,8 @@ def fit_tables(fit: ModelFit | None) -> list[Table]:
     if fit.parameters:
         above |= {*_IN_THE_HEADLINE, fit.interval_label}
     choices = [("choice", choice) for choice in fit._choices()]
-    return [
-        pairs(
-            "Details of the fit", [*[row for row in fit._rows() if row[0] not in above], *choices]
-        )
-    ]
+    rows = [row for row in fit._rows() if row[0] not in above]
+    return [pairs("Details of the fit", [*rows, *choices])]
 
 
 def parameter_table(fit: ModelFit) -> Table:

@@ -218,13 +218,8 @@ def _binned(
     inner = (middle > low + 0.05 * (high - low)) & (middle < high - 0.05 * (high - low))
     if not inner.any() or not np.isfinite(curves).any():
         return None
-    return StaticCurve(
-        middle[inner],
-        curves[0][inner],
-        curves[1][inner],
-        noise.of_mean(int(fewest)) * scale,
-        "ramp",
-    )
+    error = noise.of_mean(int(fewest)) * scale
+    return StaticCurve(middle[inner], curves[0][inner], curves[1][inner], error, "ramp")
 
 
 def _of_levels(steps: Sequence[StepMetrics], ranges: Ranges) -> StaticCurve | None:

@@ -207,11 +207,5 @@ def _line_factor(system: DelayLineController) -> Factor:
     def characteristic(w: ComplexArray, rate: float) -> ComplexArray:
         return np.asarray(ratio(w, rate) * paths(w)[1], dtype=np.complex128)
 
-    return Factor(
-        response,
-        characteristic,
-        0,
-        2 * system.line_length,
-        in_s_plane(system.inner_poles, dt),
-        system.inner_poles,
-    )
+    poles, hidden = system.inner_poles, 2 * system.line_length
+    return Factor(response, characteristic, 0, hidden, in_s_plane(poles, dt), poles)

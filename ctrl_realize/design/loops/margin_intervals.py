@@ -126,13 +126,9 @@ def _tube(loop: DataLoop, crossovers: FloatArray) -> _Tube:
     around = np.outer(crossovers, np.concatenate([1 - NEAR, [1.0], 1 + NEAR])).ravel()
     omega = np.unique(np.concatenate([grid, around]))
     omega = omega[(omega >= loop.omega[0]) & (omega <= loop.omega[-1])]
-    return _Tube(
-        omega,
-        loop(omega),
-        _spread(loop, omega),
-        upper_quantile(TAIL, loop.repeats),
-        upper_quantile(TAIL / (2 * loop.omega.size), loop.repeats),
-    )
+    tails = TAIL, TAIL / (2 * loop.omega.size)
+    one, every = (upper_quantile(tail, loop.repeats) for tail in tails)
+    return _Tube(omega, loop(omega), _spread(loop, omega), one, every)
 
 
 def _phase_margins(tube: _Tube) -> tuple[list[Stretch], list[Stretch]]:

@@ -98,13 +98,7 @@ def with_prior(
     if excited < wanted:
         flags = (flagged("partly_excited", excited=excited, lags=wanted),)
     single = [
-        NormalEquations(
-            equations.gram,
-            equations.cross[:, [a]],
-            equations.power[[a]][:, [a]],
-            equations.rows,
-            equations.freedom,
-        )
+        replace(equations, cross=equations.cross[:, [a]], power=equations.power[[a]][:, [a]])
         for a in range(p)
     ]
     fits = [fit_kernel(one, count, kernel) for one, kernel in zip(single, kernels, strict=True)]

@@ -136,18 +136,12 @@ def fit_joint(
         OutputErrorFit,
     )
     held = first.dt if hold == "zoh" else None
-    other = fit_of(
-        fit_frf(
-            frf,
-            None if pairs is None else sorted({n for n, _ in pairs}),
-            relative_degree=None if pairs is None else sorted({r for _, r in pairs}),
-            dt=held,
-            weighting=weighting,
-            hold=hold,
-            band_hz=band_hz,
-        ),
-        FRFFit,
+    n = None if pairs is None else sorted({n for n, _ in pairs})
+    r = None if pairs is None else sorted({r for _, r in pairs})
+    found = fit_frf(
+        frf, n, relative_degree=r, dt=held, weighting=weighting, hold=hold, band_hz=band_hz
     )
+    other = fit_of(found, FRFFit)
     latest = None if max_delay is None else max_delay * first.dt
     window, scales, data, time = _records(first, latest)
     lows, highs = zip(first.interval, other.interval, strict=True)

@@ -145,11 +145,5 @@ def filter_flags(impulse: ImpulseResponse) -> tuple[Flag, ...]:
     still = impulse.filter
     if still is None or still.zero_phase:
         return ()
-    return (
-        flagged(
-            "filter_delay",
-            filter=still,
-            samples=still.group_delay,
-            time=in_time(still.group_delay * impulse.dt),
-        ),
-    )
+    late = still.group_delay
+    return (flagged("filter_delay", filter=still, samples=late, time=in_time(late * impulse.dt)),)

@@ -57,11 +57,8 @@ def _aligned(markov: FloatArray, delays: IntArray) -> FloatArray:
     """Advance every channel by its delay; the length is what all channels have."""
     p, m, N = markov.shape
     length = N - int(delays.max())
-    return np.stack(
-        [
-            np.stack([markov[i, j, delays[i, j] : delays[i, j] + length] for j in range(m)])
-            for i in range(p)
-        ]
+    return np.array(
+        [[markov[i, j, delays[i, j] : delays[i, j] + length] for j in range(m)] for i in range(p)]
     )
 
 

@@ -92,11 +92,8 @@ def freed(data: JointData, joint: Candidate, key: PointsEffect) -> tuple[float, 
     ratio, later, model = 1.0, 0.0, joint
     wide = replace(records, regressors=np.pad(records.regressors, ((0, 0), (0, 1))))
     for _ in range(_TURNS):
-        turned = replace(
-            points,
-            response=points.response * np.exp(points.s * later) / ratio,
-            weight=points.weight * abs(ratio),
-        )
+        response = points.response * np.exp(points.s * later) / ratio
+        turned = replace(points, response=response, weight=points.weight * abs(ratio))
         alone = turned.problem
         common = evaluate(with_rows(records, alone), model.structure, model.parameters[None])
         rows = respond(alone.drive, alone.known, common.numerator[0], model.parameters)

@@ -140,13 +140,8 @@ def median_jumps(values: FloatArray, width: int) -> FloatArray:
     for start in range(0, values.size, _PIECE):
         stop = min(start + _PIECE, values.size)
         part = values[max(start - width, 0) : stop + width]
-        padded = np.concatenate(
-            [
-                np.full(max(width - start, 0), values[0]),
-                part,
-                np.full(max(stop + width - values.size, 0), values[-1]),
-            ]
-        )
+        lacking = max(width - start, 0), max(stop + width - values.size, 0)
+        padded = np.pad(part, lacking, mode="edge")
         before, after = _side_medians(padded, width)
         jump[start:stop] = after - before
     return jump

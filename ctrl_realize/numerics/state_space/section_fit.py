@@ -118,16 +118,8 @@ def fit_sections(
     """
     known = [np.isfinite(one.y) for one in data]
     counts = np.sum([k.sum(axis=1) for k in known], axis=0).astype(np.float64)
-    spread = (
-        np.sum(
-            [
-                np.nansum((one.y - np.nanmean(one.y, axis=1, keepdims=True)) ** 2, axis=1)
-                for one in data
-            ],
-            axis=0,
-        )
-        / counts
-    )
+    moves = [one.y - np.nanmean(one.y, axis=1, keepdims=True) for one in data]
+    spread = np.sum([np.nansum(move**2, axis=1) for move in moves], axis=0) / counts
     floor = _EXACT**2 * spread
     model = _inside(start, _FROM_OUTSIDE)
     model = model if feedthrough else replace(model, D=np.zeros_like(model.D))

@@ -98,13 +98,8 @@ def parameter_change(
     spread = np.sum((turned / singular[:, None]) ** 2, axis=0) / scale**2
     errors = np.sqrt(variance * spread)
     found = np.linalg.lstsq(plain / scale, residual, rcond=1e-9)[0] / scale
-    return ParameterChange(
-        found[1::3],
-        errors[1::3],
-        found[2::3],
-        errors[2::3],
-        float(fdtrc(3 * (used.size - 1), freedom, max(ratio, 0.0))),
-    )
+    chance = float(fdtrc(3 * (used.size - 1), freedom, max(ratio, 0.0)))
+    return ParameterChange(found[1::3], errors[1::3], found[2::3], errors[2::3], chance)
 
 
 def _derivatives(fitted: FloatArray, rows: IntArray | None) -> tuple[FloatArray, FloatArray]:

@@ -102,14 +102,8 @@ def loop_data(loop: Any, pv: Any, sp: Any, dt: Any) -> LoopData:
         name: locked(np.interp(place[first:last], place[known], each[known]))
         for name, each in signals.items()
     }
-    return LoopData(
-        cut["op"],
-        cut["pv"],
-        cut.get("sp"),
-        step,
-        size - (last - first),
-        int(np.sum(~good[first:last])),
-    )
+    left_out, filled = size - (last - first), int(np.sum(~good[first:last]))
+    return LoopData(cut["op"], cut["pv"], cut.get("sp"), step, left_out, filled)
 
 
 def _without_short_gaps(good: np.ndarray) -> np.ndarray:
