@@ -187,14 +187,9 @@ class FRFAlgebra(ct.FrequencyResponseData):  # type: ignore[misc]  # control is 
             # A mixture of channels has another coherence; a gain of zero has none.
             plain = exact.is_scalar and bool(np.all(exact.values))
             coherence, hold = kept.coherence if plain else None, kept.hold
-        return self._made(
-            "a product",
-            matmul(one.values, two.values),
-            matmul(one.spread, power(two.values)) + matmul(power(one.values), two.spread),
-            (one, two),
-            hold,
-            coherence,
-        )
+        spread = matmul(one.spread, power(two.values)) + matmul(power(one.values), two.spread)
+        values = matmul(one.values, two.values)
+        return self._made("a product", values, spread, (one, two), hold, coherence)
 
     def __truediv__(self, other: Any) -> Any:
         """Divide by one channel."""

@@ -161,13 +161,10 @@ def measured_points(frf: Any) -> MeasuredPoints:
         None if beside is None else np.reshape(beside, -1)[order]
         for beside in ((frf.coherence, frf.std) if measured else (None, None))
     )
-    return MeasuredPoints(
-        np.asarray(frf.omega, dtype=np.float64)[order] / (2 * np.pi),
-        np.asarray(frf.frdata[0, 0], dtype=np.complex128)[order],
-        coherence,
-        std,
-        frf.repeats if measured else None,
-    )
+    frequency_hz = np.asarray(frf.omega, dtype=np.float64)[order] / (2 * np.pi)
+    response = np.asarray(frf.frdata[0, 0], dtype=np.complex128)[order]
+    repeats = frf.repeats if measured else None
+    return MeasuredPoints(frequency_hz, response, coherence, std, repeats)
 
 
 def check_single_channel(system: Any, what: str) -> None:

@@ -120,17 +120,14 @@ def read_frf(
     table = read_table(path, TextOptions.among(given), variable=variable, max_bytes=max_bytes)
     columns = _columns(table, given)
     check_lengths(table, columns.values())
-    coherence_values, std_values = (
+    coherences, stds = (
         table.numbers(columns[key]) if key in columns else None for key in ("coherence", "std")
     )
     try:
-        return MeasuredFRF(
-            _response(table, columns, units),
-            _frequency_hz(table, columns["frequency"], units["frequency"]),
-            coherence=coherence_values,
-            std=std_values,
-            name=Path(path).stem if name is None else name,
-        )
+        values = _response(table, columns, units)
+        points = _frequency_hz(table, columns["frequency"], units["frequency"])
+        called = Path(path).stem if name is None else name
+        return MeasuredFRF(values, points, coherence=coherences, std=stds, name=called)
     except DataError as error:
         if str(error).startswith(str(table.path)):
             raise

@@ -208,12 +208,8 @@ def pairs(
     >>> [row.cells for row in table.rows]
     [('shaker', '4.2 kg'), ('room', '21 °C')]
     """
-    return Table(
-        title,
-        tuple(Row(tuple(row)) for row in rows),
-        kinds=("label", "mono" if mono else "text"),
-        folded=folded,
-    )
+    kinds = ("label", "mono" if mono else "text")
+    return Table(title, tuple(Row(tuple(row)) for row in rows), kinds=kinds, folded=folded)
 
 
 def headed(key: str, rows: Iterable[Row], **words: Any) -> Table:

@@ -281,15 +281,9 @@ def _held_apart(form: DelayForm) -> DelayForm:
     for i in split:
         D[p + i, :m] = 0.0
     columns = [m + i for i in split]
-    D = np.vstack([D, D_more])
-    D = np.hstack([D, D[:, columns]])
-    return DelayForm(
-        form.A,
-        np.hstack([form.B, form.B[:, columns]]),
-        np.vstack([C, C_more]),
-        D,
-        (*form.delays, *(form.delays[i] for i in split)),
-    )
+    C, D = np.vstack([C, C_more]), np.vstack([D, D_more])
+    B, D = np.hstack([form.B, form.B[:, columns]]), np.hstack([D, D[:, columns]])
+    return DelayForm(form.A, B, C, D, (*form.delays, *(form.delays[i] for i in split)))
 
 
 def _not_held(form: DelayForm) -> FloatArray:

@@ -193,11 +193,9 @@ def smith_predictor(
         raise OptionError("remove_slow needs filter_time: the filter removes the slow poles")
     slow = _slow_poles(poles, d) if remove_slow else np.zeros(0)
     drop = np.concatenate([slow, [1.0]]) if integrating else slow
+    A, B, C = (np.asarray(M) for M in (core.A, core.B, core.C))
     removed, kept = split_modes(
-        np.asarray(core.A),
-        np.asarray(core.B),
-        np.asarray(core.C),
-        lambda z: bool(np.any(np.abs(z - drop) < 1e-9 * (1 + abs(z)))),
+        A, B, C, lambda z: bool(np.any(np.abs(z - drop) < 1e-9 * (1 + abs(z))))
     )
     *parts, pulses = _assemble(
         plant, primary, removed, kept, _filter(seconds, plant, slow, integrating)
@@ -209,14 +207,8 @@ def smith_predictor(
         "filter_time": seconds,
         "removed_poles": drop,
     }
-    made = SmithPredictor(
-        *parts,
-        float(plant.dt),
-        name=name,
-        outputs=plant.input_labels[0],
-        pulses=pulses,
-        design=design,
-    )
+    dt, output = float(plant.dt), plant.input_labels[0]
+    made = SmithPredictor(*parts, dt, name=name, outputs=output, pulses=pulses, design=design)
     advice = more_robust(filter_time, float(plant.dead_time))
     return made.verified("the Smith predictor", STABILIZE, advice)
 

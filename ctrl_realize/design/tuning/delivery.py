@@ -86,13 +86,9 @@ class Delivered:
         layout = LAYOUTS.get(form)
         if time_unit is None and layout is not None and layout.unit is None:
             time_unit = self.time_unit
-        return to_form(
-            self.ideal,
-            form,
-            Scaling(measured_range, output_range, time_unit),
-            gain_unit=self.gain_unit,
-            weights=None if setpoint_weight is None else (setpoint_weight, derivative_weight),
-        )
+        scaling = Scaling(measured_range, output_range, time_unit)
+        weights = None if setpoint_weight is None else (setpoint_weight, derivative_weight)
+        return to_form(self.ideal, form, scaling, gain_unit=self.gain_unit, weights=weights)
 
     def forms(self, **ranges: Any) -> pd.DataFrame:
         """List what to enter in each form: one row for each; arguments as for `as_form`.

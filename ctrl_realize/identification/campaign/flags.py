@@ -68,8 +68,8 @@ def _different_times(rows: Rows) -> Iterator[Flag]:
         known = values[np.isfinite(errors)]
         if chance < BY_CHANCE and np.ptp(known) > time_apart(float(np.median(known)), rows[0].dt):
             code = "records_differ.campaign" if times is dead_times else "lags_differ.campaign"
-            low, high = in_time(values.min()), in_time(values.max())
-            yield flagged(code, low=low, high=high, chi_square=statistic, chance=chance)
+            ends = {"low": in_time(values.min()), "high": in_time(values.max())}
+            yield flagged(code, **ends, chi_square=statistic, chance=chance)
 
 
 def _same_records(rows: Rows) -> Iterator[Flag]:

@@ -63,13 +63,8 @@ class DelayForm:
         """Keep some of the delays, in this order, with their inputs and outputs."""
         columns = [*range(self.inputs), *(self.inputs + i for i in keep)]
         rows = [*range(self.outputs), *(self.outputs + i for i in keep)]
-        return DelayForm(
-            self.A,
-            self.B[:, columns],
-            self.C[rows],
-            self.D[np.ix_(rows, columns)],
-            tuple(self.delays[i] for i in keep),
-        )
+        D, delays = self.D[np.ix_(rows, columns)], tuple(self.delays[i] for i in keep)
+        return DelayForm(self.A, self.B[:, columns], self.C[rows], D, delays)
 
 
 def static(D: FloatArray) -> DelayForm:

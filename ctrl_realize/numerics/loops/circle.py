@@ -17,7 +17,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from scipy.optimize import minimize_scalar
+from scipy.optimize import fminbound
 
 from ..arrays import ComplexArray, FloatArray, IntArray
 
@@ -134,10 +134,7 @@ def smallest_on_line(
     values = [function(float(x)) for x in grid]
     best = int(np.argmin(values))
     a, b = np.log(grid[max(best - 1, 0)]), np.log(grid[min(best + 1, points - 1)])
-    found = minimize_scalar(
-        lambda x: function(float(np.exp(x))),
-        bounds=(a, b),
-        method="bounded",
-        options={"xatol": 1e-4},
+    at, value, *_ = fminbound(
+        lambda x: function(float(np.exp(x))), a, b, xtol=1e-4, full_output=True, disp=0
     )
-    return float(np.exp(found.x)), float(found.fun)
+    return float(np.exp(at)), float(value)

@@ -25,7 +25,7 @@ References
 from __future__ import annotations
 
 import numpy as np
-from scipy.optimize import minimize_scalar
+from scipy.optimize import fminbound
 
 from ..arrays import FloatArray, IntArray
 from ..constants import VERY_STRONG
@@ -349,10 +349,5 @@ def _refine(values: FloatArray, frequency: float) -> float:
         return float(np.abs(starts[:-1] @ sums + starts[-1] * (turn[: rest.size] @ rest)))
 
     width = 1.0 / values.size
-    found = minimize_scalar(
-        lambda f: -power(f),
-        bounds=(frequency - width, frequency + width),
-        method="bounded",
-        options={"xatol": 1e-5 * width},
-    )
-    return float(found.x)
+    low, high = frequency - width, frequency + width
+    return float(fminbound(lambda f: -power(f), low, high, xtol=1e-5 * width))

@@ -22,7 +22,7 @@ from typing import Any, TypeAlias
 
 import numpy as np
 from scipy.linalg import expm
-from scipy.optimize import brentq, minimize_scalar
+from scipy.optimize import brentq, fminbound
 
 from ..arrays import FloatArray
 from .matrix_logarithm import principal_logarithm
@@ -249,13 +249,8 @@ def _roots_in_unit_interval(function: Callable[[float], float], scale: float) ->
     for i in np.flatnonzero((size[1:-1] <= size[:-2]) & (size[1:-1] <= size[2:])) + 1:
         sign = np.sign(values[i])
         low, high = float(grid[i - 1]), float(grid[i + 1])
-        found = minimize_scalar(
-            lambda x, s=sign: s * function(float(x)),
-            bounds=(low, high),
-            method="bounded",
-            options={"xatol": 1e-12},
-        )
-        nodes.append((float(found.x), function(float(found.x))))
+        least = float(fminbound(lambda x, s=sign: s * function(float(x)), low, high, xtol=1e-12))
+        nodes.append((least, function(least)))
     nodes.sort()
     roots = []
     for (a, at_a), (b, at_b) in pairwise(nodes):
