@@ -279,10 +279,6 @@ class FRFAlgebra(ct.FrequencyResponseData):  # type: ignore[misc]  # control is 
         """Append another response; the cross terms are zero."""
         one, two = self._operand(), self._needed(other)
         hold = one.hold if not two.measured else common_hold(one, two, "appended responses")
-        return self._made(
-            "appended responses",
-            blocks(one.values, two.values, self.omega.size),
-            blocks(one.spread, two.spread, self.omega.size),
-            (one, two),
-            hold,
-        )
+        values = blocks(one.values, two.values, self.omega.size)
+        spread = blocks(one.spread, two.spread, self.omega.size)
+        return self._made("appended responses", values, spread, (one, two), hold)

@@ -129,15 +129,13 @@ def load(name: str) -> Dataset:
     """
     info = _info(name)
     files = [(each, _located(info, each)) for each in info.files]
-    return Dataset(
-        info,
-        tuple(_read(info, each, file) for each, file in files if each.kind == "record"),
-        tuple(
-            read_frf(file, name=f"{info.name} {_spelled(each)}")
-            for each, file in files
-            if each.kind == "frf"
-        ),
+    records = tuple(_read(info, each, file) for each, file in files if each.kind == "record")
+    frfs = tuple(
+        read_frf(file, name=f"{info.name} {_spelled(each)}")
+        for each, file in files
+        if each.kind == "frf"
     )
+    return Dataset(info, records, frfs)
 
 
 def path(name: str, file: str | None = None) -> Path:

@@ -68,14 +68,8 @@ def interconnect(systems: Sequence[Any], *args: Any, **settings: Any) -> Any:
         ) from None
     loop = forms.through(loop, of_outputs + of_inputs @ gain, into)
     total = forms.parallel(loop, forms.static(of_inputs @ into))
-    return DelaySystem._joined(
-        total,
-        dt,
-        list(wired.input_labels),
-        list(wired.output_labels),
-        _state_names(systems),
-        name=wired.name,
-    )
+    labels = wired.input_labels, wired.output_labels
+    return DelaySystem._joined(total, dt, *labels, _state_names(systems), name=wired.name)
 
 
 def _state_names(systems: Sequence[Any]) -> list[str]:

@@ -146,13 +146,10 @@ class DelayedStateSpace(
             )
         input_names = signal_names(inputs, core.input_labels, "u")
         output_names = signal_names(outputs, core.output_labels, "y")
+        states = core.nstates + sum(before) + sum(behind)
+        called = None if name is None else system_name(name)
         self._begin(
-            core.nstates,
-            core.nstates + sum(before) + sum(behind),
-            core.dt,
-            inputs=input_names,
-            outputs=output_names,
-            name=None if name is None else system_name(name),
+            core.nstates, states, core.dt, inputs=input_names, outputs=output_names, name=called
         )
         self._core = named(
             core, input_names, output_names, core.state_labels, name=f"{self.name}_core"

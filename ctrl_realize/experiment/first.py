@@ -83,14 +83,9 @@ def known_from_fit(fit: OutputErrorFit) -> Known:
         Experiment(signal, _noise_of(residual, fit.dt))
         for signal, residual in zip(inputs, residuals, strict=True)
     ]
-    return Known(
-        model,
-        tuple(one for one in others if np.sum(one.poles == 0) <= 1),
-        fit.dt,
-        tests[-1].noise,
-        tuple(tests),
-        float(np.ravel(fit.records[0].input)[0]),
-    )
+    plausible = tuple(one for one in others if np.sum(one.poles == 0) <= 1)
+    level = float(np.ravel(fit.records[0].input)[0])
+    return Known(model, plausible, fit.dt, tests[-1].noise, tuple(tests), level)
 
 
 def _noise_of(residual: FloatArray, dt: float) -> NoiseModel:

@@ -84,13 +84,9 @@ def by_paper(
         )
     cutoff = SETTINGS.cutoff_hz if cutoff_hz == "auto" else cutoff_hz
     impulse = impulse_from_step(step, cutoff_hz=cutoff, zero_phase=False, difference="central")
-    system = estimate_delay(
-        impulse,
-        SETTINGS.order if order is None else order,
-        max_delay=reach,
-        samples=behind,
-        feedthrough=True if feedthrough is None else feedthrough,
-    )
+    n = SETTINGS.order if order is None else order
+    direct = True if feedthrough is None else feedthrough
+    system = estimate_delay(impulse, n, max_delay=reach, samples=behind, feedthrough=direct)
     found = fit_of(system, DelayScan)
     choices = [
         "as in the paper: five-point central difference (half a sample early in a step "

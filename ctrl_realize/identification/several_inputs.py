@@ -190,12 +190,9 @@ def _wider(fits: list[OutputErrorFit], record: Record) -> tuple[OutputErrorFit, 
         factor = _ratio(own, others, weights)
         estimate = fit.estimate
         at = estimate.dead_time
-        estimate = replace(
-            estimate,
-            low=max(at - factor * (at - estimate.low), 0.0),
-            high=at + factor * (estimate.high - at),
-            std=factor * estimate.std,
-        )
+        low = max(at - factor * (at - estimate.low), 0.0)
+        high = at + factor * (estimate.high - at)
+        estimate = replace(estimate, low=low, high=high, std=factor * estimate.std)
         if estimate.static is not None:
             gains = np.zeros(own.shape[1])
             gains[: tangents[i].shape[1]] = bounds[i].gradient(("gain",))[0]

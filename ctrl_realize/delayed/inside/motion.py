@@ -74,14 +74,10 @@ class Motion(InsidePoles):
         m = self.ninputs
         outputs = np.empty((self.noutputs, m, times.size))
         drive = np.zeros((m, m, times.size))
+        pulse = kind == "impulse"
         for j in range(m):
-            outputs[:, j] = self._solved(
-                _unit_signal(m, j),
-                times,
-                np.zeros(0),
-                tolerance,
-                slope=kind == "impulse",
-            ).outputs
+            found = self._solved(_unit_signal(m, j), times, np.zeros(0), tolerance, slope=pulse)
+            outputs[:, j] = found.outputs
             drive[j, j] = 1.0
         return self._unit_responses(
             times, outputs, drive, kind, squeeze=squeeze, transpose=transpose

@@ -118,21 +118,12 @@ class DelaySystem(InsideResponses, InsideConversions, InsideCards, DelayOperator
         if 0 in delays:
             core, delays = without_zeros(core, delays, float(core.dt))
             q = len(delays)
-        self._begin(
-            core.nstates,
-            core.nstates + (int(sum(delays)) if dt else 0),
-            dt,
-            inputs=input_names,
-            outputs=output_names,
-            name=None if name is None else system_name(name),
-        )
-        self._core = named(
-            core,
-            [*input_names, *(f"w[{i}]" for i in range(q))],
-            [*output_names, *(f"z[{i}]" for i in range(q))],
-            core.state_labels,
-            name=f"{self.name}_core",
-        )
+        states = core.nstates + (int(sum(delays)) if dt else 0)
+        called = None if name is None else system_name(name)
+        self._begin(core.nstates, states, dt, inputs=input_names, outputs=output_names, name=called)
+        into = [*input_names, *(f"w[{i}]" for i in range(q))]
+        out = [*output_names, *(f"z[{i}]" for i in range(q))]
+        self._core = named(core, into, out, core.state_labels, name=f"{self.name}_core")
         self.internal_delays = delays
         self._response: Response | None = None
         self._locked = True

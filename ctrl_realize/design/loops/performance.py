@@ -60,12 +60,9 @@ class Performance:
     settling_time: float
 
     def __repr__(self) -> str:
+        both = ("set-point error", self.setpoint_error), ("load error", self.load_error)
         errors = (
-            f"{name} {'stays' if error == float('inf') else in_time(error)}"
-            for name, error in (
-                ("set-point error", self.setpoint_error),
-                ("load error", self.load_error),
-            )
+            f"{name} {'stays' if error == float('inf') else in_time(error)}" for name, error in both
         )
         over = "unknown" if np.isnan(self.overshoot) else f"{100 * self.overshoot:.3g} %"
         settled = "does not settle"

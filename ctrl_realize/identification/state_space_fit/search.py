@@ -171,12 +171,9 @@ class Search:
 
     def _minimum(self, one: Candidate) -> Candidate:
         shares = one.inputs, one.outputs
+        data, model = experiments(self._group, shares, self._enough), one.found.model
         fit = fit_sections(
-            experiments(self._group, shares, self._enough),
-            one.found.model,
-            feedthrough=one.feedthrough,
-            enough=CONVERGED,
-            most=MOST_TURNS,
+            data, model, feedthrough=one.feedthrough, enough=CONVERGED, most=MOST_TURNS
         )
         end = self._judged(fit, one.order, shares, one.feedthrough)
         # B is estimated again first, which may lead to another minimum.

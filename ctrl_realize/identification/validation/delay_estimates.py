@@ -171,15 +171,9 @@ def _scan(record: Record, stepped: bool, most: int, order: int, total: float) ->
     system = estimate_delay(impulse, order, max_delay=min(most, impulse.n_samples // 2))
     scan = fit_of(system, DelayScan)
     low, high = scan.delay_interval
-    return DelayEstimate(
-        "scan",
-        "record",
-        "dead time",
-        scan.delay * record.dt,
-        max(low - 1, 0) * record.dt,
-        (high + 1) * record.dt,
-        _doubt(scan.flags) or NO_LEVEL,
-    )
+    at, start, stop = (n * record.dt for n in (scan.delay, max(low - 1, 0), high + 1))
+    doubt = _doubt(scan.flags) or NO_LEVEL
+    return DelayEstimate("scan", "record", "dead time", at, start, stop, doubt)
 
 
 def _doubt(flags: tuple[Flag, ...]) -> str:
