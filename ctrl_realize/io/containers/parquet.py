@@ -62,13 +62,11 @@ def read_parquet(path: Path, *, max_bytes: float, variable: str | None = None) -
     if not fields:
         raise FileFormatError(f"{path} has no columns")
     reader = _Reader(path, unpacked_limit(path, max_bytes))
-    return Table(
-        path,
-        tuple(
-            LateColumn(str(field.name)[:MAX_NAME], reader.loader(position, field))
-            for position, field in enumerate(fields)
-        ),
+    columns = tuple(
+        LateColumn(str(field.name)[:MAX_NAME], reader.loader(position, field))
+        for position, field in enumerate(fields)
     )
+    return Table(path, columns)
 
 
 class _Reader:

@@ -234,13 +234,9 @@ def with_states(
     m, p, size = form.inputs + len(rest), form.outputs + len(rest), form.states + len(lines)
     B, C, D = split.B, split.C, split.D
     A = np.block([[form.A, B[:, m:] @ exit_], [entry @ C[p:], lines + entry @ D[p:, m:] @ exit_]])
-    return DelayForm(
-        A.reshape(size, size),
-        np.vstack([B[:, :m], entry @ D[p:, :m]]),
-        np.hstack([C[:p], D[:p, m:] @ exit_]),
-        D[:p, :m].copy(),
-        split.delays[: len(rest)],
-    )
+    into = np.vstack([B[:, :m], entry @ D[p:, :m]])
+    out = np.hstack([C[:p], D[:p, m:] @ exit_])
+    return DelayForm(A.reshape(size, size), into, out, D[:p, :m].copy(), split.delays[: len(rest)])
 
 
 def _check_regular(matrix: FloatArray) -> None:

@@ -75,12 +75,9 @@ def with_rows(record: Problem, more: Problem) -> Problem:
     if segments is not None:
         edges = segments.edges.copy()
         edges[-1] += rows
-        segments = Segments(
-            edges,
-            np.concatenate([segments.clock, np.full(rows, _LATE)]),
-            np.pad(segments.regressors, ((0, rows), (0, 0))),
-            segments.bins,
-        )
+        clock = np.concatenate([segments.clock, np.full(rows, _LATE)])
+        regressors = np.pad(segments.regressors, ((0, rows), (0, 0)))
+        segments = Segments(edges, clock, regressors, segments.bins)
     missing = record.regressors.shape[1] - more.regressors.shape[1]
     return replace(
         record,

@@ -41,13 +41,10 @@ def simc_pi(model: PlausibleModel, dt: float) -> tuple[float, float]:
     zeros = np.roots(model.numerator[::-1])
     zeros = zeros[zeros != 0]
     times = -zeros.real / np.abs(zeros) ** 2
+    lags, late = -poles.real / np.abs(poles) ** 2, model.dead_time + dt / 2
+    leads, unstable = times[times > 0], -times[times < 0]
     factor, kept, delay = half_rule(
-        -poles.real / np.abs(poles) ** 2,
-        times[times > 0],
-        -times[times < 0],
-        model.dead_time + dt / 2,
-        1 - int(integrating),
-        integrating=integrating,
+        lags, leads, unstable, late, 1 - int(integrating), integrating=integrating
     )
     gain = factor * float(model.numerator[0] / np.prod(-poles).real)
     if integrating:

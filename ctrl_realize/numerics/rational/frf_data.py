@@ -77,13 +77,9 @@ class FRFData:
     @cached_property
     def problem(self) -> Problem:
         """Rows whose sum of squares is that of ``|weight (response - model)|``."""
-        return Problem(
-            stacked_parts(self.response),
-            np.concatenate([self.weight, self.weight]),
-            Sines(self.omega),
-            np.empty((2 * self.s.size, 0)),
-            KnownFactor(),
-        )
+        parts, weights = stacked_parts(self.response), np.concatenate([self.weight, self.weight])
+        no_regressor = np.empty((2 * self.s.size, 0))
+        return Problem(parts, weights, Sines(self.omega), no_regressor, KnownFactor())
 
     @cached_property
     def scales(self) -> Scales:
