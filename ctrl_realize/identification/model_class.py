@@ -166,8 +166,11 @@ def _chosen(
             flags += nonlinear_flags(shown, _delay(system), total / dt)
     wide = high - low > max(_FAR_APART * max(dead_time, dt), 2 * dt * (own[1] - own[0]))
     if own[0] <= _NOTHING or wide:
-        code = "no_delay_resolved" if own[0] <= _NOTHING else "structures_disagree"
-        flags.append(flagged(code, interval=interval_in_time(low, high), known=""))
+        ends = interval_in_time(low, high)
+        if own[0] <= _NOTHING:
+            flags.append(flagged("no_delay_resolved", interval=ends, known=""))
+        else:
+            flags.append(flagged("structures_disagree", interval=ends, known=""))
     reasons = (
         f"{modes.order} states (fit_state_space) instead of a transfer function of order "
         f"{lags.order} with dead time: the residual of the latter is correlated with the "

@@ -252,10 +252,20 @@ def _left_open(made: LoopCheck) -> tuple[Flag, ...]:
     if worst is None or worst.ms <= MOST_SENSITIVE * (1 + ROUNDED):
         return ()
     if worst.ms == float("inf"):
-        code = "unstable_within_interval.model" if models else "unstable_within_interval.corner"
-        return (flagged(code, corner=worst),)
-    code = "sensitive_within_interval.model" if models else "sensitive_within_interval"
-    return (flagged(code, ms=worst.ms, most=MOST_SENSITIVE, corner=worst),)
+        return (
+            flagged(
+                "unstable_within_interval.model" if models else "unstable_within_interval.corner",
+                corner=worst,
+            ),
+        )
+    return (
+        flagged(
+            "sensitive_within_interval.model" if models else "sensitive_within_interval",
+            ms=worst.ms,
+            most=MOST_SENSITIVE,
+            corner=worst,
+        ),
+    )
 
 
 def warn_of(check: LoopCheck, advice: str) -> None:

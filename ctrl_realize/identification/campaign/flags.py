@@ -67,9 +67,13 @@ def _different_times(rows: Rows) -> Iterator[Flag]:
         statistic, chance = homogeneity(values, errors)
         known = values[np.isfinite(errors)]
         if chance < BY_CHANCE and np.ptp(known) > time_apart(float(np.median(known)), rows[0].dt):
-            code = "records_differ.campaign" if times is dead_times else "lags_differ.campaign"
-            ends = {"low": in_time(values.min()), "high": in_time(values.max())}
-            yield flagged(code, **ends, chi_square=statistic, chance=chance)
+            yield flagged(
+                "records_differ.campaign" if times is dead_times else "lags_differ.campaign",
+                low=in_time(values.min()),
+                high=in_time(values.max()),
+                chi_square=statistic,
+                chance=chance,
+            )
 
 
 def _same_records(rows: Rows) -> Iterator[Flag]:
