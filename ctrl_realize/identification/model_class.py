@@ -27,7 +27,7 @@ from ..numerics.signals.noise import correlation_time
 from ..numerics.signals.noise_model import coloured_criterion
 from .long_records import lively_parts
 from .output_error.checks import Shown, against_one_model, nonlinear_flags
-from .output_error.loop_flags import answers_the_past, in_automatic
+from .output_error.loop_flags import answers_the_output, in_automatic
 from .output_error.own_gains import at_model_gain
 from .output_error.result import OutputErrorFit
 from .state_space_fit.starts import Outcome, from_starts
@@ -87,7 +87,7 @@ def with_modes_judged(
             # A feedthrough alone leaves nothing of the input in this residual, a controller does.
             loop = not any(follows) and any(c.flags for c in _checks(found.system, records))
             # In a loop it is that of the controller: u = K (r - y) explains the noise.
-            loop |= found.fit.feedthrough and answers_the_past(records)
+            loop |= found.fit.feedthrough and answers_the_output(records)
             if loop:
                 return system  # coloured noise that a controller answers is correlated with it
             if gain > VERY_STRONG and not late:

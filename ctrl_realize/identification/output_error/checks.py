@@ -64,7 +64,8 @@ def checked(fit: OutputErrorFit, *, alone: bool = True) -> OutputErrorFit:
     if complete and not stepped:
         flags += feedback_flags(complete, fit.delay_interval[1])
     in_loop = bool(flags)
-    if complete and not fit.at_noise_level:  # else an unstable plant is excluded
+    # A stable model that leaves noise excludes an unstable plant, unless noise took what it misses.
+    if complete and (fit.estimate.averaged or not fit.at_noise_level):
         flags += unstable_flags(complete, fit.delay_interval[1])
     flags += set_point_flags(fit)
     if len(fit.records) == 1:

@@ -42,7 +42,7 @@ from .averaging import (
 )
 from .checks import checked
 from .flags import fit_flags
-from .loop_flags import in_automatic
+from .loop_flags import answers_the_output, in_automatic
 from .own_gains import fit_own_gains
 from .repeat_flags import repeat_flags, same_record_flags
 from .repeatability import delay_outliers, fit_alike, unlike_records
@@ -253,7 +253,7 @@ def fit_output_error(
         known=factor,
         huber=loss == "huber",
         simulates=focus == "simulation",
-        loop=all(in_automatic(record) for record in several),
+        loop=all(map(in_automatic, several)) or answers_the_output(several),
     )
     setting = {"own_gains": gains == "own", "may_clip": actuator is None}
     free = partial(_linear, several, tried, **setting)

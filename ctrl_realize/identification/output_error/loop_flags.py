@@ -17,10 +17,10 @@ from ...numerics.signals.excitation import lively_start
 from ...numerics.validation.innovations import (
     RARE,
     REGRESSED,
-    answer_chance,
     feedback_chance,
     late_samples,
     past_inputs,
+    shows_feedback,
 )
 from ...numerics.validation.instability import unstable_chance
 from ...numerics.validation.white_step import WhiteStep, white_step
@@ -42,7 +42,10 @@ def in_automatic(record: Record) -> bool:
 
 
 def loop_choices(record: Record) -> Iterator[str]:
-    """Say how a record of a loop whose set point moved is used."""
+    """Say how a record of a loop is used."""
+    if not in_automatic(record):
+        yield chosen("loop.seen")
+        return
     assert record.reference is not None
     wanted = np.ravel(record.reference)
     moves = np.diff(wanted)
@@ -73,6 +76,8 @@ def set_point_flags(fit: OutputErrorFit) -> Iterator[Flag]:
     if not fit.estimate.averaged or high - low <= max(_WIDE * fit.dead_time, fit.dt):
         return
     every = [record.reference for record in fit.records if record.reference is not None]
+    if not all(map(in_automatic, fit.records)):
+        return
     moved = max(float(np.nanmax(wanted) - np.nanmin(wanted)) for wanted in every)
     yield flagged(
         "small_set_point",
@@ -102,10 +107,11 @@ def feedback_flags(records: tuple[Record, ...], delay: float) -> Iterator[Flag]:
         yield flagged("feedback", chance=min(chances))
 
 
-def answers_the_past(records: Sequence[Record]) -> bool:
-    """Whether inputs depend on earlier outputs: no response within a sample explains that."""
-    every = _stretches(records)
-    return _rare([answer_chance(y[0], u[0], past_inputs(y[0].size, 0.0)) for y, u in every])
+def answers_the_output(records: Sequence[Record]) -> bool:
+    """Whether inputs are those of controllers: no response within a sample explains that."""
+    if any(record.n_missing for record in records):
+        return False
+    return shows_feedback([(np.ravel(one.output), np.ravel(one.input)) for one in records])
 
 
 def late_input(records: Sequence[Record]) -> Flag | None:

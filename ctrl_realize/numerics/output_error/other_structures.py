@@ -58,7 +58,7 @@ class Requested:
     simulates : bool
         But not if the model then simulates them worse than coloured noise explains.
     loop : bool
-        The input is that of a controller whose set point moved: see `any_input.lags`.
+        The input is that of a controller: see `any_input.lags`.
     compared : bool
         Look for structures that were not requested and fit better, or as well.
     """

@@ -175,3 +175,14 @@ def test_in_coloured_noise_a_loop_is_no_feedthrough():
     assert fit.interval[0] <= 3 <= fit.interval[1] < 5
     assert "feedback" in [one.code for one in fit.flags]
     assert isinstance(fit, cr.identification.OutputErrorFit)
+
+
+@pytest.mark.parametrize(("plant", "moves"), [("0.1", "one"), ("0.3", "one"), ("1", "three")])
+def test_without_a_set_point_slow_noise_is_not_taken_for_the_response(plant, moves):
+    """Least squares explain noise by the input that answers it: these had a dead time near zero."""
+    truth = PLANTS[plant]
+    _, bare = record(truth, CASES["AR(0.97)"], moves, 801)
+    fit = cr.identify(bare).fit
+    assert fit.interval[0] <= truth.dead_time <= fit.interval[1]
+    assert any("the input depends on the output" in one for one in fit.choices)
+    assert "feedback" in [one.code for one in fit.flags]

@@ -10,6 +10,7 @@ from ctrl_realize.numerics.validation.innovations import (
     feedback_chance,
     late_samples,
     nonlinear_chance,
+    shows_feedback,
 )
 from ctrl_realize.numerics.validation.instability import unstable_chance
 from ctrl_realize.numerics.validation.parameter_change import parameter_change
@@ -47,6 +48,18 @@ def test_no_feedback_is_found_in_open_loop(seed, pole):
     u = levels(rng)
     noise = 0.05 * lfilter([1.0], [1, -pole], rng.standard_normal(N))
     assert feedback_chance(first_order(u) + noise, u, 20) > 1e-3
+    assert not shows_feedback([(first_order(u) + noise, u)])
+
+
+@pytest.mark.parametrize("late", [0, 3])
+@pytest.mark.parametrize("held", [1, 12])
+def test_neither_a_feedthrough_nor_a_late_input_is_a_controller(held, late):
+    rng = np.random.default_rng(1)
+    u = np.repeat(rng.standard_normal(N // held), held)
+    noise = 0.05 * lfilter([1.0], [1, -0.95], rng.standard_normal(N))
+    y = first_order(u, 1) - 0.5 * u + noise
+    assert late or feedback_chance(y, u, 20) < SURE
+    assert not shows_feedback([(y[: N - late], u[late:])])
 
 
 @pytest.mark.parametrize("seed", range(5))
@@ -56,6 +69,7 @@ def test_a_controller_is_found_by_the_noise_that_it_passes_on(seed, gain, integr
     noise = 0.05 * lfilter([1.0], [1, -0.9], rng.standard_normal(N))
     u, y = loop(rng, gain, integral, noise)
     assert feedback_chance(y, u, 20) < SURE
+    assert shows_feedback([(y, u)])
 
 
 @pytest.mark.parametrize("seed", range(5))

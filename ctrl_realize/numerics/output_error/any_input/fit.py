@@ -132,7 +132,8 @@ def fit_sampled(
     its samples as if they were neighbours: an average over the gaps, as it counts for the errors of
     slow parameters.
     """
-    if requested.loop and plain_lags(requested) and not any(np.isnan(y).any() for y in outputs):
+    complete = not any(np.isnan(y).any() for y in outputs)
+    if requested.loop and complete and plain_lags(requested):
         every = -(-max(y.size for y in outputs) // MOST_SAMPLES)
         found, fit = fit_lags(cut(outputs, inputs, dt, every, requested.known), requested)
         if requested.forms or fit.better is None:
@@ -148,7 +149,7 @@ def fit_sampled(
     data, stretch = part.data, part.fit
     fits, sums = stretch, None
     long = any(y.size > every * kept.size for y, kept in zip(outputs, data.outputs, strict=True))
-    if long and not any(np.isnan(y).any() for y in outputs):
+    if long and complete:
         y, u = (
             [x / scale for x, scale in zip(signals, data.scales, strict=True)]
             for signals in (outputs, inputs)

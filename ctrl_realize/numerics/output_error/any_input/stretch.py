@@ -20,7 +20,6 @@ from ...arrays import FloatArray
 from ...engine.problem import Structure
 from ...engine.structures import Candidate
 from ...engine.window_fit import WindowFit
-from ...validation.innovations import RARE, REGRESSED, answer_chance, past_inputs
 from ..other_structures import Requested
 from .condensed import MOST_LAGS
 from .data import BEYOND, SampledData, cut
@@ -54,19 +53,10 @@ def fit_stretch(
     if not (part.fit.correlation > WHITE and requested.whiten and data.complete):
         return part
     weighted = in_coloured_noise(part)
-    if requested.simulates and simulates_worse(weighted, part) and not _in_a_loop(data):
+    # In a loop the noise model is needed for consistency [1]_.
+    if requested.simulates and not requested.loop and simulates_worse(weighted, part):
         return part
     return replace(weighted, unweighted=part.model)
-
-
-def _in_a_loop(data: SampledData) -> bool:
-    """Whether past outputs tell inputs: then the noise model is needed for consistency [1]_."""
-    chances = [
-        answer_chance(y[-REGRESSED:], u[-REGRESSED:], past_inputs(y.size, 0.0))
-        for y, u in zip(data.outputs, data.held, strict=True)
-    ]
-    # The means of a block of samples depend on one another in any case.
-    return data.every == 1 and min(chances) < RARE / len(chances)
 
 
 def samples_in_a_block(
