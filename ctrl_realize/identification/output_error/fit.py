@@ -18,6 +18,7 @@ from ...delayed import DelayedStateSpace
 from ...errors import OptionError
 from ...numerics.arrays import FloatArray
 from ...numerics.blas_threads import single_threaded
+from ...numerics.output_error.any_input.data import MOST_SAMPLES
 from ...numerics.output_error.other_structures import Requested
 from ...numerics.output_error.result import OutputErrorEstimate
 from ...numerics.output_error.step_data import StepData
@@ -253,7 +254,9 @@ def fit_output_error(
         known=factor,
         huber=loss == "huber",
         simulates=focus == "simulation",
-        loop=all(map(in_automatic, several)) or answers_the_output(several),
+        # Of long records every sample tells, where the response is not fitted by means of blocks.
+        loop=all(map(in_automatic, several))
+        or (max(one.n_samples for one in several) <= MOST_SAMPLES and answers_the_output(several)),
     )
     setting = {"own_gains": gains == "own", "may_clip": actuator is None}
     free = partial(_linear, several, tried, **setting)
