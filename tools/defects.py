@@ -87,7 +87,7 @@ DEFECTS = (
        "return np.asarray(columns - basis @ (np.swapaxes(basis, 1, 2) @ columns))",
        "return columns", "eliminate local_terms cramer", KERNELS),
     _d("initial state", "the free response of a record does not follow its poles",
-       "derivative[:, :, 1:] += models.local.moved(remainder, models.dfree)", "pass",
+       "derivative[:, :, derivative.shape[2] - moved.shape[2] :] += moved", "pass",
        "local_terms eliminate", KERNELS),
     # --- noise
     _d("noise of third differences", "a record without rest seems 2.6 times as noisy",

@@ -305,6 +305,6 @@ MADE_FOR = {
     "estimates against a pinned likelihood": drive_with_friction,
     "no pair at the Nyquist frequency": relay_test,
     "steps that are held": running_loop,
-    "noise model in a loop": running_loop,
+    "loop without its set point": running_loop,
 }
 """Rules, and the world that each was made for."""

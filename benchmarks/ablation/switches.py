@@ -406,8 +406,8 @@ SWITCHES = (
         asked=(f"{PUBLIC}.arguments:_holds_between",),
     ),
     Switch(
-        "noise model in a loop",
-        {f"{FITS}.any_input.stretch:_in_a_loop": giving(False)},
+        "loop without its set point",
+        {f"{PUBLIC}.fit:answers_the_output": giving(False)},
     ),
     Switch(
         "records weighted by their noise",
