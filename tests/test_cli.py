@@ -147,7 +147,7 @@ def test_the_report_of_identify_has_the_controller_if_it_is_wanted(folder, tmp_p
     assert main([*words, "--tune", "--overwrite"]) == 2
     assert "expected a form, such as ideal" in capsys.readouterr().err
     assert main([*words, "--overwrite", "--tune", "abacus"]) == 2
-    assert "--form abacus; choose one of 'ideal'" in capsys.readouterr().err
+    assert "--tune abacus; choose one of 'ideal'" in capsys.readouterr().err
 
 
 def test_several_records_make_a_campaign_and_a_bad_one_is_a_row(folder, tmp_path, capsys):

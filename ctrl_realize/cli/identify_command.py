@@ -40,7 +40,7 @@ def run_identify(
     files: list[Path], folder: Path | None, *, tune: str | None, json: str | None, **given: Any
 ) -> int:
     """Identify, write the results, and return the exit code."""
-    tuning = None if tune is None else Tuning({}, {"form": tune}, optional=True)
+    tuning = None if tune is None else _tuning(tune)
     if json is not None:
         return told_as_json(
             json, lambda told: identified(files, folder, tuning=tuning, told=told, **given)
@@ -48,6 +48,13 @@ def run_identify(
     if folder is None:
         raise OptionError("expected --output, the folder of the results, or --json")
     return identified(files, folder, tuning=tuning, **given)
+
+
+def _tuning(form: str) -> Tuning:
+    try:
+        return Tuning({}, {"form": form}, optional=True)
+    except OptionError as error:
+        raise OptionError(str(error).replace(f"form={form!r}", f"--tune {form}")) from None
 
 
 def run_tune(

@@ -94,7 +94,8 @@ def controller_of(
     told = tuple(row for row in pid._card().rows if row[0] not in left_out)
     unstable = pid.check is not None and any(np.isinf(one.ms) for one in pid.check.corners)
     flags = () if pid.check is None else pid.check.flags
-    level: Level = "poor" if unstable else "caution" if flags else "good"
+    doubted = any(_doubts(system)) or any(flags)
+    level: Level = "poor" if unstable else "caution" if doubted else "good"
     return Controller(
         title=f"{pid.kind} controller by {pid.rule}",
         level=level,
@@ -114,10 +115,14 @@ def _judgement(system: DelayedStateSpace, pid: PIDController) -> str:
     said = f"Ms {check.margins.ms:.3g} on the model"
     if check.worst is not None and np.isfinite(check.worst.ms):
         said += f", at most {check.worst.ms:.3g} with what the record leaves open"
-    verdicts = () if system.fit is None else system.fit.verdicts
-    doubts = [f"{one}." for one in verdicts if one.question == "tuning" and one.level != "good"]
-    words = [f"{said}.", *[f"{flag}." for flag in check.flags], *doubts]
+    words = [f"{said}.", *[f"{flag}." for flag in check.flags], *_doubts(system)]
     return " ".join(f"{one[:1].upper()}{one[1:]}" for one in words)
+
+
+def _doubts(system: DelayedStateSpace) -> list[str]:
+    """What the verdict of the fit says against tuning."""
+    verdicts = () if system.fit is None else system.fit.verdicts
+    return [f"{one}." for one in verdicts if one.question == "tuning" and one.level != "good"]
 
 
 def loop_sketch(system: DelayedStateSpace, pid: PIDController) -> Sketch:

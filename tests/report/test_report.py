@@ -242,3 +242,8 @@ def test_the_part_of_a_controller_lists_the_models_on_which_its_loop_is_unstable
     assert any(f"one of {len(unstable)} of 38 models" in reason for reason in part.unsafe)
     assert "gain kp" in dict(part.facts)
     assert part.figure.svg.count("<path") > 10
+    tuning = next(one for one in system.fit.verdicts if one.question == "tuning")
+    assert tuning.level != "good"
+    # robust on all models that are drawn, and still not what the fit can promise
+    safe = controller_of(system, cr.design.pid(system, closed_loop_time="robust"))
+    assert safe.level == "caution"
