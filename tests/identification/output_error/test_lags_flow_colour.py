@@ -173,6 +173,14 @@ def test_slow_noise_leaves_a_narrower_interval_that_holds(rest):
     assert narrower >= 2
 
 
+def test_slow_noise_is_made_white_where_no_structure_is_given():
+    data, delay = record(2, slow)
+    low, high = cr.fit_output_error(data).fit.delay_interval
+    first, last = cr.fit_output_error(data, noise="white").fit.delay_interval
+    assert low <= delay <= high
+    assert high - low < 0.5 * (last - first)
+
+
 def test_the_gain_in_slow_noise_has_its_standard_error_though_the_model_takes_part_of_it():
     n, edge, scale, pole = 280, 60, 0.02, 0.9
     k, true = np.arange(n), np.array([10.0, 12.0, 2.0, 0.0])  # dead time, lag, gain, level
