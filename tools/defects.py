@@ -104,7 +104,7 @@ DEFECTS = (
     _d("hum", "a sine in the rest is not seen", "while n >= 64 and len(found) < most:",
        "while False:", "noise", KERNELS),
     _d("rounding as noise", "an undithered output has no noise at all",
-       "floor = quantum / np.sqrt(12)", "floor = 0.0", "noise step_data step_fit", KERNELS),
+       "floor = quantum / np.sqrt(12)", "floor = 0.0", "noise step_data step_fit rounded", KERNELS),
     # --- edges and onset
     _d("edge late", "the step is put on the last sample at rest",
        "first = int(resting[-1]) + 1 if resting.size else 0",
