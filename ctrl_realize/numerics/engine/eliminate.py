@@ -73,7 +73,7 @@ def compress_mapped(problem: Problem, structure: Structure, mapped: Mapped) -> C
         parts = models.local.reduced(np.concatenate([columns, models.free_slopes()], axis=2))
         left = np.concatenate([part.left for part in parts], axis=1)
     linear, count = models.linear(left[:, :, :k], q), structure.zeros + 1
-    residual, weights, basis, gain = _within(linear, mapped)
+    residual, weights, basis, gain = _within(linear, mapped.numerator, mapped.gains)
     derivative = left[:, :, q : k - 1] @ models.slopes(weights[:, :count])
     if models.local is not None:
         remainder = models.remainder(weights, k)
@@ -105,7 +105,7 @@ def evaluate_mapped(problem: Problem, structure: Structure, mapped: Mapped) -> E
         return mapped.along(made, linear[:, :, :count], gain)
 
     dpoles = models.dfree if mapped.dtheta is None else models.dfree @ mapped.dtheta[:, 1:]
-    return _in_rows(linear, count, mapped, slopes, models.local, dpoles)
+    return _in_rows(linear, count, (mapped.numerator, mapped.gains), slopes, models.local, dpoles)
 
 
 def evaluate_shaped(
@@ -124,23 +124,27 @@ def evaluate_shaped(
     made = problem.weighted(np.append(shape[:, :, None], slopes, axis=2))
     linear = np.append(made[:, :, :1], np.tile(fixed, (len(shape), 1, 1)), axis=2)
     local = None if problem.segments is None else problem.local_terms(poles)
-    mapped = Mapped(shape, numerator=np.ones((len(shape), 1)), gains=gains)
+    own = np.ones((len(shape), 1)), gains
     return _in_rows(
-        linear, 1, mapped, lambda gain, _: gain[:, :, None] * made[:, :, 1:], local, dpoles
+        linear, 1, own, lambda gain, _: gain[:, :, None] * made[:, :, 1:], local, dpoles
     )
 
 
 def _in_rows(
     linear: FloatArray,
     count: int,
-    mapped: Mapped,
+    shape: tuple[FloatArray | None, tuple[float, float]],
     slopes: Callable[[FloatArray, FloatArray | None], FloatArray],
     local: LocalTerms | None,
     dpoles: ComplexArray,
 ) -> Evaluation:
-    """Eliminate columns (B, m, k), the first of which are `count` of the numerator."""
+    """Eliminate columns (B, m, k), the first of which are `count` of the numerator.
+
+    `shape` is the numerator for gain 1, if only the gain is free, and the bounds of the gain.
+    `slopes` has the derivatives of models by their numerators and gains, free responses aside.
+    """
     left = linear if local is None else local.without(linear)
-    residual, weights, basis, gain = _within(left, mapped)
+    residual, weights, basis, gain = _within(left, *shape)
     derivative = slopes(weights[:, :count], gain)
     if local is not None:
         remainder = linear[:, :, -1] - (linear[:, :, :-1] @ weights[:, :, None])[:, :, 0]
@@ -267,16 +271,16 @@ def _eliminated(columns: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray
 
 
 def _within(
-    linear: FloatArray, mapped: Mapped
+    linear: FloatArray, shape: FloatArray | None, gains: tuple[float, float]
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray | None]:
     """`_eliminated`; where only the gain of a numerator is free, the best within its bounds."""
-    if mapped.numerator is None:
+    if shape is None:
         return *_eliminated(linear), None
-    count = mapped.numerator.shape[1]
-    unit = linear[:, :, :count] @ mapped.numerator[:, :, None]
+    count = shape.shape[1]
+    unit = linear[:, :, :count] @ shape[:, :, None]
     linear = np.concatenate([unit, linear[:, :, count:]], axis=2)
     residual, weights, basis = _eliminated(linear)
-    (low, high), best = mapped.gains, weights[:, 0]
+    (low, high), best = gains, weights[:, 0]
     gain, held = np.clip(best, low, high), (best <= low) | (best >= high) | ~unit.any(axis=(1, 2))
     if held.any():
         # The sum of squares is a parabola of the gain: the best one is at the bound.
@@ -285,7 +289,7 @@ def _within(
         residual[held] = rest[:, :, -1]
         if rest.shape[2] > 2:
             residual[held], weights[held, 1:], basis[held, :, 1:] = _eliminated(rest[:, :, 1:])
-    numerator = gain[:, None] * mapped.numerator
+    numerator = gain[:, None] * shape
     return residual, np.concatenate([numerator, weights[:, 1:]], axis=1), basis, gain
 
 
