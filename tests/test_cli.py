@@ -183,6 +183,8 @@ def test_nothing_is_written_where_no_record_is_usable(folder, tmp_path, capsys):
         (["identify", "{folder}/flat.csv", "-o", "{out}", "--method", "scan"], "no step"),
         (["identify", "{folder}/step_0.csv", "-o", "{folder}/frf.csv"], "is a file"),
         (["identify", "{folder}/step_0.csv"], "output"),
+        (["identify", "{folder}/step_0.csv", "-o", ""], "empty name"),
+        (["compare", "{folder}/frf.csv", "{folder}/frf.csv", "--output="], "empty name"),
         (["identify", "{folder}/step_0.csv", "-o", "{out}", "--order", "0"], "--order"),
         (["identify", "{folder}/step_0.csv", "-o", "{out}", "--order", "x"], "--order"),
         (["identify", "{folder}/step_0.csv", "-o", "{out}", "--structures", "P9D"], "'P9D'"),

@@ -25,9 +25,19 @@ MaybeFiles = Annotated[
 ]
 NoBrowser = Annotated[bool, _OPTION("--no-browser", help="Say the address, and open no browser.")]
 Port = Annotated[int, _OPTION("--port", min=0, max=65535, help="Port; 0: a free one.")]
-Folder = Annotated[Path, _OPTION("--output", "-o", help="Output folder.")]
+
+
+def _folder(text: str) -> Path:
+    if not text.strip():  # as from an unset variable of a script; Path("") is the current folder
+        raise typer.BadParameter("expected a folder, got an empty name; '.' is the current folder")
+    return Path(text)
+
+
+_INTO = {"parser": _folder, "metavar": "PATH"}
+Folder = Annotated[Path, _OPTION("--output", "-o", help="Output folder.", **_INTO)]
 MaybeFolder = Annotated[
-    Path | None, _OPTION("--output", "-o", help="Output folder for table, report and figures.")
+    Path | None,
+    _OPTION("--output", "-o", help="Output folder for table, report and figures.", **_INTO),
 ]
 Overwrite = Annotated[
     bool, _OPTION("--overwrite", help="Overwrite the results of another run in the folder.")
