@@ -227,6 +227,8 @@ def test_manual_operation_returns_without_a_bump():
         ({"output_limits": (5, 5)}, "lower limit first"),
         ({"tracking_time": 0.1}, "at least the sample time"),
         ({"setpoint_weight": np.nan}, "setpoint_weight"),
+        ({"output_limits": (4, 20)}, r"bias=0 is outside of output_limits=\(4, 20\)"),
+        ({"output_limits": (0, 1), "bias": 1.5}, "operating point"),
     ],
 )
 def test_unusable_algorithms_are_refused(options, match):

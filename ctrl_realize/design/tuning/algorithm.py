@@ -135,6 +135,11 @@ class PIDAlgorithm(Result):
                 f"output_limits=({low:g}, {high:g}); expected the lower limit first, such as "
                 "(0, 100)"
             )
+        if not low <= self.bias <= high:
+            raise OptionError(
+                f"bias={self.bias:g} is outside of output_limits=({low:g}, {high:g}); expected the "
+                "output at the operating point, in the units of the limits"
+            )
         if self.ti == INF and self.setpoint_weight != 1:
             raise OptionError(
                 f"setpoint_weight={self.setpoint_weight:g} without integral action; expected 1, "
