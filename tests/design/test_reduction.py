@@ -74,6 +74,19 @@ def test_a_model_of_the_right_structure_comes_back(method, integrating):
         assert found.error < 1e-4
 
 
+@pytest.mark.parametrize("unit", [1e-6, 60.0])
+@pytest.mark.parametrize("shape", [lags(5, 2, 0.7), lags(5, 2) * ct.tf([1], [1, 0])])
+def test_the_unit_of_time_does_not_matter(shape, unit):
+    scaled = ct.tf(
+        *(part[0][0] * unit ** np.arange(len(part[0][0]))[::-1] for part in (shape.num, shape.den))
+    )
+    for reduce in (cr.design.reduce_fopdt, cr.design.reduce_sopdt):
+        here, there = reduce(shape, dead_time=3), reduce(scaled, dead_time=3 * unit)
+        times = [(m.lag, m.second_lag, m.dead_time) for m in (here, there)]
+        # least squares end where the cost changes by 1e-8 of itself
+        np.testing.assert_allclose(times[1], np.multiply(times[0], unit), rtol=1e-6)
+
+
 def test_the_optimal_fit_is_never_worse_than_the_half_rule(valve):
     for system in (valve(37), lags(1, 0.5, 0.3, 0.1), lags(3, 3, 3)):
         for reduce in (cr.design.reduce_fopdt, cr.design.reduce_sopdt):

@@ -59,9 +59,9 @@ def reduce_fopdt(
 
     Raises
     ------
-    An unstable system, several channels, no static gain; for the half rule also a core that has no
-    continuous equivalent.
-        has no continuous counterpart.
+    UnsuitableSystemError
+        An unstable system, several channels, no static gain; for the half rule also a core that has
+        no continuous counterpart.
 
     Notes
     -----
@@ -247,9 +247,11 @@ def _by_fit(
 ) -> ProcessModel:
     """Fit lags and a dead time of at least `dead_time`."""
     lags = order - int(integrating)
+    # in units of the span: differences and tolerances of least_squares are absolute below 1
+    span = time[-1]
+    time, dead_time, shape = time / span, dead_time / span, shape / (span if integrating else 1)
     # Sum of dead time and lags: the area above the step response, or the offset of the ramp.
     total = _total(time, shape, integrating)
-    span = time[-1]
 
     def unpack(p: FloatArray) -> tuple[float, float, float]:
         first, second = ([float(x) for x in p[:lags]] + [0.0, 0.0])[:2]
@@ -259,9 +261,9 @@ def _by_fit(
         lag, second, later = unpack(p)
         return process_step(time, lag, second, later, integrating=integrating) - shape
 
-    tiny = 1e-9 * span
+    tiny = 1e-9
     lower = np.array([*[tiny] * lags, dead_time])
-    upper = np.full(lags + 1, 2 * span + dead_time)
+    upper = np.full(lags + 1, 2 + dead_time)
     best: Any = None
     for share in (0.1, 0.4, 0.7):
         parts = {0: [total], 1: [(1 - share) * total, share * total]}.get(
@@ -276,6 +278,7 @@ def _by_fit(
     if last < NO_LAG * total:
         dead_time += last
         lag, second = 0.0 if integrating else lag, 0.0
+    lag, second, dead_time = span * lag, span * second, span * dead_time
     return ProcessModel(gain, lag, dead_time, second, integrating, "optimal")
 
 
