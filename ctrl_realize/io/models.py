@@ -56,7 +56,7 @@ def save_model(
     path : path-like
         File to write; an existing one is replaced.
     system : DelayedStateSpace, DelaySystem or control.StateSpace
-        A plain model must be discrete, with a sample time, and is stored with delay 0.
+        A plain model is stored with delay 0; a discrete one needs a sample time.
     settings : mapping, optional
         Numbers, text and lists of them to store, such as how the model was found.
     note : str, optional
@@ -149,7 +149,8 @@ def model_to_text(
     if not isinstance(system, DelayedStateSpace | DelaySystem):
         # anything but a system is refused by DelayedStateSpace
         name = system.name if isinstance(system, ct.InputOutputSystem) else None
-        model = DelayedStateSpace(system, name=name)
+        continuous = isinstance(system, ct.StateSpace) and not system.dt
+        model = (DelaySystem if continuous else DelayedStateSpace)(system, name=name)
     fit = model.fit if isinstance(model, DelayedStateSpace) else None
     content = {
         "format": FORMAT,

@@ -222,7 +222,6 @@ def test_what_cannot_be_saved_leaves_the_old_model_and_no_file(file, model):
     before = file.read_bytes()
     for what, settings in (
         (model, {"bad": {1, 2}}),
-        (ct.ss(-1, 1, 1, 0), {}),
         (ct.ss(0.5, 1, 1, 0, True), {}),
         (ct.tf([1], [1, 0.5], 0.1), {}),
         (ct.StateSpace([[0.5]], [[np.inf]], [[1.0]], [[0.0]], 0.1), {}),
@@ -246,6 +245,17 @@ def test_a_model_that_was_loaded_is_saved_as_it_was_and_keeps_its_interval(tmp_p
     assert told[0] == told[1]
     save_model(tmp_path / "b.json", again)
     assert (tmp_path / "a.json").read_bytes() == (tmp_path / "b.json").read_bytes()
+
+
+def test_a_plain_continuous_model_is_stored_without_delay(tmp_path):
+    tank = ct.ss([[-0.5]], [[1.0]], [[2.0]], [[0.0]], name="tank", inputs="valve", outputs="level")
+    for system in (tank, ct.ss([], [], [], [[3.0]], inputs="valve", outputs="level")):
+        save_model(tmp_path / "a.json", system)
+        again = load_model(tmp_path / "a.json")
+        assert (again.dt, again.input_labels) == (system.dt, system.input_labels)
+        assert again(0.3j) == system(0.3j)
+    with pytest.raises(UnsuitableSystemError, match="expected a sample time"):
+        save_model(tmp_path / "a.json", ct.ss([[0.5]], [[1.0]], [[2.0]], [[0.0]], True))
 
 
 def test_an_actuator_is_stored_with_its_model(tmp_path):
