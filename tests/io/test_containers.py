@@ -385,6 +385,20 @@ def test_a_sheet_is_read_like_a_text_table(tmp_path):
         read_record(path, max_bytes=7000)
 
 
+@pytest.mark.parametrize("shown", ["h:mm:ss", "[h]:mm:ss", "mm:ss.0"])
+@pytest.mark.parametrize("first", [0.0, 0.9])
+def test_clocks_of_excel_go_on_after_a_day(tmp_path, shown, first):
+    """Times are fractions of a day, 1.5 is shown as 12:00: beyond a day openpyxl has a date."""
+    openpyxl = pytest.importorskip("openpyxl")
+    sheet = openpyxl.Workbook().active
+    sheet.append(["time", "u", "y"])
+    for k in range(100):
+        sheet.append([first + k / 2, float(k > 5), 0.1 * k])
+        sheet.cell(sheet.max_row, 1).number_format = shown
+    sheet.parent.save(tmp_path / "a.xlsx")
+    assert_array_equal(read_record(tmp_path / "a.xlsx").time, 43200.0 * np.arange(100))
+
+
 def test_hdf5_files_of_others_are_read(tmp_path):
     h5py = pytest.importorskip("h5py")
     path = tmp_path / "a.h5"

@@ -20,6 +20,9 @@ from ..text.source import TextSource
 
 _FEWEST_ROWS = 3
 """A sheet with fewer filled rows is no record."""
+_FIRST_YEAR = 1904
+"""Dates before it are durations: Excel shows 1.5 days as 12:00, and openpyxl as a date of 1900."""
+_DAY_0 = datetime.datetime(1899, 12, 31)
 
 
 def is_workbook(path: Path) -> bool:
@@ -92,7 +95,9 @@ def _cell(cell: Any) -> str:
         return ""
     if isinstance(value, int | float) and "%" in str(cell.number_format):
         return f"{100 * value:.15g}%"  # what is shown as 20 % is stored as 0.2
-    if isinstance(value, datetime.datetime) and value.time() == datetime.time():
+    if isinstance(value, datetime.datetime) and value.year < _FIRST_YEAR:
+        value -= _DAY_0  # a clock of more than 24 h
+    elif isinstance(value, datetime.datetime) and value.time() == datetime.time():
         value = value.date()
     if isinstance(value, datetime.timedelta):
         minutes, seconds = divmod(value.total_seconds(), 60)
