@@ -98,6 +98,15 @@ def number_of(text: str, notation: str) -> float:
     return float(plain.replace(",", "."))
 
 
+def complex_of(text: str, notation: str) -> complex:
+    """Value of a text such as ``0.5-0.3i``, ``(0.5 - 0.3j)`` or ``0.5-j0.3``; NaN if it is none."""
+    plain = "".join(text.strip("()").split()).lower().replace(notation[0], ".").replace("i", "j")
+    try:
+        return complex(re.sub(r"j\*?([\d.].*)|\*j", r"\1j", plain))
+    except ValueError:
+        return math.nan
+
+
 def kind_of(cell: str, notation: str) -> Literal["number", "time", "missing", "text"]:
     """Return the kind of a cell."""
     if NUMBER[notation].fullmatch(measured(cell)[0]):

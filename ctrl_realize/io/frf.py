@@ -72,7 +72,8 @@ def read_frf(
     imag : str or int, optional
         Column of the imaginary part.
     response : str or int, optional
-        A complex array, in place of magnitude and phase, or real and imaginary part.
+        Complex numbers (as text ``0.5-0.3i``), in place of magnitude and phase, or real and
+        imaginary part.
     coherence, std : str or int, optional
         Columns of the coherence, and of the standard deviation of the complex response, in its
         unit.

@@ -10,8 +10,8 @@ from typing import Any, NoReturn
 import numpy as np
 
 from ..errors import DataError
-from ..numerics.arrays import BoolArray, FloatArray
-from .cells import BAD_VALUES, MISSING, NUMBER, STATES, measured, number_of
+from ..numerics.arrays import BoolArray
+from .cells import BAD_VALUES, MISSING, NUMBER, STATES, complex_of, measured, number_of
 
 _NOTHING = np.empty(0)
 _LONGEST_WORD = 60
@@ -124,7 +124,7 @@ class Table:
             standing = [float(word) for word in words if NUMBER["."].fullmatch(word)]
             values, missing = cells, np.isnan(cells) | np.isin(cells, standing)
         else:
-            values, missing = self._parsed(index, words, skipped)
+            values, missing = self._parsed(index, words, skipped, complex_too)
         bad = ~(np.isfinite(values) & ~missing | skipped)
         if keep_missing:
             bad &= ~missing
@@ -137,8 +137,8 @@ class Table:
         return np.where(missing | skipped, np.nan, values).astype(kind)
 
     def _parsed(
-        self, index: int, words: frozenset[str], skipped: BoolArray
-    ) -> tuple[FloatArray, BoolArray]:
+        self, index: int, words: frozenset[str], skipped: BoolArray, complex_too: bool
+    ) -> tuple[np.ndarray[Any, np.dtype[Any]], BoolArray]:
         """Numbers of a column of text, NaN for other cells, and which of them have no value."""
         import pandas as pd
 
@@ -152,14 +152,15 @@ class Table:
         positions = STATES if others <= STATES.keys() else {}
         parts = [measured(positions.get(word, kind)) for word, kind in zip(low, kinds, strict=True)]
         empty = np.array([word in missing for word in low], dtype=bool)
-        found = np.array([number_of(one, self.decimal) for one, _ in parts], dtype=np.float64)
+        value_of = complex_of if complex_too else number_of
+        found = np.array([value_of(one, self.decimal) for one, _ in parts])
         values = np.where(empty, np.nan, found)[place]
         units = np.array([unit for _, unit in parts], dtype=object)[place]
         self._check_units(index, units, np.where(skipped, np.nan, values))
         return values, empty[place]
 
     def _check_units(
-        self, index: int, units: np.ndarray[Any, np.dtype[Any]], values: FloatArray
+        self, index: int, units: np.ndarray[Any, Any], values: np.ndarray[Any, Any]
     ) -> None:
         """Refuse a column whose numbers have two units; a zero is the same in all."""
         seen = np.isfinite(values) & (values != 0)

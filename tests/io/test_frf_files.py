@@ -111,6 +111,27 @@ def test_complex_arrays_are_read(tmp_path):
     check(read_frf(tmp_path / "a.mat"))
 
 
+@pytest.mark.parametrize(
+    ("head", "form"),
+    [
+        ("f,G", "{0.real:.17g}{0.imag:+.17g}j"),
+        ("f,response", "({0.real:.17g} {0.imag:+.17g}i)"),
+        ("f;H", "{0.real:.17g} {0.imag:+.17g} j"),
+        ("f,G", "({0})"),
+    ],
+)
+@pytest.mark.parametrize("decimal", ".,")
+def test_complex_numbers_are_read_as_programs_write_them(tmp_path, head, form, decimal):
+    mark = ";" if decimal == "," else head[1]
+    rows = [f"{f}{mark}{form.format(g)}".replace(".", decimal) for f, g in zip(F, G, strict=True)]
+    file = tmp_path / "a.csv"
+    file.write_text("\n".join([head.replace(head[1], mark), *rows, ""]))
+    check(read_frf(file))
+    file.write_text(file.read_text().replace(rows[3], f"5{decimal}0{mark}1{decimal}2+k"))
+    with pytest.raises(DataError, match=r"line 5: '1[.,]2\+k': is not a number"):
+        read_frf(file)
+
+
 def test_coherence_and_std_come_along_and_a_cut_last_line_does_not(tmp_path):
     file = tmp_path / "two.parts.csv"
     coherence, std = np.linspace(1, 0.2, 5), np.linspace(0.01, 0.1, 5)
