@@ -20,8 +20,8 @@ COARSE = 0.2
 """Share of repeated stamps above which the clock is coarser than the sample time."""
 _APART, _FEW = 0.5, 20
 """Share of rows with one of both signals, in a union of their stamps, and rows that tell it."""
-_LONG = 2.5
-"""Usual steps in which an input may move unseen."""
+_GAP, _LONG = 1.5, 2.5
+"""Usual steps that are a gap, and in which an input may move unseen."""
 
 
 def _in_words(time: FloatArray) -> str:
@@ -107,6 +107,7 @@ class Samples:
                     said = f"{rows.size} samples have missing values, the first in {first}" + (
                         f", and {said}" if said else ""
                     )
+                said += samples._late()
         if said:
             warn_caller(
                 f"{path}: {said}; they are kept as they are (missing='refuse' refuses them)",
@@ -132,6 +133,19 @@ class Samples:
                         "meanwhile; missing='hold' holds its value, as a historian stores it"
                     )
         return input
+
+    def _late(self) -> str:
+        """What an input that moved in a gap of a row or so means; empty if it did not."""
+        steps = np.diff(self.time)
+        late = np.where(np.abs(np.diff(self.input)) > 0, steps, 0.0) - np.median(steps)
+        late = np.atleast_2d(late).max(axis=0)
+        if not (late > (_GAP - 1) * np.median(steps)).any():
+            return ""
+        row = int(np.argmax(late))
+        return (
+            f"; the input moved in the gap before {self.place(row + 1)}, up to {late[row]:g} s "
+            "before the sample from which it counts: a dead time may be as much longer"
+        )
 
     def joined(self, period: float) -> Samples:
         """Return the samples with the turns of counters among the outputs joined.

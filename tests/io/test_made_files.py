@@ -69,6 +69,12 @@ def test_a_gap_in_which_the_input_moved_is_refused_and_others_are_kept_and_told(
     assert np.isnan(record.output[20:30]).all()
     with pytest.raises(TimeAxisError, match=r"no values between 19 s and 30 s \(line 22\).*hold"):
         cr.read_record(wrote(np.where(t < 25, 0.0, 1.0)))
+    t = np.r_[0:20.0, 21:60.0]
+    with pytest.warns(DataWarning, match="moved in the gap before line 22, up to 1 s before the"):
+        cr.read_record(wrote(np.where(t < 20, 0.0, 1.0)))
+    with pytest.warns(DataWarning) as told:
+        cr.read_record(wrote(np.where(t < 40, 0.0, 1.0)))
+    assert "moved" not in str(told[0].message)
 
 
 def test_thousands_separators_are_told_apart_from_decimal_signs(tmp_path):
