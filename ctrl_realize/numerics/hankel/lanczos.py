@@ -3,20 +3,20 @@
 The singular values of a symmetric matrix are the magnitudes of its
 eigenvalues, so one symmetric eigenproblem replaces the SVD of Kung's
 algorithm. Many Hankel matrices (one for each candidate delay) go through the
-recurrence together; every product is an FFT, every step is a handful of
-array operations over all of them.
+recurrence together [1]_; every product is an FFT, every step is a handful of
+array operations over all of them. Every new vector is made orthogonal to all before.
 
 The recurrence is stopped by the residual ``|H v - lambda v|`` of each wanted pair, not by a number
-of steps. Matrices that do not converge, or break down before the whole spectrum is found, are
-solved by a dense solver or by ARPACK. Bases shared between delays and randomised range finders are
-faster, but errors of up to 10 % were measured on unfiltered data.
+of steps. Where a Krylov space is exhausted, it goes on from a random vector orthogonal to it, until
+a product with such a vector vanishes: one start vector finds one copy of a multiple eigenvalue.
+Matrices that do not converge, or have eigenvalues of equal magnitude, are solved by a dense solver
+or by ARPACK. Bases shared between delays and randomised range finders are faster, but errors of up
+to 10 % were measured on unfiltered data.
 
 References
 ----------
 .. [1] B. N. Parlett, The Symmetric Eigenvalue Problem, SIAM 1998, chapter 13 (Lanczos algorithms),
    doi:10.1137/1.9781611971163.
-.. [2] H. D. Simon, The Lanczos algorithm with partial reorthogonalization, Math. Comp. 42 (1984)
-   115-142, doi:10.1090/S0025-5718-1984-0725988-X.
 """
 
 from __future__ import annotations
@@ -24,11 +24,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.linalg import eigh_tridiagonal
 from scipy.sparse.linalg import LinearOperator, eigsh
 
 from ..arrays import FloatArray, IntArray
 from .matrix import HankelStack, hankel_matrix
-from .recurrence import FLOOR, LanczosRecurrence
 
 DENSE_SIZE = 64
 """Up to this size a dense solver is as fast."""
@@ -42,23 +42,22 @@ MAX_STEPS = 320
 BASIS_BYTES = 96e6
 """Memory that the basis of one run may take; fewer steps are allowed where it is short."""
 
-CHUNK_BYTES = 8e6
+CHUNK_BYTES = 4e6
 """Size of 32 basis vectors for all members that run together."""
 
-PROBES = 5
-"""Number of matrices that are tested before all are solved."""
-
-LONGEST_WAIT = 10
-"""Number of steps between two tests of the residuals."""
-
-LOOK_COST = 2e5
-"""Numbers in the vectors of a step that costs as much as a look."""
+LOOK_EVERY, LOOK_COST = 6, 2e5
+"""Steps between two tests of the residuals; numbers in the vectors of a step from which on a test
+costs little beside it, so that every step is followed by one."""
 
 TWINS = 1e-10
 """Relative difference of magnitudes up to which eigenvalues are twins."""
 
-LOSS_OVER_TOL = 1e-3
-"""Tolerated loss of orthogonality, relative to the tolerance of the residuals."""
+FLOOR, NOTHING = 1e-14, 1e-13
+"""Residual, and product with a random vector, relative to the largest eigenvalue, that count as
+rounding."""
+
+CANCELLED = 1e-3
+"""Part of a vector that is left by a projection below which it is projected once more."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,6 +79,26 @@ class EigenPairs:
     values: FloatArray
     vectors: FloatArray
     following: FloatArray
+
+    @classmethod
+    def empty(cls, members: int, size: int, count: int) -> EigenPairs:
+        """Return arrays that take pairs as they converge."""
+        return cls(np.zeros((members, count)), np.zeros((members, count, size)), np.zeros(members))
+
+    def part(self, members: IntArray) -> EigenPairs:
+        """Return the positions of consecutive members."""
+        rows = slice(int(members[0]), int(members[-1]) + 1)
+        return EigenPairs(self.values[rows], self.vectors[rows], self.following[rows])
+
+    def put(self, d: int, values: FloatArray, vectors: FloatArray, following: float) -> None:
+        """Store pairs up to the numerical rank; `vectors` may be in their final place already."""
+        magnitude = np.abs(values)
+        rounding = vectors.shape[1] * np.finfo(float).eps * magnitude.max()
+        rank = int(np.count_nonzero(magnitude > rounding))
+        self.values[d, :rank] = values[:rank]
+        self.vectors[d, :rank] = vectors[:rank]
+        self.vectors[d, rank:] = 0.0
+        self.following[d] = following
 
 
 def leading_eigenpairs(h: FloatArray, size: int, count: int, *, tol: float = 1e-9) -> EigenPairs:
@@ -103,7 +122,7 @@ def leading_eigenpairs(h: FloatArray, size: int, count: int, *, tol: float = 1e-
     fixed random vector. (A start in the range of H saves steps; a pure
     eigenvector as a start would miss the others.)
     """
-    result = _Result.empty(h.shape[0], size, count)
+    result = EigenPairs.empty(h.shape[0], size, count)
     small = size <= DENSE_SIZE or 4 * count >= size
     # Several members at a time hide Python's overhead; too many leave the cache.
     chunk = int(np.clip(CHUNK_BYTES // (8 * size * 32), 1, 64))
@@ -118,9 +137,9 @@ def leading_eigenpairs(h: FloatArray, size: int, count: int, *, tol: float = 1e-
                 part.put(d, *_dense(piece[d], size, count))
         else:
             _lanczos(piece, count, size, tol, part)
-        part.values *= scale[:, np.newaxis]
-        part.following *= scale
-    return EigenPairs(result.values, result.vectors, result.following)
+        np.multiply(part.values, scale[:, np.newaxis], out=part.values)
+        np.multiply(part.following, scale, out=part.following)
+    return result
 
 
 def largest_magnitude(h: FloatArray, size: int) -> FloatArray:
@@ -136,75 +155,98 @@ def largest_magnitude(h: FloatArray, size: int) -> FloatArray:
     return np.abs(leading_eigenpairs(h, size, 1, tol=1e-3).values[:, 0])
 
 
-@dataclass
-class _Result:
-    """Collects pairs as they converge."""
-
-    values: FloatArray
-    vectors: FloatArray
-    following: FloatArray
-
-    @classmethod
-    def empty(cls, members: int, size: int, count: int) -> _Result:
-        return cls(np.zeros((members, count)), np.zeros((members, count, size)), np.zeros(members))
-
-    def part(self, members: IntArray) -> _Result:
-        """Return the positions of consecutive members."""
-        rows = slice(int(members[0]), int(members[-1]) + 1)
-        return _Result(self.values[rows], self.vectors[rows], self.following[rows])
-
-    def put(self, d: int, values: FloatArray, vectors: FloatArray, following: float) -> None:
-        """Store pairs up to the numerical rank; `vectors` may be in their final place already."""
-        magnitude = np.abs(values)
-        rounding = vectors.shape[1] * np.finfo(float).eps * magnitude.max()
-        rank = int(np.count_nonzero(magnitude > rounding))
-        self.values[d, :rank] = values[:rank]
-        self.vectors[d, :rank] = vectors[:rank]
-        self.vectors[d, rank:] = 0.0
-        self.following[d] = following
-
-
-def _lanczos(h: FloatArray, count: int, size: int, tol: float, result: _Result) -> None:
+def _lanczos(h: FloatArray, count: int, size: int, tol: float, result: EigenPairs) -> None:
     """Run some matrices together; hand what does not converge to the fallback."""
-    members = np.arange(h.shape[0])
-    room = int(BASIS_BYTES // (8 * size * members.size))
+    members = h.shape[0]
+    room = int(BASIS_BYTES // (8 * size * members))
     capacity = min(size - 1, MAX_STEPS, max(room, 2 * count + 6))
-    run = LanczosRecurrence(h, size, capacity, LOSS_OVER_TOL * tol)
-    pace = _Pace(count + 2, LOOK_COST / (size * members.size))
-    while members.size and run.steps < capacity:
-        run.advance()
-        exhausted = run.exhausted_at <= run.steps
-        if run.steps < pace.next_look and not exhausted.all():
+    every = 1 if size * members > LOOK_COST else LOOK_EVERY
+    product, random = HankelStack(h, size), np.random.default_rng(2005)
+    basis = np.empty((members, capacity + 1, size))
+    basis[:, 0] = start_vectors(h, random.standard_normal(size))
+    diagonal, beside = np.zeros((2, members, capacity))
+    scale, renewed, complete = np.zeros(members), np.zeros(members, bool), np.zeros(members, bool)
+    left = list(range(members))
+    for steps in range(1, capacity + 1):
+        known = basis[:, :steps]
+        w = product(known[:, -1])
+        before = _norms(w)
+        scale = np.maximum(scale, before)
+        diagonal[:, steps - 1] = _subtract_projection(w, known)
+        if (_norms(w) < CANCELLED * before).any():
+            _subtract_projection(w, known)
+        norm = _norms(w)
+        exhausted = norm <= FLOOR * scale
+        complete |= renewed & (before <= NOTHING * scale)
+        beside[:, steps - 1] = np.where(exhausted, 0.0, norm)
+        divisor = np.where(exhausted, np.inf, norm)
+        np.divide(w, divisor[:, np.newaxis], out=basis[:, steps])
+        renewed = exhausted & ~complete
+        if renewed.any():
+            basis[renewed, steps] = _beside(known[renewed], random.standard_normal(size))
+        if steps < count + 2 or (steps - count - 2) % every:
             continue
-        for i in np.unique(np.linspace(0, members.size - 1, PROBES).astype(np.intp)):
-            excess = _excess(*run.ritz(int(i), count)[:2], tol)
-            if excess > 1:
+        while left and (complete[left[-1]] or not exhausted[left[-1]]):
+            d = left[-1]
+            values, coordinates = _ritz(diagonal[d, :steps], beside[d, : steps - 1], count + 1)
+            # |H v - theta v| = beta_j |last entry of the eigenvector of T|: Parlett, chapter 13.
+            residuals = beside[d, steps - 1] * np.abs(coordinates[-1, :count])
+            if _excess(values[:count], residuals, tol) > 1:
                 break
-        pace.set(run.steps, excess)
-        if excess > 1:
-            continue
-        doubtful = exhausted & ~run.sees_everything() if exhausted.any() else exhausted
-        pairs = [run.ritz(i, count) for i in range(members.size)]
-        left = [i for i, pair in enumerate(pairs) if _excess(*pair[:2], tol) > 1]
-        if not left:
-            run.end_products()
-        for i in sorted(set(range(members.size)) - set(left)):
-            d = int(members[i])
-            values, _, coordinates, following = pairs[i]
-            if doubtful[i] or _has_twins(values, following):
-                _fall_back(h[d], size, count, run.mixture(i, coordinates), result, d)
+            left.pop()
+            if _has_twins(values):
+                _fall_back(h[d], size, count, basis[d, 0], result, d)
             else:
                 # directly to their place: for a million samples there is no memory for a copy
-                vectors = result.vectors[d, : values.size]
-                run.vectors(i, coordinates, vectors)
-                result.put(d, values, vectors, following)
-        members = members[left]
-        if left:
-            run.keep(np.array(left))
-    starts = [run.mixture(i, run.ritz(i, count)[2]) for i in range(members.size)]
-    del run  # the basis is the largest thing here, and ARPACK makes its own
-    for d, start in zip(members.tolist(), starts, strict=True):
+                vectors = result.vectors[d, :count]
+                np.matmul(coordinates[:, :count].T, basis[d, :steps], out=vectors)
+                result.put(d, values[:count], vectors, float(abs(values[count])))
+        if not left:
+            return
+    starts = basis[left, 0]
+    del basis, known  # the basis is the largest thing here, and ARPACK makes its own
+    for d, start in zip(left, starts, strict=True):
         _fall_back(h[d], size, count, start, result, d)
+
+
+def start_vectors(h: FloatArray, random: FloatArray) -> FloatArray:
+    """Return unit start vectors: first column plus a random one."""
+    vectors = np.zeros((h.shape[0], random.size))
+    column = h[:, : random.size]
+    norm = np.linalg.norm(column, axis=1, keepdims=True)
+    vectors[:, : column.shape[1]] = column / np.where(norm > 0, norm, 1.0)
+    vectors += random / np.linalg.norm(random)
+    vectors /= np.linalg.norm(vectors, axis=1, keepdims=True)
+    return vectors
+
+
+def _subtract_projection(w: FloatArray, basis: FloatArray) -> FloatArray:
+    """Make vectors orthogonal to some basis vectors; return what was in the last of these."""
+    inner = np.matmul(basis, w[:, :, np.newaxis])
+    w -= np.matmul(inner.transpose(0, 2, 1), basis)[:, 0]
+    last: FloatArray = inner[:, -1, 0]
+    return last
+
+
+def _beside(basis: FloatArray, random: FloatArray) -> FloatArray:
+    """Return unit vectors orthogonal to some basis vectors, from a random one."""
+    w = np.tile(random, (basis.shape[0], 1))
+    for _ in range(2):
+        _subtract_projection(w, basis)
+    return w / _norms(w)[:, np.newaxis]
+
+
+def _norms(w: FloatArray) -> FloatArray:
+    squares: FloatArray = np.einsum("ij,ij->i", w, w)
+    return np.sqrt(squares)
+
+
+def _ritz(diagonal: FloatArray, beside: FloatArray, count: int) -> tuple[FloatArray, FloatArray]:
+    """Return the eigenpairs of a tridiagonal matrix with the largest magnitudes."""
+    pairs = eigh_tridiagonal(diagonal, beside, check_finite=False)
+    values, vectors = (np.asarray(part, dtype=np.float64) for part in pairs)
+    order = np.argsort(-np.abs(values), kind="stable")[:count]
+    return values[order], vectors[:, order]
 
 
 def _excess(values: FloatArray, residuals: FloatArray, tol: float) -> float:
@@ -215,35 +257,18 @@ def _excess(values: FloatArray, residuals: FloatArray, tol: float) -> float:
     return largest / asked if asked > 0 else float(largest > 0)
 
 
-def _has_twins(values: FloatArray, following: float) -> bool:
+def _has_twins(values: FloatArray) -> bool:
     """Whether two eigenvalues have the same magnitude, which noise excludes.
 
     A pulse on top of a smooth response has 1 and -1 many times, and one
     start vector finds one of each.
     """
-    magnitude = np.append(np.abs(values), following)
+    magnitude = np.abs(values)
     return bool((magnitude[1:] > (1 - TWINS) * magnitude[:-1]).any())
 
 
-class _Pace:
-    """Determines when to test the residuals again: they decrease about geometrically."""
-
-    def __init__(self, first: int, longest: float) -> None:
-        self.next_look = first
-        self._longest = max(1.0, min(longest, LONGEST_WAIT))
-        self._looked = 0
-        self._excess = np.inf
-
-    def set(self, steps: int, excess: float) -> None:
-        since, pause = steps - self._looked, min(2.0, self._longest)
-        if 1 < excess < self._excess < np.inf:
-            needed = since * np.log(excess) / np.log(self._excess / excess)
-            pause = min(max(0.6 * needed, pause), self._longest)
-        self.next_look, self._looked, self._excess = steps + int(pause), steps, excess
-
-
 def _fall_back(
-    h: FloatArray, size: int, count: int, start: FloatArray, result: _Result, d: int
+    h: FloatArray, size: int, count: int, start: FloatArray, result: EigenPairs, d: int
 ) -> None:
     """Solve one matrix without the recurrence: dense, or ARPACK with restarts when large."""
     if size <= DENSE_FALLBACK_SIZE:

@@ -16,12 +16,10 @@ References
 
 from __future__ import annotations
 
-from copy import copy
-
 import numpy as np
 from scipy.fft import next_fast_len
 
-from ..arrays import ComplexArray, FloatArray, IntArray
+from ..arrays import ComplexArray, FloatArray
 
 
 def fft_length(n: int) -> int:
@@ -88,18 +86,9 @@ class HankelStack:
     def __init__(self, h: FloatArray, size: int) -> None:
         self.size = size
         self.points = fft_length(2 * size - 1)
-        self._use(np.fft.rfft(h, n=self.points))
-
-    def _use(self, spectrum: ComplexArray) -> None:
-        self._spectrum = spectrum
-        self._transform: ComplexArray = np.empty_like(spectrum)
-        self._product: FloatArray = np.empty((spectrum.shape[0], self.points))
-
-    def take(self, members: IntArray) -> HankelStack:
-        """Return a stack of some of the matrices."""
-        taken = copy(self)
-        taken._use(self._spectrum[members])
-        return taken
+        self._spectrum: ComplexArray = np.fft.rfft(h, n=self.points)
+        self._transform: ComplexArray = np.empty_like(self._spectrum)
+        self._product: FloatArray = np.empty((h.shape[0], self.points))
 
     def __call__(self, vectors: FloatArray) -> FloatArray:
         """Multiply matrix `d` by ``vectors[d]``.
