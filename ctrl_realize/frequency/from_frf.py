@@ -39,7 +39,7 @@ def impulse_from_frf(
     dt: float,
     length: int,
     *,
-    kernel: Literal["TC", "DC", "SS"] = "SS",
+    kernel: Literal["TC", "SS"] = "SS",
     weighting: Literal["auto", "std", "relative", "uniform"] = "auto",
     hold: Literal["auto", "zoh"] | None = "auto",
     band_hz: tuple[float, float] | None = None,
@@ -59,7 +59,7 @@ def impulse_from_frf(
         Sample time of the response in s.
     length : int
         Number of Markov parameters; the response must have decayed within it.
-    kernel : {"TC", "DC", "SS"}
+    kernel : {"TC", "SS"}
         Prior; "SS" is smooth, "TC" allows a jump at lag 0 (see `impulse_from_io`).
     weighting : {"auto", "std", "relative", "uniform"}
         As for `fit_frf`, but "auto" is "std" if there is one, otherwise "uniform".
@@ -116,7 +116,7 @@ def impulse_from_frf(
     >>> print(f"{g.markov.sum():.3f}", np.abs(g.markov[:5]).max() < 0.002)
     1.000 True
     """
-    kernel = one_of(kernel, "kernel", ("TC", "DC", "SS"))
+    kernel = one_of(kernel, "kernel", ("TC", "SS"))
     step = positive(dt, "dt", "sample time in s")
     count = integer(length, "length", 8)
     weighting = one_of(weighting, "weighting", ("auto", "std", "relative", "uniform"))

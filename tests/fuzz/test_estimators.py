@@ -146,7 +146,7 @@ def test_any_record_is_identified_by_the_scan_or_refused(rng):
 
 WAYS = {
     "method": of("auto", "regularized", "least_squares", "okid"),
-    "kernel": of("DC", "other"),
+    "kernel": of("TC", "other"),
     "start": of("rest", "unknown", 3),
 }
 

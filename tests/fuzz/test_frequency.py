@@ -91,7 +91,7 @@ def test_any_measured_response_is_fitted_or_refused(rng):
 
 
 WAYS = {
-    "kernel": of("TC", "TC", "DC", "other"),
+    "kernel": of("TC", "TC", "SS", "other"),
     "weighting": of("std", "relative", "uniform", "auto"),
     "hold": of("zoh", "foh"),
     "band_hz": lambda rng: (any_float(rng), any_float(rng)),

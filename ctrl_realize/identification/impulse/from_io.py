@@ -20,7 +20,7 @@ from .estimator import Choice, choose_estimate
 from .regression import PulseRegression, through_arx, with_prior, without_prior
 
 Method = Literal["auto", "regularized", "least_squares", "okid"]
-Kernel = Literal["auto", "TC", "DC", "SS"]
+Kernel = Literal["auto", "TC", "SS"]
 Start = Literal["unknown", "rest"]
 
 SHORTEST, LONGEST = 100, 1 / 3
@@ -65,10 +65,9 @@ def impulse_from_io(
         than `length` free parameters can describe. ``"auto"``: ``"okid"`` if it halves the
         prediction error of ``"regularized"`` on the held-back last third of the data, otherwise
         ``"regularized"``.
-    kernel : {"auto", "TC", "DC", "SS"}
-        Prior of the regularized method. TC allows a jump at lag 0, SS is smooth, DC estimates the
-        correlation of neighbours; ``"auto"``: TC or SS, whichever has the larger marginal
-        likelihood, for each output separately.
+    kernel : {"auto", "TC", "SS"}
+        Prior of the regularized method. TC allows a jump at lag 0, SS is smooth; ``"auto"``:
+        whichever has the larger marginal likelihood, for each output separately.
     start : {"unknown", "rest"}
         Input before the record: unknown (the first ``length - 1`` outputs, or as many as the order
         of the ARX model, are then only used as past values), or steady state at the first sample of
@@ -128,7 +127,7 @@ def impulse_from_io(
     True
     """
     method = one_of(method, "method", ("auto", "regularized", "least_squares", "okid"))
-    kernel = one_of(kernel, "kernel", ("auto", "TC", "DC", "SS"))
+    kernel = one_of(kernel, "kernel", ("auto", "TC", "SS"))
     start = one_of(start, "start", ("unknown", "rest"))
     group = as_group(records)
     longest = max(record.n_samples for record in group)

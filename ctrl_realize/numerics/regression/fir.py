@@ -1,6 +1,6 @@
 """Regularised impulse responses: Gaussian priors tuned by their marginal likelihood.
 
-The priors are those of `kernel_priors`; decay and size of the response are estimated from the data
+The priors are those of `kernel_prior`; decay and size of the response are estimated from the data
 by `kernel_search` [1]_. `cautious_std` is our own: a posterior standard deviation is valid only if
 the prior is.
 
@@ -19,12 +19,8 @@ import numpy as np
 from scipy.linalg import block_diag, solve_triangular
 
 from ..arrays import FloatArray
-from .kernel_prior import prior_of
 from .kernel_search import CLOSE, KernelProblem
 from .normal_equations import NormalEquations
-
-CHOSEN_FROM = ("TC", "SS")
-"""Kernels that are compared by default: a search for DC takes several times as long."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,16 +28,14 @@ class KernelFit:
     """Posterior of the pulse response of one output.
 
     ``markov`` (m, n) is the mean and ``std`` its standard deviation; `decay` (m,) is lambda,
-    `correlation` (m,) the correlation of neighbours, `scale` (m,) c, and `evidence` the log
-    marginal likelihood up to a constant. ``effective`` is the number of parameters determined by
-    the data, trace(I - M^-1); ``kernel`` is the prior.
+    `scale` (m,) c, and `evidence` the log marginal likelihood up to a constant. ``effective`` is
+    the number of parameters determined by the data, trace(I - M^-1); ``kernel`` is the prior.
     """
 
     markov: FloatArray
     std: FloatArray
     noise_variance: float
     decay: FloatArray
-    correlation: FloatArray
     scale: FloatArray
     evidence: float
     effective: float
@@ -56,12 +50,12 @@ def fit_kernel(equations: NormalEquations, lags: int, kernel: str) -> KernelFit:
     equations : NormalEquations
         Of ``m * lags`` regressors, one target.
     lags : int
-    kernel : {"TC", "DC", "SS", "auto"}
+    kernel : {"TC", "SS", "auto"}
         ``"auto"``: TC or SS, whichever has the larger marginal likelihood.
     """
     problem = KernelProblem.of(equations, lags, kernel)
     if kernel == "auto":
-        tried = [replace(problem, kernel=name) for name in CHOSEN_FROM]
+        tried = [replace(problem, kernel=name) for name in ("TC", "SS")]
         problem = min(tried, key=lambda each: each.roughly()[1])
     return _posterior(problem, problem.best())
 
@@ -92,14 +86,12 @@ def _posterior(problem: KernelProblem, x: FloatArray) -> KernelFit:
     wide = block_diag(*factors)
     spread = solve_triangular(found.C, wide.T, lower=True)
     inverse_diagonal = solve_triangular(found.C, np.eye(m * lags), lower=True)
-    decay, correlation, scale = prior_of(x, m, problem.kernel)
     return KernelFit(
         markov=(wide @ weights).reshape(m, lags),
         std=np.sqrt(variance * (spread**2).sum(axis=0)).reshape(m, lags),
         noise_variance=variance,
-        decay=decay,
-        correlation=correlation,
-        scale=scale * variance,
+        decay=np.exp(-np.exp(x[::2])),
+        scale=np.exp(x[1::2]) * variance,
         evidence=-found.value / 2,
         effective=float(m * lags - (inverse_diagonal**2).sum()),
         kernel=problem.kernel,

@@ -1,15 +1,14 @@
-r"""Gaussian priors of pulse responses that decay: the kernels TC, DC and SS.
+r"""Gaussian priors of pulse responses that decay: the kernels TC and SS.
 
 The covariance is c D K D, where D = diag(lambda^(w i)) is the decay and K a stationary correlation
 of neighbours:
 
 - TC ("tuned/correlated" [1]_): lambda^max(i, j), so w = 1/2 and K = lambda^(\|i-j\|/2);
-- DC ("diagonal/correlated" [1]_): w = 1/2 and K = rho^\|i-j\| with rho free;
 - SS ("stable spline" [2]_): w = 3/2 and
   K = (3 lambda^(\|i-j\|/2) - lambda^(3\|i-j\|/2)) / 2, smoother.
 
-Hyper-parameters are the rows (log rate, [log rate of neighbours,] log c / sigma^2), one for each
-input, where lambda = exp(-rate).
+Hyper-parameters are the rows (log rate, log c / sigma^2), one for each input, where
+lambda = exp(-rate).
 
 References
 ----------
@@ -28,26 +27,7 @@ from scipy.linalg.lapack import dpotrf
 from ..arrays import FloatArray
 
 
-def shape_count(kernel: str) -> int:
-    """Count the hyper-parameters of one input that shape its prior, without the scale."""
-    return 2 if kernel == "DC" else 1
-
-
-def prior_of(x: FloatArray, m: int, kernel: str) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return lambda, the correlation of neighbours and c / sigma^2 of every input, (m,) each."""
-    rows = x.reshape(m, -1)
-    rate = np.exp(rows[:, 0])
-    decay = np.exp(-rate)
-    if kernel == "DC":
-        correlation = np.exp(-np.exp(rows[:, 1]))
-    elif kernel == "TC":
-        correlation = np.exp(-rate / 2)
-    else:
-        correlation = (3 * np.exp(-rate / 2) - np.exp(-1.5 * rate)) / 2
-    return decay, correlation, np.exp(rows[:, -1])
-
-
-def prior_factors(x: FloatArray, m: int, lags: int, group: int, kernel: str) -> list[FloatArray]:
+def prior_factors(x: FloatArray, lags: int, group: int, kernel: str) -> list[FloatArray]:
     """Return sqrt(c / sigma^2) D L of every input: lower triangular, `lags` rows.
 
     Taps are `group` samples apart, the first one in the middle of its group.
@@ -55,8 +35,7 @@ def prior_factors(x: FloatArray, m: int, lags: int, group: int, kernel: str) -> 
     factors = []
     index = group * np.arange(lags)
     apart = np.arange(lags)[:, None] - np.arange(lags)
-    for row in x.reshape(m, -1):
-        rate, scale = np.exp(row[0]), np.exp(row[-1] / 2)
+    for rate, scale in zip(np.exp(x[::2]), np.exp(x[1::2] / 2), strict=True):
         if kernel == "SS":
             slow, fast = np.exp(-rate / 2 * index), np.exp(-1.5 * rate * index)
             K = ((3 * slow - fast) / 2)[np.abs(apart)]
@@ -65,10 +44,9 @@ def prior_factors(x: FloatArray, m: int, lags: int, group: int, kernel: str) -> 
             L = cholesky(K)
             decline = 1.5 * rate
         else:
-            step = np.exp(row[1]) if kernel == "DC" else rate / 2
-            L = np.where(apart < 0, 0.0, np.exp(-step * index)[np.abs(apart)])
+            L = np.where(apart < 0, 0.0, np.exp(-rate / 2 * index)[np.abs(apart)])
             # Cholesky factor of rho^|i-j|: rho^(i-j) sqrt(1 - rho^2), that of a Markov chain.
-            L[:, 1:] *= np.sqrt(-np.expm1(-2 * step * group))
+            L[:, 1:] *= np.sqrt(-np.expm1(-rate * group))
             decline = rate / 2
         exponent = decline * (index + (group + 1) / 2)
         # Squares of numbers below 1e-154 are denormal numbers, which are slow.

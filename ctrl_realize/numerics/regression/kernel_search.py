@@ -27,7 +27,7 @@ from scipy.linalg.lapack import dtrtrs
 from scipy.optimize import minimize
 
 from ..arrays import FloatArray
-from .kernel_prior import cholesky, prior_factors, shape_count
+from .kernel_prior import cholesky, prior_factors
 from .normal_equations import NormalEquations
 
 FEW = 40
@@ -104,7 +104,7 @@ class KernelProblem:
 
     def factors(self, x: FloatArray) -> list[FloatArray]:
         """Lower-triangular F of every input."""
-        return prior_factors(x, self.inputs, self.taps, self.group, self.kernel)
+        return prior_factors(x, self.taps, self.group, self.kernel)
 
     def likelihood(self, factors: list[FloatArray]) -> Likelihood:
         """Evaluate the likelihood of a prior with these factors."""
@@ -130,8 +130,9 @@ class KernelProblem:
         """Guess: the response decays within a third of the window and explains the output."""
         energy = np.diag(self.gram).reshape(self.inputs, self.taps).mean(axis=1)
         signal = 20.0 * self.freedom / np.maximum(energy, 1e-300) / self.taps
-        shape = [np.log(6.0 / self.taps), np.log(3.0 / self.taps)][: shape_count(self.kernel)]
-        return np.concatenate([[*shape, np.log(s)] for s in signal])
+        rate = np.full(self.inputs, 6.0 / self.taps)
+        guess: FloatArray = np.log(np.stack([rate, signal], axis=1))
+        return guess.ravel()
 
     def roughly(self) -> tuple[FloatArray, float]:
         """Search with grouped taps, which is fast."""
@@ -150,12 +151,11 @@ class KernelProblem:
 
         The simplex starts with steps of `size`, and ends with a thirtieth of that.
         """
-        span = self.taps * self.group
-        m, shapes = self.inputs, shape_count(self.kernel)
-        low = np.tile([np.log(0.1 / span)] * shapes + [-80.0], m)
-        high = np.tile([np.log(3.0)] * shapes + [80.0], m)
+        m, span = self.inputs, self.taps * self.group
+        low = np.tile([np.log(0.1 / span), -80.0], m)
+        high = np.tile([np.log(3.0), 80.0], m)
         # If one point has 1e77 times the weight of another, the prior is narrow from the start.
-        low[shapes :: shapes + 1] = np.minimum(-80.0, start[shapes :: shapes + 1] - 40.0)
+        low[1::2] = np.minimum(-80.0, start[1::2] - 40.0)
 
         def misfit(x: FloatArray) -> float:
             try:
@@ -165,11 +165,10 @@ class KernelProblem:
                 # Not infinity, because the search computes differences.
                 return _WORST
 
-        steps = np.tile([size] * shapes + [2 * size], m)
+        steps = np.tile([size, 2 * size], m)
         inside = np.clip(start, low, high)
-        scales = slice(shapes, None, shapes + 1)
-        while misfit(inside) >= _WORST and (inside[scales] > low[scales]).any():
-            inside[scales] = np.maximum(inside[scales] - 3.0, low[scales])
+        while misfit(inside) >= _WORST and (inside[1::2] > low[1::2]).any():
+            inside[1::2] = np.maximum(inside[1::2] - 3.0, low[1::2])
         # From a start at a bound, steps go inward; otherwise the simplex would be flat there.
         steps = np.where(inside + steps > high, -steps, steps)
         simplex = np.vstack([inside, inside + np.diag(steps)])

@@ -12,7 +12,6 @@ from tests.rigs import DT, TWO_STATES
 
 METHODS = [
     {"method": "regularized", "kernel": "TC"},
-    {"method": "regularized", "kernel": "DC"},
     {"method": "regularized", "kernel": "SS"},
     {"method": "least_squares"},
     {"method": "okid"},
@@ -88,7 +87,7 @@ def test_an_output_that_does_not_follow_is_flagged(options):
     assert flagged >= 18  # a test at 1 %, with room for two alarms
 
 
-@pytest.mark.parametrize("kernel", ["auto", "TC", "DC", "SS"])
+@pytest.mark.parametrize("kernel", ["auto", "TC", "SS"])
 def test_the_errors_of_a_regularized_response_hold_the_truth_also_where_it_dies_away(kernel):
     # two lags of 0.8 and 4 Hz behind ten samples; the smooth prior alone held 22 % of the tail
     core = ct.tf([1], [1 / (2 * np.pi * 0.8), 1]) * ct.tf([1], [1 / (2 * np.pi * 4.0), 1])
