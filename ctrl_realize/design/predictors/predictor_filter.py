@@ -11,12 +11,11 @@ from ...numerics.state_space.balancing import Part
 Filter = tuple[FloatArray, FloatArray, FloatArray, float]
 
 
-def predictor_filter(alpha: float, delay: int, poles: FloatArray, *, integrating: bool) -> Filter:
-    r"""Design a low-pass filter of unit gain that removes given poles from the predictor.
+def predictor_filter(alpha: float, delay: int, *, integrating: bool) -> Filter:
+    r"""Design a low-pass filter of unit gain, which removes an integrator from the predictor.
 
-    In the basis ``phi_j = (1-a)/(z-a) ((z-1)/(z-a))^j`` the filter F meets ``F(1) = 1``,
-    ``F(p) = p^d`` at each pole, and ``F'(1) = d`` for an integrating core: then
-    ``1 - F(z) z^-d`` has zeros at all of them [1]_.
+    With ``F'(1) = d`` for an integrating core, ``1 - F(z) z^-d`` has a double zero at z = 1 [1]_:
+    ``F = (1-a)/(z-a) (1 + (d (1-a) + 1) (z-1)/(z-a))``.
 
     Parameters
     ----------
@@ -24,10 +23,8 @@ def predictor_filter(alpha: float, delay: int, poles: FloatArray, *, integrating
         Pole of the filter, 0...1.
     delay : int
         Delay of the model in samples.
-    poles : ndarray, shape (s,)
-        Real poles to remove, other than z = 1.
     integrating : bool
-        Whether a pole at z = 1 is removed too.
+        Whether a pole at z = 1 is removed.
 
     Returns
     -------
@@ -39,30 +36,11 @@ def predictor_filter(alpha: float, delay: int, poles: FloatArray, *, integrating
     .. [1] J. E. Normey-Rico and E. F. Camacho, Control of Dead-time Processes, Springer 2007,
        doi:10.1007/978-1-84628-829-6.
     """
-    count = 1 + poles.size + int(integrating)
-    basis = np.arange(count)
-    rows, values = [np.where(basis == 0, 1.0, 0.0)], [1.0]
-    if integrating:
-        # phi_0' = -1/(1-a) and phi_1' = 1/(1-a) at z = 1, all others are 0 there.
-        slope = np.zeros(count)
-        slope[0], slope[1] = -1 / (1 - alpha), 1 / (1 - alpha)
-        rows.append(slope)
-        values.append(float(delay))
-    for p in poles:
-        rows.append((1 - alpha) / (p - alpha) * ((p - 1) / (p - alpha)) ** basis)
-        values.append(float(p) ** delay)
-    weights = np.linalg.solve(np.array(rows), np.array(values))
-    # A cascade: the input of each stage is the stage before it, plus that stage's input.
-    A, B = alpha * np.eye(count), np.zeros((count, 1))
-    B[0] = 1 - alpha
-    for i in range(1, count):
-        A[i, 0] = 1.0
-        A[i, 1:i] = alpha - 1
-    through = np.zeros((count, count))
-    for j in range(count):
-        through[j, 0] = 1.0
-        through[j, 1 : j + 1] = alpha - 1
-    return A, B, (weights @ through)[None, :], 0.0
+    weight = delay * (1 - alpha) + 1
+    A = np.array([[alpha, 0.0], [1.0, alpha]])
+    B = np.array([[1 - alpha], [0.0]])
+    C = np.array([[1 + weight, weight * (alpha - 1)]])
+    return (A, B, C, 0.0) if integrating else (A[:1, :1], B[:1], np.ones((1, 1)), 0.0)
 
 
 def removed_part(filter_: Filter, removed: Part) -> FloatArray:

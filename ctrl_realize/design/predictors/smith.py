@@ -9,7 +9,7 @@ import numpy as np
 
 from ..._checks import positive
 from ...delayed import DelayedStateSpace, DelaySystem
-from ...errors import OptionError, UnsuitableSystemError
+from ...errors import UnsuitableSystemError
 from ...numerics.arrays import FloatArray
 from ...numerics.state_space import responses
 from ...numerics.state_space.balancing import Part, split_modes
@@ -17,7 +17,7 @@ from ..resolved import check_sign, warn_unresolved
 from ..siso import delayed_system, same_rate
 from .checked import CheckedController
 from .continuous_smith import STABILIZE, continuous_smith_predictor, more_robust
-from .predictor_filter import predictor_filter, removed_part
+from .predictor_filter import Filter, predictor_filter, removed_part
 
 ON_CIRCLE = 1e-9
 
@@ -33,8 +33,6 @@ class SmithPredictor(CheckedController):
         Controller of the delay-free core.
     filter_time : float or None
         Time constant of the prediction-error filter in s.
-    removed_poles : ndarray
-        Poles removed from the predictor.
     check : LoopCheck or None
         Check of the closed loop with the plant.
 
@@ -50,7 +48,6 @@ class SmithPredictor(CheckedController):
 
     primary: DelayedStateSpace
     filter_time: float | None
-    removed_poles: FloatArray
 
 
 @overload
@@ -59,7 +56,6 @@ def smith_predictor(
     controller: Any,
     *,
     filter_time: float | None = None,
-    remove_slow: bool | None = None,
     name: str = "smith",
 ) -> DelaySystem: ...
 
@@ -70,7 +66,6 @@ def smith_predictor(
     controller: Any,
     *,
     filter_time: float | None = None,
-    remove_slow: bool | None = None,
     name: str = "smith",
 ) -> SmithPredictor: ...
 
@@ -80,7 +75,6 @@ def smith_predictor(
     controller: Any,
     *,
     filter_time: float | None = None,
-    remove_slow: bool | None = None,
     name: str = "smith",
 ) -> SmithPredictor | DelaySystem:
     """Make a Smith predictor for a controller designed for the delay-free core.
@@ -100,11 +94,8 @@ def smith_predictor(
     filter_time : float, optional
         Time constant in s of the filter on the prediction error. It makes the loop robust to a
         wrong dead time or gain, and slows down load rejection; the set-point response is then
-        shaped by a prefilter. Half the dead time is a usual initial choice.
-    remove_slow : bool, optional
-        Remove poles slower than the dead time from the predictor, so that the response to loads
-        decays with the controller rather than with the plant (for lag-dominated cores). An
-        integrator is always removed. Discrete plants only.
+        shaped by a prefilter. Half the dead time is a usual initial choice. An integrator of a
+        discrete plant is removed from the predictor.
     name : str, optional
 
     Returns
@@ -121,7 +112,7 @@ def smith_predictor(
         core without `filter_time`, for the same reason. An improper or multi-channel system, or
         one with delays in a loop. A controller that makes the loop with `system` itself unstable.
     OptionError
-        An invalid filter.
+        A filter time that is not positive.
 
     Warns
     -----
@@ -131,8 +122,8 @@ def smith_predictor(
 
     Notes
     -----
-    The structure is Smith's [1]_; the filter on the prediction error, and the slow poles that it
-    removes from the predictor, are those of the filtered Smith predictor [2]_, [3]_, [4]_. The
+    The structure is Smith's [1]_; the filter on the prediction error, and how it removes an
+    integrator from the predictor, are those of the filtered Smith predictor [2]_, [3]_, [4]_. The
     prediction is computed as ``y0[k] = sum_i g_i u[k-i] + C A^d x[k-d]``, from the past inputs and
     the state of the delayed model.
 
@@ -170,8 +161,6 @@ def smith_predictor(
     True
     """
     if isinstance(system, DelaySystem) and not system.dt:
-        if remove_slow:
-            raise OptionError("remove_slow is for discrete plants (sys.to_discrete)")
         return continuous_smith_predictor(system, controller, filter_time, name)
     plant = delayed_system(system, "a Smith predictor")
     check_sign(plant, "a Smith predictor")
@@ -189,23 +178,16 @@ def smith_predictor(
             "error. Give filter_time, for instance half the dead time "
             f"({0.5 * d * plant.dt:.3g} s)"
         )
-    if remove_slow and seconds is None:
-        raise OptionError("remove_slow needs filter_time: the filter removes the slow poles")
-    slow = _slow_poles(poles, d) if remove_slow else np.zeros(0)
-    drop = np.concatenate([slow, [1.0]]) if integrating else slow
     A, B, C = (np.asarray(M) for M in (core.A, core.B, core.C))
-    removed, kept = split_modes(
-        A, B, C, lambda z: bool(np.any(np.abs(z - drop) < 1e-9 * (1 + abs(z))))
-    )
+    removed, kept = split_modes(A, B, C, lambda z: integrating and abs(z - 1) < 2 * ON_CIRCLE)
     *parts, pulses = _assemble(
-        plant, primary, removed, kept, _filter(seconds, plant, slow, integrating)
+        plant, primary, removed, kept, _filter(seconds, plant, integrating=integrating)
     )
 
     design = {
         "model": plant,
         "primary": DelayedStateSpace(primary, 0, name=primary.name),
         "filter_time": seconds,
-        "removed_poles": drop,
     }
     dt, output = float(plant.dt), plant.input_labels[0]
     made = SmithPredictor(*parts, dt, name=name, outputs=output, pulses=pulses, design=design)
@@ -229,24 +211,11 @@ def _refuse_unstable(poles: FloatArray) -> None:
         )
 
 
-def _slow_poles(poles: FloatArray, delay: int) -> FloatArray:
-    """Real poles whose time constant exceeds the dead time."""
-    real = poles[np.abs(poles.imag) < 1e-9].real
-    return np.asarray(real[(real > np.exp(-1 / max(delay, 1))) & (np.abs(real - 1) > ON_CIRCLE)])
-
-
-def _filter(
-    seconds: float | None, plant: DelayedStateSpace, slow: FloatArray, integrating: bool
-) -> tuple[FloatArray, FloatArray, FloatArray, float]:
+def _filter(seconds: float | None, plant: DelayedStateSpace, *, integrating: bool) -> Filter:
     if seconds is None:
         return np.zeros((0, 0)), np.zeros((0, 1)), np.zeros((1, 0)), 1.0
     alpha = float(np.exp(-plant.dt / seconds))
-    if np.any(np.abs(slow - alpha) < 1e-6):
-        raise OptionError(
-            f"filter_time={seconds:g} s equals the time constant of a pole to be removed; "
-            "choose another value"
-        )
-    return predictor_filter(alpha, int(plant.delay), slow, integrating=integrating)
+    return predictor_filter(alpha, int(plant.delay), integrating=integrating)
 
 
 def _assemble(
@@ -254,7 +223,7 @@ def _assemble(
     primary: ct.StateSpace,
     removed: Part,
     kept: Part,
-    filter_: tuple[FloatArray, FloatArray, FloatArray, float],
+    filter_: Filter,
 ) -> tuple[Any, ...]:
     """Matrices of u = C v, v = F (e + y_d) - y_0, with states [x_c; x_d; x_F] and the line.
 
