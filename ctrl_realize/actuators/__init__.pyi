@@ -8,6 +8,5 @@ from .limits import DeadZone as DeadZone
 from .limits import Resolution as Resolution
 from .limits import Saturation as Saturation
 from .limits import SlewRateLimit as SlewRateLimit
-from .stiction import HeStiction as HeStiction
 from .stiction import KanoStiction as KanoStiction
 from .stiction import Stiction as Stiction

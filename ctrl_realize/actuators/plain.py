@@ -9,14 +9,14 @@ from typing import TypeAlias
 from .base import Actuator
 from .characteristic import Characteristic
 from .limits import Backlash, DeadZone, Resolution, Saturation, SlewRateLimit
-from .stiction import HeStiction, KanoStiction, Stiction
+from .stiction import KanoStiction, Stiction
 
 Plain: TypeAlias = "float | int | str | bool | tuple[Plain, ...] | None"
 
 _MODELS: dict[str, type[Actuator]] = {
     model.__name__: model
     for model in (
-        Backlash, Characteristic, DeadZone, HeStiction, KanoStiction, Resolution, Saturation,
+        Backlash, Characteristic, DeadZone, KanoStiction, Resolution, Saturation,
         SlewRateLimit, Stiction,
     )
 }  # fmt: skip

@@ -1,4 +1,4 @@
-"""Stems that stick: the data-driven models of Choudhury, Kano and He."""
+"""Stems that stick: the data-driven models of Choudhury and Kano."""
 
 from __future__ import annotations
 
@@ -13,8 +13,6 @@ from ..numerics.actuators.friction import (
     choudhury,
     choudhury_at_rest,
     choudhury_step,
-    he,
-    he_step,
     kano,
     kano_step,
     stem_at_rest,
@@ -147,87 +145,3 @@ class KanoStiction(_StickAndJump):
 
     _author = "Kano"
     _model = _Model(kano_step, stem_at_rest, kano)
-
-
-@dataclass(frozen=True)
-class HeStiction(Actuator):
-    """Stiction by the model of He and others: a stem that rests after every slip.
-
-    The command acts like a force that static friction holds up to `static`; when it yields, the
-    stem moves until kinetic friction holds the rest. A slow ramp becomes a staircase of height
-    `J`.
-
-    Parameters
-    ----------
-    static : float
-        Static friction, in the unit of the command.
-    kinetic : float
-        Kinetic friction, at most the static one.
-    start : float, default 0
-        Part of the kinetic friction that holds the stem at first; positive after a move up.
-
-    Attributes
-    ----------
-    S : float
-        Dead band plus stick band, ``static + kinetic``.
-    J : float
-        Slip jump, ``static - kinetic``.
-
-    Raises
-    ------
-    OptionError
-        ``0 <= kinetic <= static`` and ``static > 0`` does not hold, or a start outside -1...1.
-
-    References
-    ----------
-    .. [1] Q. P. He, J. Wang, M. Pottmann and S. J. Qin, A curve fitting method for detecting valve
-       stiction in oscillating control loops, Ind. Eng. Chem. Res. 46 (2007) 4549-4560, section 2,
-       doi:10.1021/ie061219a.
-
-    Examples
-    --------
-    >>> import ctrl_realize as cr
-    >>> valve = cr.actuators.HeStiction(static=3.0, kinetic=1.0)
-    >>> valve.S, valve.J
-    (4.0, 2.0)
-    >>> valve.simulate([0, 1, 2, 3, 4, 5, 6]).tolist()
-    [0.0, 0.0, 0.0, 0.0, 3.0, 3.0, 3.0]
-    """
-
-    static: float
-    kinetic: float
-    start: float = 0.0
-
-    _states: ClassVar[tuple[str, ...]] = ("command", "position", "force")
-
-    def __post_init__(self) -> None:
-        positive(self.static, "static", "static friction")
-        if not 0 <= real(self.kinetic, "kinetic", "kinetic friction") <= self.static:
-            raise OptionError(
-                f"static={self.static!r}, kinetic={self.kinetic!r}; expected 0 <= kinetic <= static"
-            )
-        within_start(self.start)
-
-    def __str__(self) -> str:
-        return f"stiction (He): static {self.static:g}, kinetic {self.kinetic:g}"
-
-    @property
-    def S(self) -> float:
-        """Dead band plus stick band."""
-        return self.static + self.kinetic
-
-    @property
-    def J(self) -> float:
-        """Slip jump."""
-        return self.static - self.kinetic
-
-    def _rest(self, command: float) -> State:
-        held = self.start * self.kinetic
-        return (command, command - held, held)
-
-    def _advance(self, state: State, command: float, dt: float) -> tuple[State, float]:
-        last, position, held = state
-        return he_step((last, position, held), command, self.static, self.kinetic)
-
-    def _simulated(self, command: FloatArray, dt: float) -> FloatArray:
-        return he(command, self.static, self.kinetic, self.start)

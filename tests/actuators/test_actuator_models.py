@@ -10,7 +10,6 @@ from ctrl_realize.actuators import (
     Backlash,
     Characteristic,
     DeadZone,
-    HeStiction,
     KanoStiction,
     Resolution,
     Saturation,
@@ -36,7 +35,6 @@ MODELS = [
     Stiction(4, 1.5),
     Stiction(4, 1.5, start=1),
     KanoStiction(4, 1.5, start=-1),
-    HeStiction(3, 1, start=1),
     Characteristic("points", points=[(0, 0), (0.5, 0.2), (1, 1)]),
     Series([SlewRateLimit(5.0), KanoStiction(4, 1), Characteristic("equal-percentage")]),
 ]
@@ -71,7 +69,6 @@ def test_numbers_and_text_of_a_file_make_the_same_model():
         (Stiction(4, 1.5), 4.0),
         (Stiction(4, 1.5, start=-1), 4.0),
         (KanoStiction(4, 1.5), 2.75),  # (S + J) / 2 from the middle of the friction
-        (HeStiction(2.75, 1.25), 2.75),
         (Backlash(4), 2.0),
     ],
     ids=str,
@@ -85,10 +82,10 @@ def test_the_first_move_needs_its_change_of_the_command(model, needed, direction
     assert direction * (above[2] - above[0]) > 0
 
 
-def test_a_fast_damped_stem_with_lugre_friction_is_hes_model():
+def test_a_fast_damped_stem_with_lugre_friction_is_kanos_model():
     # S = 2.5 and J = 0.5 by the ratios of friction and spring.
     u = np.repeat(50 + np.array([0.0, 1, 2, 4, 3, 2, 1, 0, -1]), 15)
-    simple = HeStiction(static=1.5, kinetic=1.0).simulate(u)
+    simple = KanoStiction(S=2.5, J=0.5).simulate(u)
     # The stem stops at the Stribeck velocity, where viscous friction still holds 0.006, and
     # presliding is 0.0015.
     assert_allclose(lugre_stem(u, STEM, 0.5)[14::15][1:], simple[13::15][1:], atol=0.02)
@@ -155,7 +152,6 @@ def test_the_gain_margin_of_a_loop_is_that_of_its_open_loop(process):
         (lambda: Stiction(0, 0), "S=0"),
         (lambda: Stiction(5, -1), "J=-1"),
         (lambda: KanoStiction(5, 1, start=2), "start=2"),
-        (lambda: HeStiction(1, 2), "kinetic <= static"),
         (lambda: Backlash(-1), "width=-1"),
         (lambda: SlewRateLimit(0), "opening=0"),
         (lambda: Saturation(5, 5), "low < high"),

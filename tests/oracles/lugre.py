@@ -1,4 +1,4 @@
-"""A stem with the friction of the LuGre model, of which He's stiction is a limit.
+"""A stem with the friction of the LuGre model, whose limit is Kano's where commands pause.
 
 The force of friction on a stem of velocity v is [1]_, equations (3) to (6)::
 

@@ -1,4 +1,4 @@
-"""Backlash, and the data-driven models of stiction: Choudhury's, Kano's and He's.
+"""Backlash, and the data-driven models of stiction: Choudhury's and Kano's.
 
 All of them map a command to a stem position. S is the width of dead band plus stick band, the
 change of the command that a reversal needs before the stem moves; J is the slip jump. A stem that
@@ -8,11 +8,11 @@ papers describe; the order of the tests and the state before the first sample ar
 *Choudhury* [1]_: a stem that stops because the command pauses needs |change| > J to move again, one
 that stops because the command turns needs |change| > S. *Kano* [2]_: remembers in addition on which
 side of the friction the stem stopped, so that after a pause a reversal needs S, and the same
-direction J. *He* [3]_: static and kinetic friction f_S and f_D, with S = f_S + f_D and J = f_S -
-f_D; the stem comes to rest after every jump, so that a slow ramp becomes a staircase.
+direction J. For commands that pause between moves this is the model of He and others [3]_, with
+static friction (S + J) / 2 and kinetic friction (S - J) / 2.
 
-For J = 0 Kano's and He's are backlash of width S, and Choudhury's is as well for commands that
-swing by more than S. For commands that pause between moves Kano's and He's are one model.
+For J = 0 Kano's is backlash of width S, and Choudhury's is as well for commands that swing by more
+than S.
 
 References
 ----------
@@ -27,8 +27,8 @@ References
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from typing import Any, NamedTuple
+from collections.abc import Mapping
+from typing import NamedTuple
 
 import numpy as np
 
@@ -222,36 +222,8 @@ def choudhury_at_rest(command: float, stick: float, jump: float, start: float = 
 def choudhury(position: FloatArray, stick: float, jump: float, start: float = 0.0) -> FloatArray:
     """Stem positions (N,) for commands `position` by Choudhury's model; `start` as `kano`."""
     state = choudhury_at_rest(float(position[0]), stick, jump, start)
-    return _followed(choudhury_step, state, position, stick, jump)
-
-
-def he_step(
-    state: tuple[float, float, float], command: float, static: float, kinetic: float
-) -> tuple[tuple[float, float, float], float]:
-    """Advance He's model by one sample; the state is (command, position, force that is held)."""
-    last, position, held = state
-    force = held + command - last
-    if abs(force) > static:
-        left = float(np.copysign(kinetic, force))
-        position, force = position + force - left, left
-    return (command, position, force), position
-
-
-def he(position: FloatArray, static: float, kinetic: float, start: float = 0.0) -> FloatArray:
-    """Stem positions (N,) for commands `position` by He's model.
-
-    `static` is f_S, `kinetic` f_D; `start` times f_D is the force that friction holds at first.
-    """
-    command = float(position[0])
-    state = (command, command - start * kinetic, start * kinetic)
-    return _followed(he_step, state, position, static, kinetic)
-
-
-def _followed(
-    step: Callable[..., tuple[Any, float]], state: Any, position: FloatArray, *parameters: float
-) -> FloatArray:
     out = []
     for command in position.tolist():
-        state, stem = step(state, command, *parameters)
+        state, stem = choudhury_step(state, command, stick, jump)
         out.append(stem)
     return np.array(out)

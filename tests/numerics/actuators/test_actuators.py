@@ -8,7 +8,6 @@ from ctrl_realize.actuators import Characteristic
 from ctrl_realize.numerics.actuators.friction import (
     backlash,
     choudhury,
-    he,
     kano,
     kano_step,
     stem_at_rest,
@@ -18,6 +17,7 @@ from ctrl_realize.numerics.actuators.limits import (
     slew_limited,
     without_dead_zone,
 )
+from tests.oracles.he import he
 from tests.oracles.lugre import LuGre, lugre_stem
 
 
@@ -44,7 +44,6 @@ def test_a_slew_limited_step_takes_its_height_over_the_rate_of_its_direction():
 def test_without_a_jump_models_of_stiction_are_backlash(start):
     u = random_walk(1)
     assert_allclose(kano(u, 2.0, 0.0, start), backlash(u, 2.0, start), atol=1e-12)
-    assert_allclose(he(u, 1.0, 1.0, start), backlash(u, 2.0, start), atol=1e-12)
     swings = triangle()
     assert_allclose(choudhury(swings, 2.0, 0.0, 1.0), backlash(swings, 2.0, 1.0), atol=1e-12)
 
@@ -78,12 +77,6 @@ def test_the_step_form_of_kanos_model_is_the_model():
         state, stem = kano_step(state, command, 2.5, 0.8)
         stems.append(stem)
     assert_allclose(kano(u, 2.5, 0.8, -1.0), stems, atol=1e-12)
-
-
-def test_hes_stem_climbs_a_slow_ramp_in_jumps_of_j():
-    y = he(np.linspace(0, 20, 4001), 1.5, 1.0)
-    jumps = np.diff(y)[np.diff(y) > 0]
-    assert_allclose(jumps, 0.5, atol=0.01)
 
 
 def test_a_resolution_is_the_smallest_change_that_moves_the_output():
