@@ -55,7 +55,7 @@ def worlds() -> Iterator[World]:
             f"{process}: S = 5, J = 2, rounded to {_QUANTUM:g} %", "stiction", made, _QUANTUM
         )
     for process in ("flow", "first-order", "integrating"):
-        margin = loop(process=process).gain_margin
+        margin = cr.design.margins(loop(process=process).open_loop).gain_margin
         for part in (0.9, _AT_MARGIN):
             made = loop(process=process, tightness=part * margin, noise=0.3)
             yield World(f"{process}: {part:.0%} of the gain margin", "tuning or external", made)

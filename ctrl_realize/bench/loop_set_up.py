@@ -37,8 +37,8 @@ def valve_loop(
 
     Controller output, position and process value are in % about an operating point of 50 %. A loop
     oscillates because of its valve (`actuator` with stiction, or with backlash before an
-    integrating process), its tuning (`tightness` near `ValveLoop.gain_margin`), or from outside
-    (`oscillation`), or does not.
+    integrating process), its tuning (`tightness` near the gain margin of `open_loop`), or from
+    outside (`oscillation`), or does not.
 
     Parameters
     ----------

@@ -137,7 +137,8 @@ def worlds():
         stem = sticky(8, 4) if process == "first-order" else sticky(5, 2)
         yield STICKS, process, duration, {"actuator": stem, "noise": 0.1}
         yield NOT_SO, process, duration, {"oscillation": (2.0, period), "noise": 0.1}
-        tight = 0.97 * cr.bench.valve_loop(process=process).gain_margin
+        open_loop = cr.bench.valve_loop(process=process).open_loop
+        tight = 0.97 * cr.design.margins(open_loop).gain_margin
         # of a level at the limit of stability only the fit says that it does not stick; a flow has
         # six samples in a cycle
         told = "cannot tell" if process == "integrating" else NOT_SO
