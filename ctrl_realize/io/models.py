@@ -12,7 +12,6 @@ from typing import Any, TypeAlias
 import control as ct
 import numpy as np
 
-from .._checks import integer
 from .._facts import version_of
 from ..delayed import DelayedStateSpace, DelaySystem
 from ..delayed.inside.pure import TransferDelay
@@ -86,7 +85,7 @@ def save_model(
     write_text(path, model_to_text(system, settings=settings, note=note))
 
 
-def load_model(path: str | os.PathLike[str], *, max_states: int | None = None) -> Model:
+def load_model(path: str | os.PathLike[str]) -> Model:
     """Read a model that `save_model` wrote.
 
     No code from the file is executed. A file that is truncated, edited, of a later version or not a
@@ -95,10 +94,8 @@ def load_model(path: str | os.PathLike[str], *, max_states: int | None = None) -
     Parameters
     ----------
     path : path-like
-    max_states : int, optional
-        Largest number of states, delays included; default: the limit of `DelayedStateSpace`. A long
-        delay takes no memory until a function of python-control needs the matrices, which grow with
-        the square of the number of states.
+        A long delay in it takes no memory until a function of python-control needs the matrices,
+        which grow with the square of the number of states, up to the limit of `DelayedStateSpace`.
 
     Returns
     -------
@@ -125,15 +122,13 @@ def load_model(path: str | os.PathLike[str], *, max_states: int | None = None) -
     >>> valve.delay, valve.name
     (37, 'valve')
     """
-    if max_states is not None:
-        integer(max_states, "max_states", 0)
     file = usable_file(path, MAX_MODEL_BYTES)
     try:
         text = file.read_bytes().decode("utf-8")
     except ValueError as error:
         raise FileFormatError(f"{file}: not a model file: {error}") from error
     try:
-        return model_from_text(text, max_states=max_states)
+        return model_from_text(text)
     except FileFormatError as error:
         raise FileFormatError(f"{file}: {error}") from error
 
@@ -174,7 +169,7 @@ def model_to_text(
     return text + "\n"
 
 
-def model_from_text(text: str, *, max_states: int | None = None) -> Model:
+def model_from_text(text: str) -> Model:
     """Make a model from the text that `save_model` has written; see `load_model`."""
     try:
         content = parsed(text)
@@ -184,7 +179,7 @@ def model_from_text(text: str, *, max_states: int | None = None) -> Model:
         ) from error
     try:
         _check_origin(content)
-        return _model_from(content, max_states=max_states)
+        return _model_from(content)
     except FileFormatError:
         raise
     # TypeError, KeyError, ...: python-control's errors for invalid names and shapes
@@ -219,7 +214,7 @@ def _model_content(model: Model) -> dict[str, Any]:
     }
 
 
-def _model_from(content: Mapping[str, Any], max_states: int | None = None) -> Model:
+def _model_from(content: Mapping[str, Any]) -> Model:
     model = field(content, "model", dict)
     inputs, outputs = texts(model, "inputs"), texts(model, "outputs")
     if not inputs or not outputs:
@@ -238,7 +233,6 @@ def _model_from(content: Mapping[str, Any], max_states: int | None = None) -> Mo
             raise FileFormatError(f"dt={dt} is neither a sample time nor 0 for continuous time")
         internal = finite_numbers(model, "internal_delays")
         core = _core(model, dt, len(inputs) + len(internal), len(outputs) + len(internal))
-        _check_states(core.nstates + (sum(internal) if dt else 0), max_states)
         kind = TransferDelay if model.get("transfer_function") is True else DelaySystem
         return kind(core, internal, **names)
     if not 0 < dt < float("inf"):
@@ -246,7 +240,6 @@ def _model_from(content: Mapping[str, Any], max_states: int | None = None) -> Mo
     before = whole_numbers(model, "input_delays", len(inputs))
     behind = whole_numbers(model, "output_delays", len(outputs))
     core = _core(model, dt, len(inputs), len(outputs))
-    _check_states(core.nstates + sum(before) + sum(behind), max_states)
     fit = summary_from_json(content.get("fit"))
     return DelayedStateSpace(core, before, output_delay=behind, fit=fit, **names)
 
@@ -266,14 +259,6 @@ def _core(model: Mapping[str, Any], dt: float | None, ninputs: int, noutputs: in
     }
     matrices = [matrix(model, letter, shape) for letter, shape in shapes.items()]
     return ct.StateSpace(*matrices, dt, states=states, remove_useless_states=False)
-
-
-def _check_states(count: float, limit: int | None) -> None:
-    if limit is not None and count > limit:
-        raise FileFormatError(
-            f"the model has {count:.0f} states, delays included; the limit is "
-            f"max_states={limit} (the matrix takes {8e-6 * count**2:.0f} MB)"
-        )
 
 
 def _check_origin(content: object) -> None:
