@@ -128,21 +128,6 @@ def test_a_feedthrough_is_not_taken_for_a_controller():
     assert found.markov(1).item() == pytest.approx(0.4, abs=0.025)
 
 
-def test_a_controller_is_not_taken_for_a_feedthrough():
-    rng = np.random.default_rng(1)
-    noise = lfilter([0.06], [1, -0.8], rng.standard_normal(400))
-    target = np.repeat(rng.choice([-1.0, 1.0], 20), 20)
-    u, y, x, integral = np.zeros(403), np.zeros(400), 0.0, 0.0  # the plant is 3 samples late
-    for k in range(400):
-        y[k] = x + noise[k]
-        integral += 0.05 * (target[k] - y[k])
-        u[k + 3] = 0.8 * (target[k] - y[k]) + integral
-        x = 0.9 * x + 0.1 * u[k]
-    found = cr.identify(cr.Record(DT * np.arange(400), u[3:], y))
-    assert isinstance(found.fit, cr.identification.OutputErrorFit)
-    assert "feedback" in codes(found)
-
-
 def focused(plant, count):
     """Fits for prediction and for simulation in slow noise, and the record without it."""
     rng = np.random.default_rng(1)
