@@ -34,9 +34,7 @@ def holds(fit):
     return low <= GAIN <= high and fit.interval[0] <= DEAD_TIME <= fit.interval[1]
 
 
-@pytest.mark.parametrize(
-    ("limit", "sign", "where"), [(1.77, 1, "before"), (1.27, -1, "behind")]
-)
+@pytest.mark.parametrize(("limit", "sign", "where"), [(1.77, 1, "before"), (1.27, -1, "behind")])
 def test_gain_and_dead_time_of_a_step_hold_beyond_a_limit(limit, sign, where):
     u = np.where(TIME < 6, 0.0, 1.0)
     fit = fitted(u, sign * clipped(u, limit, where), structures=FEW)
