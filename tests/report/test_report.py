@@ -190,6 +190,7 @@ def test_hostile_names_stay_text(tmp_path, record, fitted):
     assert "<script>alert(1)</script>" in tags.text  # said, not done
 
 
+@pytest.mark.usefixtures("without_figures")
 def test_a_report_that_fails_leaves_the_old_one(tmp_path, record, fitted, monkeypatch):
     path = tmp_path / "r.html"
     path.write_text("old", encoding="utf-8")

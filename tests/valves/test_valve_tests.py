@@ -160,22 +160,22 @@ def test_small_steps_of_a_sticking_valve_are_late_in_table_and_flag_and_the_fit_
 
 
 def test_a_valve_of_more_lags_than_three_has_a_fitted_dead_time():
-    command = command_of([50, 60, 50], 3.0, 0.02)
+    command = command_of([50, 60], 3.0, 0.02)
     stem = command
     for k in range(5):
         stem = stem_of(stem, dt=0.02, dead_time=0.2 if k == 0 else 0.0, lag=0.12)
     noise = 0.003 * np.random.default_rng(1).standard_normal(stem.size)
     record = cr.Record(0.02 * np.arange(stem.size), command, stem + noise, units=PERCENT)
-    for group in valves.valve_report(record).groups:
-        # four of the lags hold an input that moves: half a sample more for each
-        assert held(group.fitted_dead_time, 0.2 + 4 * 0.01)
-        # the first visible motion of five lags is much later
-        assert group.fitted_dead_time.value < group.estimates["dead_time"].value
+    (group,) = valves.valve_report(record).groups
+    # four of the lags hold an input that moves: half a sample more for each
+    assert held(group.fitted_dead_time, 0.2 + 4 * 0.01)
+    # the first visible motion of five lags is much later
+    assert group.fitted_dead_time.value < group.estimates["dead_time"].value
 
 
 def test_an_anti_surge_valve_gives_strokes_dead_time_and_overshoot_in_one_call():
     dt, dead_time, damping, omega = 0.01, 0.1, 0.6, 12.0
-    levels = [50, 52, 50, 55, 50, 60, 50, 75, 50, 0, 100, 0, 100]
+    levels = [50, 52, 50, 60, 50, 0, 100, 0, 100]
     command = command_of(levels, 3.0, dt)
     t = dt * np.arange(300)
     ring = np.sqrt(1 - damping**2)

@@ -18,7 +18,6 @@ BANDS = {
     "wis_canal/20210302_step_gate1_2_s25_slow": (160.0, 236.8),
     "heating_system/edge0": (0.5, 2.2),
     "air_duct/45": (10, 13),
-    "dc_motor_tacho/up": (31, 42),
     "rlc_zero_delay/up": (-1, 1),
 }
 SHORT = {  # dead times of a few samples; no rule was made with the last three plants

@@ -66,7 +66,7 @@ def test_a_stated_range_bounds_the_search(record, plain):
 
 @pytest.mark.parametrize("within", [(0.0, 1.0), (9.0, 12.0)])
 def test_a_stated_range_that_the_data_contradict_is_told(record, within):
-    fit = cr.identify(record, dead_time=within).fit
+    fit = cr.identify(record, dead_time=within, structures=[(2, 2)]).fit
     low, high = fit.interval
     assert within[0] <= low <= fit.dead_time <= high <= within[1]
     assert "parameter_at_bound" in codes(fit)
@@ -81,7 +81,7 @@ def test_statements_hold_for_any_input_and_for_a_frequency_response():
         u.size
     )
     record = cr.Record(np.arange(u.size, dtype=float), u, y)
-    few = {"structures": [(1, 1), (2, 2), (3, 3)]}
+    few = {"structures": [(1, 1), (2, 2)]}
     free = cr.fit_output_error(record, **few).fit
     fit = cr.identify(record, fastest_lag=5.0, dead_time=(3.0, 4.7), **few).fit
     assert fit.interval[0] <= DEAD_TIME <= fit.interval[1] <= 4.7
