@@ -6,6 +6,7 @@ import numpy as np
 from scipy.signal import lfilter
 
 import ctrl_realize as cr
+from benchmarks.closed_loop import cases as loops
 from benchmarks.relay import __main__ as tests
 from benchmarks.worlds import sensors, steps
 from benchmarks.worlds.simulation import (
@@ -273,6 +274,22 @@ def running_loop(rng: Rng) -> Case:
     return Case(record(u, y), 3 * DT, 1.0, 4 * DT)
 
 
+def rounded_loop(rng: Rng) -> Case:
+    """A loop of `benchmarks.closed_loop`, rounded to 0.7 to 2 usual changes between samples.
+
+    The set point, which moves three times, is not recorded.
+    """
+    plant = loops.PLANTS[str(rng.choice(list(loops.PLANTS)))]
+    noise = loops.CASES[str(rng.choice(["white", "AR(0.9)"]))]
+    _, made = loops.record(plant, noise, "three", int(rng.integers(2**31)))
+    signals = np.stack([np.ravel(made.input), np.ravel(made.output)])
+    change = np.median(np.abs(np.diff(signals)), axis=1, keepdims=True)
+    step = rng.uniform(0.7, 2.0) * change
+    u, y = step * np.round(signals / step)
+    total = plant.dead_time + sum(plant.lags)
+    return Case(cr.Record(made.time, u, y), plant.dead_time, loops.GAIN, total)
+
+
 MADE_FOR = {
     "unlike residual left alone": noise_of_the_response,
     "noise made white": waves_on_a_canal,
@@ -306,5 +323,6 @@ MADE_FOR = {
     "no pair at the Nyquist frequency": relay_test,
     "steps that are held": running_loop,
     "loop without its set point": running_loop,
+    "controller behind rounding": rounded_loop,
 }
 """Rules, and the world that each was made for."""

@@ -19,6 +19,7 @@ from ctrl_realize.numerics.constants import STRONG, VERY_STRONG
 from ctrl_realize.numerics.engine.structures import choose, needless_parameters
 from ctrl_realize.numerics.output_error.before_the_step import _dies_away
 from ctrl_realize.numerics.output_error.selection import flows_of
+from ctrl_realize.numerics.validation.innovations import _EXACTLY
 
 Change = Callable[[Any], Any]
 """Of what stands in a module: what stands there while the rule is off."""
@@ -408,6 +409,11 @@ SWITCHES = (
     Switch(
         "loop without its set point",
         {f"{PUBLIC}.fit:answers_the_output": giving(False)},
+    ),
+    Switch(
+        "controller behind rounding",
+        {f"{NUMERICS}.validation.innovations:_ROUNDED": value(_EXACTLY)},
+        asked=(f"{PUBLIC}.fit:answers_the_output",),
     ),
     Switch(
         "records weighted by their noise",
