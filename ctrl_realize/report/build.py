@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, TypedDict, Unpack
 
 import control as ct
 
@@ -46,21 +46,27 @@ from .tables import (
 from .verdict import Verdict, campaign_verdict, comparison_verdict, verdict_of
 
 
+class About(TypedDict, total=False):
+    """What every report tells of its data, beside its result; see `write_identification`."""
+
+    files: Paths
+    settings: Mapping[str, Any] | None
+    calls: Sequence[tuple[str, str]]
+    simulated: bool
+    figures: str | os.PathLike[str] | None
+
+
 @in_shown_units
 def write_identification(
     path: str | os.PathLike[str],
     system: DelayedStateSpace,
     record: Record,
     *,
-    files: Paths = (),
     frf: ct.FrequencyResponseData | None = None,
     comparison: FRFComparison | None = None,
-    settings: Mapping[str, Any] | None = None,
-    calls: Sequence[tuple[str, str]] = (),
     controller: PIDController | None = None,
     form: PIDForm | None = None,
-    simulated: bool = False,
-    figures: str | os.PathLike[str] | None = None,
+    **about: Unpack[About],
 ) -> Path:
     """Write the report of one identification as a self-contained HTML file.
 
@@ -72,25 +78,20 @@ def write_identification(
         The model, with its `fit`.
     record : Record
         Record that it was identified from.
-    files : sequence of path-like, optional
-        Data files, for their checksums.
     frf : FrequencyResponseData, optional
         Measured frequency response to show with the model.
     comparison : FRFComparison, optional
         Comparison of the model with `frf`.
-    settings : mapping, optional
-        Settings to list.
-    calls : sequence of (name, text), optional
-        Commands that reproduce the result.
     controller : PIDController, optional
         From `design.pid` for `system`: what to enter, the closed loop on all models that the data
         do not rule out, and what would make it unstable.
     form : PIDForm, optional
         The parameters of `controller` as they are entered, from its `as_form`.
-    simulated : bool, default False
-        Whether the data are simulated, which is stated at the top.
-    figures : path-like, optional
-        Folder in which the figures are saved as PNG files, too.
+    **about
+        `files`, a sequence of data files, for their checksums; `settings`, a mapping to list;
+        `calls`, pairs (name, text) of commands that reproduce the result; ``simulated=True`` states
+        at the top that the data are simulated; `figures`, a folder in which the figures are saved
+        as PNG files, too.
 
     Returns
     -------
@@ -131,14 +132,11 @@ def write_identification(
             *fit_tables(system.fit),
             *comparison_tables(comparison),
             model_table(system),
-            data_table([record], files),
-            *settings_tables(settings),
         ],
-        calls=calls,
-        simulated=simulated,
-        figures=figures,
+        records=[record],
         fit=system.fit,
         controller=_controller(system, controller, form),
+        **about,
     )
 
 
@@ -152,18 +150,14 @@ def write_campaign(
     path: str | os.PathLike[str],
     campaign: Campaign,
     *,
-    files: Paths = (),
     records: Sequence[Record] = (),
     frf: ct.FrequencyResponseData | None = None,
     comparison: FRFComparison | None = None,
-    settings: Mapping[str, Any] | None = None,
-    calls: Sequence[tuple[str, str]] = (),
     controller: PIDController | None = None,
     form: PIDForm | None = None,
     title: str = "Campaign",
     truth: float | None = None,
-    simulated: bool = False,
-    figures: str | os.PathLike[str] | None = None,
+    **about: Unpack[About],
 ) -> Path:
     """Write the report of a campaign as a self-contained HTML file.
 
@@ -171,15 +165,15 @@ def write_campaign(
     ----------
     path : path-like
     campaign : Campaign
-    files : sequence of path-like, optional
-        Data files, for their checksums.
     records : sequence of Record, optional
         The records, for their checksums if there are no files.
-    frf, comparison, settings, calls, controller, form, simulated, figures
+    frf, comparison, controller, form
         As for `write_identification`; comparison and controller are those of ``campaign.system``.
     title : str, optional
     truth : float, optional
         Known delay in samples of simulated data, drawn with the estimates.
+    **about
+        As for `write_identification`.
 
     Returns
     -------
@@ -223,14 +217,11 @@ def write_campaign(
                 *comparison_tables(comparison),
                 *fit_tables(system.fit),
                 model_table(system),
-                *([data_table(records, files)] if files or records else []),
-                *settings_tables(settings),
             ],
-            calls=calls,
-            simulated=simulated,
-            figures=figures,
+            records=records,
             fit=system.fit,
             controller=_controller(system, controller, form),
+            **about,
         )
 
 
@@ -240,11 +231,7 @@ def write_comparison(
     system: DelayedStateSpace,
     frf: ct.FrequencyResponseData,
     comparison: FRFComparison,
-    *,
-    files: Paths = (),
-    calls: Sequence[tuple[str, str]] = (),
-    simulated: bool = False,
-    figures: str | os.PathLike[str] | None = None,
+    **about: Unpack[About],
 ) -> Path:
     """Write the report of a comparison with a measured frequency response as a self-contained file.
 
@@ -256,7 +243,7 @@ def write_comparison(
         Measured.
     comparison : FRFComparison
         Comparison of `system` with `frf`.
-    files, calls, simulated, figures
+    **about
         As for `write_identification`.
 
     Returns
@@ -292,15 +279,9 @@ def write_comparison(
         subtitle="model and measured frequency response",
         verdict=comparison_verdict(system, comparison),
         sketches=frf_sketches([system], frf, comparison),
-        tables=[
-            *comparison_tables(comparison),
-            model_table(system),
-            *([data_table([], files)] if files else []),
-        ],
-        calls=calls,
-        simulated=simulated,
-        figures=figures,
+        tables=[*comparison_tables(comparison), model_table(system)],
         fit=system.fit,
+        **about,
     )
 
 
@@ -312,13 +293,18 @@ def write_report(
     verdict: Verdict,
     sketches: Sequence[Sketch],
     tables: Sequence[Table],
-    calls: Sequence[tuple[str, str]],
-    simulated: bool,
-    figures: str | os.PathLike[str] | None,
+    records: Sequence[Record] = (),
     fit: ModelFit | None = None,
     controller: Controller | None = None,
+    files: Paths = (),
+    settings: Mapping[str, Any] | None = None,
+    calls: Sequence[tuple[str, str]] = (),
+    simulated: bool = False,
+    figures: str | os.PathLike[str] | None = None,
 ) -> Path:
-    """Write a page and, if a folder is given, its figures."""
+    """Write a page, with tables of data and settings, and, if a folder is given, its figures."""
+    data = [data_table(records, files)] if files or records else []
+    below = [*data, *settings_tables(settings), pairs("Versions", versions(), folded=True)]
     if figures is not None:
         save_sketches(figures, sketches)
     page = Page(
@@ -327,7 +313,7 @@ def write_report(
         verdict=verdict,
         version=version_of("ctrl-realize"),
         figures=[sketch.on_page() for sketch in sketches],
-        tables=[*tables, pairs("Versions", versions(), folded=True)],
+        tables=[*tables, *below],
         calls=calls,
         simulated=simulated,
         parameters=parameter_table(fit) if fit is not None and fit.parameters else None,

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Unpack
 
 import numpy as np
 
@@ -13,10 +12,9 @@ from .. import plots
 from .._checks import check_type
 from .._wording import in_time
 from ..valves.loops.result import LoopDiagnosis
-from .build import write_report
+from .build import About, write_report
 from .page import Row, Table, headed
 from .sketches import Sketch, sketch
-from .tables import Paths, data_table, settings_tables
 from .verdict import JUDGEMENTS, Level, Verdict
 
 _LEVELS: dict[str, Level] = {"stiction": "poor", "no oscillation": "good"}
@@ -26,12 +24,8 @@ def write_loop_report(
     path: str | os.PathLike[str],
     diagnosis: LoopDiagnosis,
     *,
-    files: Paths = (),
-    settings: Mapping[str, Any] | None = None,
-    calls: Sequence[tuple[str, str]] = (),
     title: str = "Oscillating loop",
-    simulated: bool = False,
-    figures: str | os.PathLike[str] | None = None,
+    **about: Unpack[About],
 ) -> Path:
     """Write the diagnosis of a loop as a self-contained HTML file.
 
@@ -41,9 +35,9 @@ def write_loop_report(
         File to write, atomically.
     diagnosis : LoopDiagnosis
         From `valves.diagnose_loop`.
-    files, settings, calls, simulated, figures
-        As for `write_identification`.
     title : str, optional
+    **about
+        As for `write_identification`.
 
     Returns
     -------
@@ -77,14 +71,9 @@ def write_loop_report(
         subtitle=f"{many} samples of {in_time(diagnosis.signals.dt)}",
         verdict=_verdict(diagnosis),
         sketches=_sketches(diagnosis),
-        tables=[
-            _method_table(diagnosis),
-            data_table((diagnosis.signals.record,), files),
-            *settings_tables(settings),
-        ],
-        calls=calls,
-        simulated=simulated,
-        figures=figures,
+        tables=[_method_table(diagnosis)],
+        records=[diagnosis.signals.record],
+        **about,
     )
 
 

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, Unpack
 
 import numpy as np
 
@@ -15,10 +14,9 @@ from ..valves.definitions import DEFINITIONS
 from ..valves.metrics import words_of
 from ..valves.result import ValveReport
 from ..valves.words import in_words, limit_in_words
-from .build import write_report
+from .build import About, write_report
 from .page import Row, Table, headed, pairs
 from .sketches import Sketch, sketch
-from .tables import Paths, data_table, settings_tables
 from .verdict import JUDGEMENTS, Verdict
 
 _SHOWN = ("dead_time", "t63", "t86", "t98", "overshoot", "gain")
@@ -30,12 +28,8 @@ def write_valve_report(
     path: str | os.PathLike[str],
     result: ValveReport,
     *,
-    files: Paths = (),
-    settings: Mapping[str, Any] | None = None,
-    calls: Sequence[tuple[str, str]] = (),
     title: str = "Valve test",
-    simulated: bool = False,
-    figures: str | os.PathLike[str] | None = None,
+    **about: Unpack[About],
 ) -> Path:
     """Write the report of a valve test as a self-contained HTML file.
 
@@ -45,9 +39,9 @@ def write_valve_report(
         File to write, atomically.
     result : ValveReport
         From `valve_report`.
-    files, settings, calls, simulated, figures
-        As for `write_identification`.
     title : str, optional
+    **about
+        As for `write_identification`.
 
     Returns
     -------
@@ -87,12 +81,9 @@ def write_valve_report(
             *_missing_tables(result),
             _step_table(result),
             _definition_table(),
-            data_table(result.records, files),
-            *settings_tables(settings),
         ],
-        calls=calls,
-        simulated=simulated,
-        figures=figures,
+        records=result.records,
+        **about,
     )
 
 
