@@ -40,6 +40,14 @@ def not_negative(value: Any, name: str, what: str) -> float:
     return number
 
 
+def within(value: Any, name: str, what: str, low: float, high: float) -> float:
+    """Return `value` as a float; it must be a number in low...high."""
+    number = real(value, name, what)
+    if not low <= number <= high:
+        raise OptionError(f"{name}={value!r}; expected {what} in {low:g}...{high:g}")
+    return number
+
+
 def real(value: Any, name: str, what: str) -> float:
     """Return `value` as a float; it must be a finite real number."""
     if isinstance(value, bool) or not isinstance(value, Real) or not math.isfinite(value):
@@ -55,6 +63,14 @@ def band(value: Any, name: str, what: str) -> tuple[float, float]:
             f"{name}={value!r}; expected two numbers, the lower and the upper end: {what}"
         )
     return real(ends[0], name, what), real(ends[1], name, what)
+
+
+def rising(value: Any, name: str, what: str) -> tuple[float, float]:
+    """Return the two ends of a band, the lower of which must come first."""
+    low, high = band(value, name, what)
+    if not low < high:
+        raise OptionError(f"{name}=({low:g}, {high:g}); expected the lower end first")
+    return low, high
 
 
 def integer(value: Any, name: str, low: int, high: int | None = None) -> int:

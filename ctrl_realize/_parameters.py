@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ._checks import one_of
 from ._wording import number_within, numbers_alike
-from .errors import OptionError
 from .numerics.constants import Z_95
 
 if TYPE_CHECKING:
@@ -131,9 +131,7 @@ class Parameter:
 
 def checked_time_unit(unit: str) -> str:
     """Return a unit of time of results, or raise an error that lists them."""
-    if unit not in SECONDS:
-        raise OptionError(f"time_unit={unit!r}; expected one of {', '.join(SECONDS)}")
-    return unit
+    return one_of(unit, "time_unit", tuple(SECONDS))
 
 
 def slope_unit(gain_unit: str, time_unit: str) -> str:

@@ -8,7 +8,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from .._checks import not_negative, positive, real
+from .._checks import not_negative, positive, real, within
 from ..errors import OptionError
 from ..numerics.actuators.friction import backlash
 from ..numerics.actuators.limits import resolved, saturated, slew_limited, without_dead_zone
@@ -126,7 +126,7 @@ class Backlash(_OfTwoSamples):
 
     def __post_init__(self) -> None:
         not_negative(self.width, "width", "width of the play")
-        within_start(self.start)
+        within(self.start, "start", "place within play or friction", -1, 1)
 
     def __str__(self) -> str:
         return f"backlash of width {self.width:g}"
@@ -280,15 +280,3 @@ def ordered(low: float, high: float) -> None:
     """
     if not real(low, "low", "lower end") < real(high, "high", "upper end"):
         raise OptionError(f"low={low!r}, high={high!r}; expected low < high")
-
-
-def within_start(start: float) -> None:
-    """Check a place within play or friction.
-
-    Raises
-    ------
-    OptionError
-        Outside of -1...1.
-    """
-    if not -1 <= real(start, "start", "place within play or friction") <= 1:
-        raise OptionError(f"start={start!r}; expected a value in -1...1")

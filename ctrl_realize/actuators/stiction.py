@@ -6,8 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import ClassVar, NamedTuple
 
-from .._checks import positive, real
-from ..errors import OptionError
+from .._checks import not_negative, positive, within
 from ..numerics.actuators.friction import (
     StemState,
     choudhury,
@@ -19,7 +18,6 @@ from ..numerics.actuators.friction import (
 )
 from ..numerics.arrays import FloatArray
 from .base import Actuator, State
-from .limits import within_start
 
 
 class _Model(NamedTuple):
@@ -44,9 +42,8 @@ class _StickAndJump(Actuator):
 
     def __post_init__(self) -> None:
         positive(self.S, "S", "width of dead band plus stick band")
-        if real(self.J, "J", "slip jump") < 0:
-            raise OptionError(f"J={self.J!r}; expected a slip jump >= 0, and usually at most S")
-        within_start(self.start)
+        not_negative(self.J, "J", "slip jump, usually at most S")
+        within(self.start, "start", "place within the friction", -1, 1)
 
     def __str__(self) -> str:
         return f"stiction ({self._author}): S = {self.S:g}, J = {self.J:g}"

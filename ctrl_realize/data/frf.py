@@ -19,6 +19,7 @@ from .._checks import (
     real,
     system_name,
     system_names,
+    within,
 )
 from .._shown import as_asked, as_code
 from ..errors import DataError, OptionError
@@ -273,8 +274,7 @@ class MeasuredFRF(FRFAlgebra):
             raise DataError(
                 "this FRF has no coherence; choose a band with between_hz(low, high) instead"
             )
-        if not 0 <= min_coherence <= 1:
-            raise OptionError(f"min_coherence={min_coherence!r}; expected a value in 0...1")
+        within(min_coherence, "min_coherence", "coherence", 0, 1)
         good = self.coherence.reshape(-1, self.frequency_hz.size).min(axis=0) >= min_coherence
         return self._select(good, f"with a coherence of {min_coherence:g}")
 

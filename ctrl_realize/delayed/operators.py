@@ -118,27 +118,24 @@ class DelayOperators(DeferredMatrices):
 
     def __mul__(self, other: Any) -> Any:
         """Series: first `other`, then this system."""
-        theirs = self._other(other)
-        if theirs is None:
-            return NotImplemented
-        if isinstance(other, Numbers):
-            return self._scaled(float(other))
-        labels = labels_of(other, "input_labels", self.input_labels), self.output_labels
-        mine = self._form()
-        series, states = product(mine, theirs), core_states(other, theirs) + core_states(self, mine)
-        return self._joined(series, common_dt(self, other), *labels, states)
+        return self._series(other, behind=False)
 
     def __rmul__(self, other: Any) -> Any:
         """Series: first this system, then `other`."""
+        return self._series(other, behind=True)
+
+    def _series(self, other: Any, *, behind: bool) -> Any:
         theirs = self._other(other)
         if theirs is None:
             return NotImplemented
         if isinstance(other, Numbers):
             return self._scaled(float(other))
-        labels = self.input_labels, labels_of(other, "output_labels", self.output_labels)
-        mine = self._form()
-        series, states = product(theirs, mine), core_states(self, mine) + core_states(other, theirs)
-        return self._joined(series, common_dt(self, other), *labels, states)
+        parts = [(theirs, other), (self._form(), self)]
+        (first, before), (second, after) = parts[::-1] if behind else parts
+        inputs = labels_of(before, "input_labels", self.input_labels)
+        outputs = labels_of(after, "output_labels", self.output_labels)
+        states = core_states(before, first) + core_states(after, second)
+        return self._joined(product(second, first), common_dt(self, other), inputs, outputs, states)
 
     def __pow__(self, power: Any) -> Any:
         """Power; -1 is the inverse, if that is proper."""

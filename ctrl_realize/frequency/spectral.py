@@ -7,7 +7,7 @@ from typing import Literal
 
 import numpy as np
 
-from .._checks import integer, one_of, real
+from .._checks import integer, one_of, within
 from ..data import MeasuredFRF, Record
 from ..data.given import as_records, check_complete
 from ..errors import DataError, OptionError, TimeAxisError
@@ -133,8 +133,7 @@ def spectral_frf(
             )
         found, dt = from_periods(stream, period, skip_periods)
     else:
-        if not 0 <= real(overlap, "overlap", "part in 0...0.95") <= 0.95:
-            raise OptionError(f"overlap={overlap!r}; expected a part in 0...0.95")
+        within(overlap, "overlap", "part", 0, 0.95)
         found, dt = from_segments(stream, method, segment, window, overlap)
     frequency = found.frequency_hz
     response = found.response * np.exp(-2j * np.pi * frequency * delay * dt)

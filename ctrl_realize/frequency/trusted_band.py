@@ -6,7 +6,7 @@ from typing import Literal
 
 import numpy as np
 
-from .._checks import band, real
+from .._checks import band, within
 from ..errors import DataError, OptionError
 from ..numerics.arrays import BoolArray
 from ..numerics.rational.bands import running_median, widest_run
@@ -27,8 +27,7 @@ def trusted_points(
 ) -> tuple[BoolArray, Source]:
     """Mark the points of the trusted band, and name its criterion."""
     if min_coherence is not None:
-        if not 0 <= real(min_coherence, "min_coherence", "value in 0...1") <= 1:
-            raise OptionError(f"min_coherence={min_coherence!r}; expected a value in 0...1")
+        within(min_coherence, "min_coherence", "coherence", 0, 1)
         if points.coherence is None:
             raise OptionError(
                 "min_coherence is given, but the FRF has no coherence; pass band_hz=(low, high)"

@@ -7,7 +7,7 @@ import json
 from collections.abc import Callable, Mapping
 from typing import Any, TypeAlias
 
-from .._checks import band, one_of, real
+from .._checks import one_of, real, rising
 from .._facts import facts
 from .._parameters import SECONDS
 from ..design.tuning.layouts import LAYOUTS
@@ -33,10 +33,7 @@ def _number(value: Any, name: str) -> float:
 
 
 def _ends(value: Any, name: str) -> list[float]:
-    low, high = band(value, name, "the lower one first")
-    if not low < high:
-        raise OptionError(f"{name} is {low:g} to {high:g}; expected the lower end first")
-    return [low, high]
+    return [*rising(value, name, "the lower one first")]
 
 
 def _reading(value: Any, name: str) -> State:

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from .._checks import integer, positive, real
+from .._checks import integer, not_negative, positive, real
 from .._wording import in_time
 from ..data import Record
 from ..data.given import as_record
@@ -196,10 +196,8 @@ def _speed(
                 f"dead_time={dead_time!r}, time_constant={time_constant!r}; expected both in s, or "
                 "a record of a first step"
             )
-        late = real(dead_time, "dead_time", "time in s")
+        late = not_negative(dead_time, "dead_time", "time in s")
         tau = positive(time_constant, "time_constant", "time in s")
-        if late < 0:
-            raise OptionError(f"dead_time={late:g}; expected a time that is not negative")
         return late, late + tau, late + 4 * tau
     record = as_record(first_step)
     command = np.ravel(record.input)

@@ -111,8 +111,9 @@ class LoopCheck(Result):
             return self.worst.ms < float("inf")
         return None if self.robustness is None else self.robustness.stable
 
-    def rows(self) -> list[tuple[str, str]]:
-        """List the results, for the report of a controller."""
+    _heading = "Closed loop on the design model"
+
+    def _rows(self) -> list[tuple[str, str]]:
         found = self.margins
         if not found.stable:
             return [("on the design model", "UNSTABLE")]
@@ -128,11 +129,6 @@ class LoopCheck(Result):
         if self.worst is not None:
             rows.append(("at worst", f"Ms {self.worst.ms:.3g}, at {self.worst}"))
         return rows
-
-    _heading = "Closed loop on the design model"
-
-    def _rows(self) -> list[tuple[str, str]]:
-        return self.rows()
 
     def __repr__(self) -> str:
         word = "stable" if self.stable else "unstable"

@@ -9,7 +9,7 @@ from typing import Any
 import control as ct
 import numpy as np
 
-from ..._checks import real
+from ..._checks import not_negative
 from ..._flags import Flag, flagged
 from ...errors import OptionError
 from ...numerics.arrays import ComplexArray, FloatArray, locked, read_only
@@ -115,9 +115,7 @@ def margins(
             "unstable_poles and integrators are for measured responses; for systems they are "
             "computed"
         )
-    dead_time = real(dead_time, "dead_time", "dead time in s, >= 0")
-    if dead_time < 0:
-        raise OptionError(f"dead_time={dead_time:g} s; expected a value >= 0")
+    dead_time = not_negative(dead_time, "dead_time", "dead time in s")
     exact = open_loop(loop, controller, dead_time)
     if dead_time and exact.dt:
         raise OptionError(

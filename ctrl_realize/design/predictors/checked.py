@@ -54,5 +54,5 @@ class CheckedController(DelayLineController):
         card = super()._card()
         if self.check is None:
             return card
-        rows = [*card.rows, *self.check.rows()]
+        rows = [*card.rows, *self.check._rows()]
         return Card(card.title, rows, flags=[str(flag) for flag in self.check.flags])

@@ -94,7 +94,7 @@ class PredictorLQR(Result):
             ("delay", f"{samples} samples ({seconds} s)"),
             ("gain on the core", in_numbers(self.core_gain)),
             ("slowest closed-loop pole", f"|z| = {largest:.4g}"),
-            *(self.check.rows() if self.check is not None else []),
+            *(self.check._rows() if self.check is not None else []),
         ]
 
     def _notes(self) -> list[str]:

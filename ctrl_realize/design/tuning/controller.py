@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from ..._checks import one_of, positive, real, system_name
+from ..._checks import not_negative, one_of, positive, real, system_name
 from ..._parameters import SECONDS, checked_time_unit, slope_unit
 from ..._shown import Card, ShownSystem, text_card
 from ..._wording import in_time, times_in
@@ -102,9 +102,7 @@ class PIDController(ShownSystem, Delivered, BesideDelays):
                 f"td={self.td:g} s, tf={self.tf:g} s; expected td >= 0 and, with a "
                 "derivative, tf > 0 (td/10 is usual)"
             )
-        step = real(dt, "dt", "sample time in s, 0 for continuous")
-        if step < 0:
-            raise OptionError(f"dt={step:g}; expected a sample time in s, or 0 for continuous")
+        step = not_negative(dt, "dt", "sample time in s, 0 for continuous")
         self.kind = "P" + "I" * (self.ti < float("inf")) + "D" * (self.td > 0)
         super().__init__(
             *self._matrices(step),
@@ -222,7 +220,7 @@ class PIDController(ShownSystem, Delivered, BesideDelays):
         rows.append(("sample time", step))
         flags = []
         if self.check is not None:
-            rows += self.check.rows()
+            rows += self.check._rows()
             flags = [str(flag) for flag in self.check.flags]
         rows.append(("next", 'pid.as_form("siemens_pid_compact"); pid.forms() lists all'))
         return Card(f"PID controller {self.name}", rows, flags=flags)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from ..._checks import band, one_of, real
+from ..._checks import one_of, real, rising
 from ..._parameters import SECONDS, checked_time_unit
 from ...errors import OptionError
 from .layouts import LAYOUTS, Layout
@@ -87,9 +87,7 @@ def _filter(layout: Layout, number: Mapping[str, float], td: float, seconds: flo
 
 
 def _span(given: tuple[float, float] | None, name: str) -> float:
-    low, high = PERCENT if given is None else band(given, name, "ends of the range of a signal")
-    if not high > low:
-        raise OptionError(f"{name}=({low:g}, {high:g}); expected the lower end first")
+    low, high = PERCENT if given is None else rising(given, name, "ends of the range of a signal")
     return high - low
 
 

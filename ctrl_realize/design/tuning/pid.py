@@ -8,7 +8,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from ..._checks import one_of, positive, real
+from ..._checks import one_of, positive, within
 from ...data.shown_units import in_shown_units
 from ...delayed import DelayedStateSpace, DelaySystem
 from ...errors import OptionError
@@ -198,9 +198,7 @@ def tuned(
     known = kinds_of(rule)
     if kind not in known:
         raise OptionError(f"rule={rule!r} has no {kind}; available: {', '.join(known)}")
-    ratio = real(options.derivative_filter, "derivative_filter", "td / tf")
-    if not 1 <= ratio <= 100:
-        raise OptionError(f"derivative_filter={ratio:g}; expected td / tf in 1...100")
+    ratio = within(options.derivative_filter, "derivative_filter", "td / tf", 1, 100)
     target = None
     if options.closed_loop_time is not None:
         if rule not in ADJUSTED:
@@ -208,9 +206,7 @@ def tuned(
                 f"closed_loop_time= is an argument of simc, lambda and imc, not of {rule!r}"
             )
         target = positive(options.closed_loop_time, "closed_loop_time", "time in s")
-    limit = real(options.max_sensitivity, "max_sensitivity", "Ms")
-    if not 1.01 <= limit <= 10:
-        raise OptionError(f"max_sensitivity={limit:g}; expected Ms in 1.01...10")
+    limit = within(options.max_sensitivity, "max_sensitivity", "Ms", 1.01, 10)
     plant, exact, step = reference_plant(system, options.dt)
     model: ProcessModel | None = None
     if rule in MODEL_RULES:

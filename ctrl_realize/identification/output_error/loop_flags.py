@@ -12,7 +12,7 @@ from ..._wording import chosen, in_time, interval_in_time
 from ...data import Record
 from ...numerics.arrays import BoolArray, FloatArray
 from ...numerics.constants import Z_95
-from ...numerics.output_error.result import UnweightedModel
+from ...numerics.engine.plausible_models import PlausibleModel
 from ...numerics.signals.excitation import lively_start
 from ...numerics.validation.innovations import (
     RARE,
@@ -160,12 +160,12 @@ def generalised_step(
     """One step of generalised least squares, from a fit with coloured residual."""
     if not np.all(fit.poles) or not fit.gain:
         return None
-    model = UnweightedModel(fit.dead_time, fit.poles, fit.estimate.numerator)
+    model = PlausibleModel(fit.dead_time, fit.poles, fit.estimate.numerator)
     return _step(fit, model, output, drive)
 
 
 def _step(
-    fit: OutputErrorFit, start: UnweightedModel, output: FloatArray, drive: FloatArray
+    fit: OutputErrorFit, start: PlausibleModel, output: FloatArray, drive: FloatArray
 ) -> WhiteStep | None:
     step = white_step(output, drive, fit.data.dt, *start)
     reach = max(fit.total_delay, fit.dead_time)

@@ -8,13 +8,13 @@ import control as ct
 import numpy as np
 from scipy.special import ndtri
 
-from ..._checks import integer, real
+from ..._checks import integer, within
 from ..._flags import Flag, flagged
 from ...data import Record
 from ...data.given import as_record
 from ...delayed import DelayedStateSpace
 from ...delayed.simulation import Start, simulate_record
-from ...errors import DataError, OptionError
+from ...errors import DataError
 from ...numerics.arrays import BoolArray, FloatArray, read_only
 from ...numerics.blas_threads import single_threaded
 from ...numerics.signals.correlation import correlation, cross_bound, fit_percent, whiteness
@@ -89,7 +89,8 @@ def analyse_residuals(
     False
     """
     count = integer(lags, "lags", 1)
-    level = _level(confidence)
+    # beyond it, 1 - confidence is lost in rounding, or the bound is zero
+    level = within(confidence, "confidence", "probability", 1e-12, 1 - 1e-12)
     simulated = simulate_record(system, as_record(record), start)
     y, u = np.atleast_2d(record.output), np.atleast_2d(record.input)
     if record.n_samples < 3 * count:
@@ -157,11 +158,3 @@ def _two_sided(residual: FloatArray, drive: FloatArray, lags: int) -> FloatArray
     """Correlation at lags -lags...lags; at positive lags the residual comes later."""
     before = correlation(drive, residual, lags)[:0:-1]
     return np.concatenate([before, correlation(residual, drive, lags)])
-
-
-def _level(confidence: float) -> float:
-    level = real(confidence, "confidence", "a probability between 0 and 1")
-    # beyond it, 1 - confidence is lost in rounding, or the bound is zero
-    if not 1e-12 <= level <= 1 - 1e-12:
-        raise OptionError(f"confidence={confidence!r}; expected a number between 0 and 1")
-    return level

@@ -72,14 +72,6 @@ class Followed(NamedTuple):
     by_closest: float
 
 
-class UnweightedModel(NamedTuple):
-    """Model of least squares, all samples alike: dead time in s, poles (n,), numerator."""
-
-    dead_time: float
-    poles: ComplexArray
-    numerator: FloatArray
-
-
 class OtherModel(NamedTuple):
     """Interval of the dead time in s under a model that is not in the table of structures."""
 
@@ -281,7 +273,7 @@ class OutputErrorEstimate:
     alike: tuple[tuple[StaticGain, float], ...] = ()
     others: OtherStructures | None = None
     close: tuple[CloseDecision, ...] = ()
-    unweighted: UnweightedModel | None = None
+    unweighted: PlausibleModel | None = None
     load: LoadStep | None = None
     drawn: PlausibleDraw | None = None
     points: Mapping[Structure, Points] = field(default_factory=dict)

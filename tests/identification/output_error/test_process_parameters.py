@@ -32,7 +32,7 @@ def test_the_transfer_function_is_one_line_in_the_unit_of_time_asked_for():
     columns = ["value", "std_given_structure", "low", "high"]
     np.testing.assert_allclose(seconds.loc[times, columns], 60 * minutes.loc[times, columns])
     assert minutes.loc["gain", "value"] == seconds.loc["gain", "value"]
-    with pytest.raises(cr.errors.OptionError, match="time_unit='weeks'; expected one of"):
+    with pytest.raises(cr.errors.OptionError, match="time_unit='weeks'; choose one of"):
         fit.parameter_table(time_unit="weeks")
 
 

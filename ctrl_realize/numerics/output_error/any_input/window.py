@@ -25,6 +25,7 @@ from ...constants import SMALLEST, VERY_STRONG
 from ...engine.compared_fits import settled
 from ...engine.eliminate import evaluate
 from ...engine.modal import respond
+from ...engine.plausible_models import PlausibleModel
 from ...engine.poles import poles_from_parameters
 from ...engine.problem import Problem, Structure
 from ...engine.static_gain import StaticGain
@@ -34,7 +35,6 @@ from ...engine.window_fit import WindowFit, fit_window
 from ...signals.noise import correlation_time, quantisation_step, winsorised_sigma
 from ...signals.noise_model import noise_lags, whitening_filter
 from ...signals.onset import correlation_onset
-from ..result import UnweightedModel
 from .data import BEYOND, SampledData
 
 ORDERS = tuple(Structure(n, r) for n in range(1, 4) for r in range(n, 0, -1))
@@ -63,14 +63,14 @@ class SampledWindow:
     scales: Scales
     fit: WindowFit
     huber: bool
-    unweighted: UnweightedModel | None = None
+    unweighted: PlausibleModel | None = None
 
     @property
-    def model(self) -> UnweightedModel:
+    def model(self) -> PlausibleModel:
         """What was chosen to determine the noise."""
         best = self.fit.best
         state = evaluate(self.fit.problem, best.structure, best.parameters[None])
-        return UnweightedModel(best.dead_time, best.poles, state.numerator[0])
+        return PlausibleModel(best.dead_time, best.poles, state.numerator[0])
 
     def fit_of(self, structures: Sequence[Structure]) -> WindowFit:
         """Fit other structures to the same data."""
