@@ -8,6 +8,7 @@ from typing import ClassVar, NamedTuple
 
 from .._checks import not_negative, positive, within
 from ..numerics.actuators.friction import (
+    Stem,
     StemState,
     choudhury,
     choudhury_at_rest,
@@ -23,7 +24,7 @@ from .base import Actuator, State
 class _Model(NamedTuple):
     """One sample, the state at rest, and the positions of a whole command."""
 
-    step: Callable[[StemState, float, float, float], tuple[StemState, float]]
+    step: Callable[[Stem, float, float, float], Stem]
     at_rest: Callable[[float, float, float, float], StemState]
     simulated: Callable[[FloatArray, float, float, float], FloatArray]
 
@@ -53,9 +54,9 @@ class _StickAndJump(Actuator):
 
     def _advance(self, state: State, command: float, dt: float) -> tuple[State, float]:
         last, position, way, rest, moving, paused, slope = state
-        stem = StemState(last, position, way, rest, moving > 0.5, paused > 0.5, slope)
-        after, position = self._model.step(stem, command, self.S, self.J)
-        return tuple(map(float, after)), position
+        stem = last, position, way, rest, moving > 0.5, paused > 0.5, slope
+        after = self._model.step(stem, command, self.S, self.J)
+        return tuple(map(float, after)), after[1]
 
     def _simulated(self, command: FloatArray, dt: float) -> FloatArray:
         return self._model.simulated(command, self.S, self.J, self.start)

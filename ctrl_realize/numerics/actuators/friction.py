@@ -27,8 +27,8 @@ References
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import NamedTuple
+from collections.abc import Callable, Mapping
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -54,6 +54,10 @@ def backlash(position: FloatArray, width: float, start: float = 0.0) -> FloatArr
             current = wanted + half
         out.append(current)
     return np.array(out)
+
+
+Stem: TypeAlias = tuple[float, float, float, float, bool, bool, float]
+"""A `StemState` without names."""
 
 
 class StemState(NamedTuple):
@@ -86,10 +90,8 @@ def stem_at_rest(command: float, stick: float, jump: float, start: float = 0.0) 
     return StemState(command, position, 1.0, position + (stick - jump) / 2)
 
 
-def kano_step(
-    state: StemState, command: float, stick: float, jump: float
-) -> tuple[StemState, float]:
-    """Advance Kano's model by one sample; return the new state and the stem position."""
+def kano_step(state: Stem, command: float, stick: float, jump: float) -> Stem:
+    """Advance Kano's model by one sample."""
     last, position, direction, rest, moving, paused, slope = state
     change = command - last
     if moving and change * slope <= 0:
@@ -102,31 +104,26 @@ def kano_step(
             moving = True
     if moving:
         position = command - direction * (stick - jump) / 2
-    return StemState(command, position, direction, rest, moving, paused, change), position
+    # not a StemState: for every sample, its names take longer than all the rest
+    return command, position, direction, rest, moving, paused, change
 
 
 def kano(position: FloatArray, stick: float, jump: float, start: float = 0.0) -> FloatArray:
     """Stem positions (N,) for commands `position` by Kano's model; `start` as `stem_at_rest`."""
-    last = float(position[0])
-    half = (stick - jump) / 2
-    stem = last - start * half
-    direction, rest, moving, slope = 1.0, stem + half, False, 0.0
+    state = stem_at_rest(float(position[0]), stick, jump, start)
+    return _followed(kano_step, state, position, stick, jump)
+
+
+def _followed(
+    step: Callable[[Stem, float, float, float], Stem],
+    state: Stem,
+    position: FloatArray,
+    *parameters: float,
+) -> FloatArray:
     out = []
-    # `kano_step`, written out: a call for every sample takes three times as long.
     for command in position.tolist():
-        change = command - last
-        if moving and change * slope <= 0:
-            moving, rest = False, last
-        if not moving:
-            away = direction * (command - rest)
-            if away < -stick:
-                moving, direction = True, -direction
-            elif away > jump:
-                moving = True
-        if moving:
-            stem = command - direction * half
-        last, slope = command, change
-        out.append(stem)
+        state = step(state, command, *parameters)
+        out.append(state[1])
     return np.array(out)
 
 
@@ -194,10 +191,8 @@ def _runs(
     return first, rising, np.diff(run, append=turns.size) > 0
 
 
-def choudhury_step(
-    state: StemState, command: float, stick: float, jump: float
-) -> tuple[StemState, float]:
-    """Advance Choudhury's model by one sample; return the new state and the stem position."""
+def choudhury_step(state: Stem, command: float, stick: float, jump: float) -> Stem:
+    """Advance Choudhury's model by one sample."""
     last, position, direction, rest, moving, paused, slope = state
     change = command - last
     if moving and change * slope <= 0:
@@ -206,7 +201,7 @@ def choudhury_step(
         moving, direction = True, float(np.sign(command - rest))
     if moving:
         position = command - direction * (stick - jump) / 2
-    return StemState(command, position, direction, rest, moving, paused, change), position
+    return command, position, direction, rest, moving, paused, change
 
 
 def choudhury_at_rest(command: float, stick: float, jump: float, start: float = 0.0) -> StemState:
@@ -222,8 +217,4 @@ def choudhury_at_rest(command: float, stick: float, jump: float, start: float = 
 def choudhury(position: FloatArray, stick: float, jump: float, start: float = 0.0) -> FloatArray:
     """Stem positions (N,) for commands `position` by Choudhury's model; `start` as `kano`."""
     state = choudhury_at_rest(float(position[0]), stick, jump, start)
-    out = []
-    for command in position.tolist():
-        state, stem = choudhury_step(state, command, stick, jump)
-        out.append(stem)
-    return np.array(out)
+    return _followed(choudhury_step, state, position, stick, jump)

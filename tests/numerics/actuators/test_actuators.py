@@ -9,8 +9,6 @@ from ctrl_realize.numerics.actuators.friction import (
     backlash,
     choudhury,
     kano,
-    kano_step,
-    stem_at_rest,
 )
 from ctrl_realize.numerics.actuators.limits import (
     resolved,
@@ -68,15 +66,6 @@ def test_a_stem_turns_after_s_with_a_jump_of_j(model):
     assert y[moves - 1] - y[moves] == pytest.approx(jump, abs=2 * change)
     later = slice(moves, moves + 500)
     assert_allclose(y[later] - u[later], (stick - jump) / 2)
-
-
-def test_the_step_form_of_kanos_model_is_the_model():
-    u = random_walk(5)
-    state, stems = stem_at_rest(float(u[0]), 2.5, 0.8, -1.0), []
-    for command in u.tolist():
-        state, stem = kano_step(state, command, 2.5, 0.8)
-        stems.append(stem)
-    assert_allclose(kano(u, 2.5, 0.8, -1.0), stems, atol=1e-12)
 
 
 def test_a_resolution_is_the_smallest_change_that_moves_the_output():
