@@ -17,8 +17,8 @@ class TrackPoint(ModelFit):
     """Estimate of a delay tracker at one time.
 
     ``dead_time`` is ``delay * dt`` with the delay interpolated between samples; if `resolved` is
-    true it lies inside ``interval``, to half a sample. If `resolved` is false, `reason` states what
-    is missing, and the numbers are only the best guess.
+    true it lies inside ``interval``, to half a sample. Otherwise `reason` states what is missing,
+    and the numbers are only the best guess.
 
     Attributes
     ----------
@@ -43,7 +43,6 @@ class TrackPoint(ModelFit):
         Speed of each real pole and pole pair, relative to the starting model; 1 is unchanged.
     noise_std : float
         Standard deviation of the residual.
-    resolved : bool
     reason : str
     choices : tuple of str
     flags : tuple of Flag
@@ -67,18 +66,22 @@ class TrackPoint(ModelFit):
     delay: int
     dead_time: float
     delay_interval: tuple[int, int]
-    gain_ratio: float
-    gain_std: float
-    pole_speed_ratios: tuple[float, ...]
-    noise_std: float
-    resolved: bool
     dt: float
-    reason: str = ""
+    reason: str
+    gain_ratio: float = 1.0
+    gain_std: float = float("inf")
+    pole_speed_ratios: tuple[float, ...] = ()
+    noise_std: float = float("inf")
     lost: bool = False
     choices: tuple[str, ...] = ()
     flags: tuple[Flag, ...] = ()
     order = None
     records = ()
+
+    @property
+    def resolved(self) -> bool:
+        """Whether the delay is known."""
+        return not self.reason
 
     @property
     def interval_kind(self) -> IntervalKind:

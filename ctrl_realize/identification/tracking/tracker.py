@@ -163,7 +163,7 @@ class DelayTracker:
         # Sample at which the sums were last solved.
         self._variance = 0.0
         self._solution: Solution | None = None
-        self._point = self._unresolved_point()
+        self._point = self._point_of(None)
         # Delays within the last forgetting time; NaN where the delay was not resolved.
         self._recent_delays: deque[float] = deque(maxlen=MOMENTS)
 
@@ -292,38 +292,23 @@ class DelayTracker:
         self._solution, self._variance = found, found.variance
         self._banks.follow(found, self._count)
 
-    def _unresolved_point(self) -> TrackPoint:
-        low = self._low
-        return TrackPoint(
-            time=max(self._count - 1, 0) * self.dt,
-            delay=low,
-            dead_time=low * self.dt,
-            delay_interval=(low, self._high),
-            dt=self.dt,
-            gain_ratio=1.0,
-            gain_std=np.inf,
-            pole_speed_ratios=(),
-            noise_std=np.inf,
-            resolved=False,
-            reason=f"only {self._count} samples yet" if self._count else "no samples yet",
-        )
-
     def _point_of(self, found: Solution | None) -> TrackPoint:
+        time, low = max(self._count - 1, 0) * self.dt, self._low
         if found is None:
-            return self._unresolved_point()
-        excess, pending = self._excess_residual(found), self._banks.pending
+            reason = f"only {self._count} samples yet" if self._count else "no samples yet"
+            return TrackPoint(time, low, low * self.dt, (low, self._high), self.dt, reason)
+        excess = self._excess_residual(found)
         return TrackPoint(
-            time=(self._count - 1) * self.dt,
-            delay=found.delay,
-            dead_time=found.delay_estimate * self.dt,
-            delay_interval=self._widened(found.interval, found.delay_estimate),
-            dt=self.dt,
+            time,
+            found.delay,
+            found.delay_estimate * self.dt,
+            self._widened(found.interval, found.delay_estimate),
+            self.dt,
+            reason=found.reason or excess or self._banks.pending,
             gain_ratio=found.gain,
             gain_std=found.gain_std,
             pole_speed_ratios=found.pole_speed_ratios,
             noise_std=float(np.sqrt(found.variance)),
-            resolved=not (found.reason or excess or pending),
-            reason=found.reason or excess or pending,
             lost=bool(excess),
         )
 
