@@ -15,6 +15,7 @@ import matplotlib as mpl
 import numpy as np
 from matplotlib.axis import Axis
 from matplotlib.figure import Figure
+from matplotlib.layout_engine import ConstrainedLayoutEngine
 from matplotlib.ticker import FixedLocator
 
 from ..numerics.arrays import FloatArray
@@ -46,11 +47,12 @@ def laid_out(draw: Callable[[Figure], Any], size: tuple[float, float]) -> Figure
     size : tuple of float
         Width and height in inches of 72 points.
     """
-    figure = Figure(figsize=size, layout="constrained")
+    layout = ConstrainedLayoutEngine()
+    figure = Figure(figsize=size, layout=layout)
     with missing_glyphs_allowed():
         draw(figure)
         thin_lines(figure)
-        figure.draw_without_rendering()
+        layout.execute(figure)
     figure.set_layout_engine("none")
     return figure
 
