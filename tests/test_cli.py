@@ -14,6 +14,7 @@ import pytest
 
 import ctrl_realize as cr
 from ctrl_realize.cli import main
+from tests.app_records import step_record
 from tests.traps import csv, signals
 
 FAST = ["--method", "scan", "--order", "3", "--max-delay", "80"]
@@ -82,8 +83,7 @@ def test_the_exit_code_tells_whether_a_required_verdict_is_good(folder, tmp_path
 
 
 def test_tune_tells_the_numbers_of_the_same_calls_in_python(tmp_path, capsys):
-    record = cr.datasets.load("tclab").records[0]
-    file = save(record, tmp_path / "heater.csv")
+    file = save(step_record(), tmp_path / "heater.csv")
     words = [str(file), "--structures", "FOPDT", "--form", "siemens_pid_compact", "--kind", "PI"]
     assert main(["tune", *words, "--rule", "amigo"]) == 0
     said = capsys.readouterr().out
@@ -132,6 +132,7 @@ def test_json_is_written_into_a_new_folder_and_not_in_place_of_one(folder, tmp_p
     assert "is a folder; expected a file to write" in said.err
 
 
+@pytest.mark.usefixtures("without_figures")
 def test_the_report_of_identify_has_the_controller_if_it_is_wanted(folder, tmp_path, capsys):
     out = tmp_path / "out"
     words = ["identify", str(folder / "step_0.csv"), "-o", str(out), *FAST]

@@ -327,8 +327,7 @@ def of_modes(centres, damping, *, level=0.01, points=100):
     return f, exact * (1 + noise), level * np.abs(exact)
 
 
-@pytest.mark.parametrize("damping", [0.02, 0.2])
-@pytest.mark.parametrize("known", [True, False])
+@pytest.mark.parametrize(("damping", "known"), [(0.02, False), (0.2, True)])
 def test_three_resonances_are_order_six_without_being_told(damping, known):
     # four poles are no better than one there, and five no better than four
     f, measured, std = of_modes((2, 9, 40), damping)

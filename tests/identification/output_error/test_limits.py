@@ -102,13 +102,9 @@ def test_a_response_that_settles_is_not_said_to_clip(pole):
 
 def test_a_plateau_that_noise_hides_is_told_and_leaves_the_gain_in_doubt():
     u = np.where(TIME < 6, 0.0, 1.0)
-    told = 0
-    for seed in range(3):
-        fit = fitted(u, clipped(u, 1.5, "before", seed, noise=0.04), structures=FEW)
-        if "may_be_at_limit" in codes(fit):
-            assert fit.verdicts[1].level != "good"
-        told += bool(codes(fit) & {"may_be_at_limit", "output_at_limit"})
-    assert told >= 2
+    fit = fitted(u, clipped(u, 1.5, "before", noise=0.04), structures=FEW)
+    assert codes(fit) & {"may_be_at_limit", "output_at_limit"}
+    assert fit.verdicts[1].level != "good"
 
 
 def test_a_response_that_settles_has_no_plateau():
