@@ -21,6 +21,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from scipy.special import ndtr, stdtrit
@@ -135,6 +136,11 @@ class WindowFit:
             del left[structure]
         return self.candidates[first]
 
+    def of(self, candidates: dict[Structure, Candidate], **changes: Any) -> WindowFit:
+        """Replace the candidates, and what else has changed; the criterion is theirs."""
+        fit = replace(self, candidates=candidates, **changes)
+        return replace(fit, criterion=fit.criteria(candidates))
+
     def misfit(self, candidate: Candidate) -> float:
         """Root mean square of the residual of a candidate, in units of `normalized_rms`."""
         least = self.candidates[choose(self.criterion)].cost
@@ -166,7 +172,7 @@ def with_known_noise(
     """Compare candidates on a window with noise of a known level, whatever their residual is."""
     level = float(np.sqrt(correlation))
     fit = WindowFit(window, window.problem, candidates, {}, scales, sigma, correlation, level)
-    return replace(fit, criterion=fit.criteria(candidates))
+    return fit.of(candidates)
 
 
 def with_noise_of_residual(fit: WindowFit) -> WindowFit:
@@ -348,7 +354,7 @@ def extended(fit: WindowFit, structures: Sequence[Structure]) -> WindowFit:
     """Add structures to a fit; noise and data remain those of the previous structures."""
     candidates = search(fit.problem, structures, fit.scales, fit.candidates)
     candidates = converged(fit.problem, candidates, fit.scales, fit.variance, fit.independent)
-    return replace(fit, candidates=candidates, criterion=fit.criteria(candidates))
+    return fit.of(candidates)
 
 
 def among(fit: WindowFit, structures: Sequence[Structure]) -> WindowFit:
@@ -357,7 +363,7 @@ def among(fit: WindowFit, structures: Sequence[Structure]) -> WindowFit:
     candidates = fit.candidates | converged(
         fit.problem, few, fit.scales, fit.variance, fit.independent
     )
-    return replace(fit, candidates=candidates, criterion=fit.criteria(candidates))
+    return fit.of(candidates)
 
 
 def clipped(error: FloatArray, least: float) -> FloatArray:

@@ -90,8 +90,7 @@ def in_coloured_noise(fits: WindowFit, data: StepData) -> WindowFit:
     if colour > _UNLIKE**2:
         return fits
     slowness = 2 * float(np.sum(covariance)) - 1.0
-    refit = replace(refit, colour=max(colour, 1.0), correlation=max(slowness, 1.0))
-    return replace(refit, criterion=refit.criteria(candidates))
+    return refit.of(candidates, colour=max(colour, 1.0), correlation=max(slowness, 1.0))
 
 
 def _fitted_again(fits: WindowFit, problem: Problem) -> dict[Structure, Candidate]:

@@ -184,8 +184,7 @@ def _compared(
             lower = lower_minima(fits, kept)
         if not lower:
             break
-        candidates = fits.candidates | lower
-        fits = replace(fits, candidates=candidates, criterion=fits.criteria(candidates))
+        fits = fits.of(fits.candidates | lower)
         points = {s: own for s, own in points.items() if s not in lower}
     return (
         fits,

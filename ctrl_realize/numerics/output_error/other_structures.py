@@ -147,7 +147,7 @@ def _not_ruled_out(fits: WindowFit, richer: dict[Structure, Candidate]) -> Other
     # Those that are ruled out by more than is left to their minima need not be followed there.
     for s in _kept(fits, found, SLACK):
         found[s] = settled(problem, found[s], scales) if s in more else found[s]
-    free = replace(fits, candidates=found, criterion=fits.criteria(found))
+    free = fits.of(found)
     level = _charged(fits.criterion, given.structure)
     lines = [
         _without_interval(free, found[s], _charged(free.criterion, s) - level)

@@ -69,13 +69,12 @@ def process_fit(
     like = list(fits.candidates.values())
     fitted = [fit_form(fits.problem, form, fits.scales, like) for form in forms]
     models = {model.structure: model for model in fitted}
-    given = replace(fits, candidates=models, criterion=fits.criteria(models), rivals={})
+    given = fits.of(models, rivals={})
     # What the prescriptions cost is part of the noise, if the data contradict them.
     excess = given.best.cost / max(fits.candidates[given.best.structure.plain].cost, SMALLEST)
     if excess > _CONTRADICTED:
         sigma = float(np.hypot(fits.sigma, fits.rounding) * np.sqrt(excess))
-        given = replace(given, sigma=sigma, rounding=0.0)
-        given = replace(given, criterion=given.criteria(models))
+        given = given.of(models, sigma=sigma, rounding=0.0)
     found = likelihood_fit(given, adequate=adequate, near=near)
     chosen = fitted[forms.index(found.process.form)]
     host = fits.candidates[chosen.structure.plain]
@@ -116,13 +115,12 @@ def fit_without_fast_lags(
         setting = fits.scales, fits.variance, fastest
         model = fit_slow_lags(fits.problem, host, fewer, *setting)
         models[model.structure] = model
-    given = replace(fits, candidates=models, criterion=fits.criteria(models), rivals={})
+    given = fits.of(models, rivals={})
     excess = given.best.cost / max(fits.best.cost, SMALLEST)
     better = better_than(given.best, fits)
     if better is not None:
         # What the bound costs is part of the noise.
-        given = replace(given, sigma=given.sigma * float(np.sqrt(max(excess, 1.0))))
-        given = replace(given, criterion=given.criteria(models))
+        given = given.of(models, sigma=given.sigma * float(np.sqrt(max(excess, 1.0))))
     adequate = is_noise(fits.misfit(given.best), fits.correlation)
     chains = [c for c in chains_of(fits) if fastest * np.abs(c.candidate.poles).max() <= 1]
     found = likelihood_fit(given, adequate=adequate, chains=chains, near=near)

@@ -64,7 +64,7 @@ from ..result import (
     assembled,
 )
 from .data import SampledData
-from .window import SampledWindow, fit_windows, modelled
+from .window import SampledWindow, fit_windows, simulation_error
 
 LAGS = tuple(ProcessForm(f"P{n}D", n) for n in (1, 2, 3))
 FURTHER = ProcessForm("P4D", 4)  # where three lags are chosen
@@ -148,7 +148,7 @@ def fit_lags(data: SampledData, requested: Requested) -> tuple[SampledWindow, Ou
         partial(with_profiled_lags, *setting), form if requested.forms else None
     )
     plain = {s.plain: _plain(one) for s, one in fits.candidates.items()}
-    plainly = replace(fits, candidates=plain, criterion=fits.criteria(plain))
+    plainly = fits.of(plain)
     better = _better(part, min(fitted, key=partial(_value, fits)), within)
     of_lags = np.add.reduceat(shares.sum(axis=1), range(len(forms)))
     evidence = dict(zip(plain, of_lags.tolist(), strict=True))
@@ -193,9 +193,7 @@ def _from_the_first(data: SampledData, errors: Sequence[FloatArray]) -> tuple[Fl
 
 def _left(part: SampledWindow, model: Candidate) -> list[FloatArray]:
     """What a model leaves of every record."""
-    state = evaluate(part.fit.problem, model.structure, model.parameters[None])
-    fitted = modelled(part.data, model.parameters, state.numerator[0])
-    return np.split(part.data.problem.data - fitted, part.data.edges[1:-1])
+    return np.split(simulation_error(part.data, model, part.fit), part.data.edges[1:-1])
 
 
 def _better(
@@ -245,12 +243,10 @@ def _with_noise(fits: WindowFit, lags: Sequence[Candidate]) -> WindowFit:
     terms = 2 + closest.structure.order + fits.problem.local_count(closest.structure.order)
     sigma = float(np.sqrt(closest.cost / max(residual.size - terms, 1)))
     correlation = correlation_time(residual)
-    candidates = {one.structure: one for one in lags}
-    made = replace(
-        fits, candidates=candidates, sigma=sigma, rounding=0.0, correlation=correlation, rivals={},
-        normalized_rms=1.0,
+    return fits.of(
+        {one.structure: one for one in lags}, sigma=sigma, rounding=0.0, correlation=correlation,
+        rivals={}, normalized_rms=1.0,
     )  # fmt: skip
-    return replace(made, criterion=made.criteria(candidates))
 
 
 def _profiles(fits: WindowFit, fitted: Sequence[Candidate]) -> list[Points]:

@@ -124,9 +124,7 @@ def in_coloured_noise(plain: SampledWindow) -> SampledWindow:
     """
     found, before = plain, None
     for _ in range(_NOISE_TURNS):
-        parameters = found.fit.best.parameters
-        model = modelled(found.data, parameters, found.model.numerator)
-        error = found.data.problem.data - model
+        error = simulation_error(found.data, found.fit.best, found.fit)
         noise = whitening_filter(error, noise_lags(min(found.data.counts)))
         within = plain.scales.earliest, plain.scales.latest
         again = fit_windows(plain.data, ORDERS, within, plain.huber, noise, like=before)
@@ -153,7 +151,8 @@ def simulates_worse(weighted: SampledWindow, plain: SampledWindow) -> bool:
     """
     if not _settles(plain.fit.static(plain.fit.best)):
         return False
-    before, after = (_simulated(plain.data, fit) for fit in (plain, weighted))
+    both = plain.fit, weighted.fit
+    before, after = (simulation_error(plain.data, fit.best, fit) for fit in both)
     independent = after.size / correlation_time(after)
     ratio = winsorised_sigma(after, 0.0) / max(winsorised_sigma(before, 0.0), SMALLEST)
     fewer = weighted.fit.best.structure.free - plain.fit.best.structure.free
@@ -161,10 +160,10 @@ def simulates_worse(weighted: SampledWindow, plain: SampledWindow) -> bool:
     return bool(evidence > VERY_STRONG)
 
 
-def _simulated(data: SampledData, fit: SampledWindow) -> FloatArray:
-    """Error of a simulation with the best local terms."""
-    best = fit.fit.best
-    return np.asarray(data.problem.data - modelled(data, best.parameters, fit.model.numerator))
+def simulation_error(data: SampledData, model: Candidate, fit: WindowFit) -> FloatArray:
+    """Error of a simulation with the best local terms, and the numerator that a fit gives."""
+    state = evaluate(fit.problem, model.structure, model.parameters[None])
+    return np.asarray(data.problem.data - modelled(data, model.parameters, state.numerator[0]))
 
 
 def _settles(static: StaticGain) -> bool:
