@@ -15,7 +15,7 @@ from ...numerics.state_space.pole_sensitivity import (
     pole_directions,
     sensitivity_system,
 )
-from .estimate import LinearisedBank, Solution
+from .estimate import LinearisedBank, Solution, too_far
 
 RUN_IN, SHORT_RUN_IN = 2.0, 0.5
 """Forgetting times before a renewed bank is used; the shorter one if the previous bank gives no
@@ -111,10 +111,4 @@ class Banks:
     @property
     def pending(self) -> str:
         """Report that a bank for poles far from the present ones is pending; empty otherwise."""
-        step = self.step_made
-        if abs(step) <= PENDING:
-            return ""
-        return (
-            f"a pole has moved by about {100 * np.expm1(step):+.0f} %; the reference model is "
-            "being updated"
-        )
+        return too_far(self.step_made, PENDING)

@@ -125,7 +125,7 @@ def solve(now: LinearisedBank, variance: float, inflation: float) -> Solution:
         variance=variance,
         response_std=float(np.sqrt(max(found.power - found.weighted_sse[best], 0.0) / bank.weight)),
         responds=not unseen,
-        reason=unseen or open_still or _too_far(moves[speeds]),
+        reason=unseen or open_still or too_far(max(moves[speeds], key=abs, default=0.0), SPEED_STD),
     )
 
 
@@ -172,14 +172,13 @@ def _no_choice(delay: int, interval: tuple[int, int], candidates: tuple[int, int
     return ""
 
 
-def _too_far(speeds: FloatArray) -> str:
-    """Report that the poles have moved beyond the range of the linearisation."""
-    moved = float(max(speeds, key=abs, default=0.0))
-    if abs(moved) <= SPEED_STD:
+def too_far(move: float, most: float) -> str:
+    """State that a pole has moved beyond the range of the linearisation."""
+    if abs(move) <= most:
         return ""
     return (
-        f"a pole has moved by {100 * np.expm1(moved):+.0f} %, too far from the reference "
-        "model; the reference model is being updated"
+        f"a pole has moved by {100 * np.expm1(move):+.0f} %, too far from the reference model, "
+        "which is being updated"
     )
 
 

@@ -139,16 +139,17 @@ def _without_delays(part: DelayForm) -> ComplexArray:
     return np.asarray(np.linalg.eigvals(A), dtype=np.complex128)
 
 
-def _loop_gain(part: DelayForm, points: ComplexArray) -> FloatArray:
-    """Spectral radius of the core between the delays, at points where the delays have size 1."""
+def between_delays(part: DelayForm, points: ComplexArray) -> ComplexArray:
+    """Response of the core between the delays at points (K,), shape (K, q, q)."""
     with np.errstate(divide="ignore", invalid="ignore"):
         core = frequency_response(schur_form(part.A), part.B, part.C, part.D, points)
-    if core.shape[0] == 1:
-        gain = np.abs(core[0, 0])
-    else:
-        matrices = np.nan_to_num(np.moveaxis(core, -1, 0), nan=1e3, posinf=1e3, neginf=1e3)
-        gain = np.abs(np.linalg.eigvals(matrices)).max(axis=1)
-    return np.asarray(np.nan_to_num(gain, nan=1e3), dtype=np.float64)
+    return np.asarray(np.moveaxis(core, -1, 0))
+
+
+def _loop_gain(part: DelayForm, points: ComplexArray) -> FloatArray:
+    """Spectral radius of the core between the delays, at points where the delays have size 1."""
+    core = np.nan_to_num(between_delays(part, points), nan=1e3, posinf=1e3, neginf=1e3)
+    return np.asarray(np.abs(np.linalg.eigvals(core)).max(axis=1))
 
 
 def apart(roots: ComplexArray, rtol: float = 1e-9) -> ComplexArray:

@@ -19,9 +19,8 @@ import numpy as np
 
 from ..arrays import ComplexArray, FloatArray
 from ..loops.crossings import encircled, follow, frequency_grid
-from ..state_space.responses import frequency_response, schur_form
 from .characteristic import loops
-from .dominant import dominant_discrete_poles
+from .dominant import between_delays, dominant_discrete_poles
 from .form import DelayForm
 from .response import CHUNK, characteristic_matrices
 from .spectrum import rightmost_poles
@@ -149,14 +148,6 @@ def _count(part: DelayForm, dt: float) -> tuple[int, bool]:
     return encircled(values, rest)
 
 
-def _between_delays(part: DelayForm, omega: FloatArray) -> ComplexArray:
-    """Response of the core between the delays, shape (K, q, q)."""
-    points = np.asarray(1j * omega, dtype=np.complex128)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        core = frequency_response(schur_form(part.A), part.B, part.C, part.D, points)
-    return np.asarray(np.moveaxis(core, -1, 0))
-
-
 def _low_gain_from(part: DelayForm, omega: FloatArray) -> float | None:
     """Frequency above which the gain of all loops together is small; None if there is none.
 
@@ -165,7 +156,7 @@ def _low_gain_from(part: DelayForm, omega: FloatArray) -> float | None:
     """
     places = np.linalg.eigvals(part.A).astype(np.complex128)
     coarse = frequency_grid(float(omega[0]), float(omega[-1]), places, 0.0)
-    gains = np.abs(_between_delays(part, coarse))
+    gains = np.abs(between_delays(part, np.asarray(1j * coarse, dtype=np.complex128)))
     gains = np.where(np.isfinite(gains), gains, np.inf)
     v = np.ones(gains.shape[:2])
     bound = np.full(coarse.size, np.inf)
@@ -185,7 +176,7 @@ def _rest(part: DelayForm, omega: float) -> float:
     """Turn of the characteristic function in rad from a frequency of small gain to infinity."""
     at = np.array([omega])
     late = np.exp(-1j * omega * np.asarray(part.delays))
-    loops_at = np.linalg.eigvals(late[:, None] * _between_delays(part, at)[0])
+    loops_at = np.linalg.eigvals(late[:, None] * between_delays(part, 1j * at)[0])
     poles = np.linalg.eigvals(part.A)
     rate = _rate(part)
     # each factor goes to the positive real axis on the shorter way: 1 - g with |g| < 1, and

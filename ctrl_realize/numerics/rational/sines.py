@@ -43,8 +43,6 @@ class SineFit:
         Level at ``t = 0``, and drift per second (0 if not fitted).
     noise_variance : ndarray, shape (B, C)
         Variance of the residual, corrected for the fitted parameters.
-    omega_std : ndarray, shape (B,)
-        Standard deviation of `omega`; 0 if the frequency was given.
     phasor_covariance : ndarray, shape (B, C, 2, 2)
         Covariance of real and imaginary part of `phasor`, at the frequency found.
     """
@@ -54,7 +52,6 @@ class SineFit:
     offset: FloatArray
     slope: FloatArray
     noise_variance: FloatArray
-    omega_std: FloatArray
     phasor_covariance: FloatArray
 
 
@@ -111,7 +108,6 @@ def fit_sines(
     data = signals * kept[:, None, :]
 
     omega = np.array(omega, dtype=np.float64)
-    omega_std = np.zeros(n_records)
     weights = np.ones((n_records, n_channels))
     n_columns = 4 if drift else 3
     freedom = np.maximum(count - n_columns - (0.5 if free_frequency else 0.0), 1.0)[:, None]
@@ -122,7 +118,7 @@ def fit_sines(
         for iteration in range(_MAX_ITERATIONS):
             if iteration in (0, 2):
                 weights = 1.0 / np.maximum((at.residual**2).sum(axis=2) / freedom, floor)
-            step, _ = _frequency_step(local, at, weights)
+            step = _frequency_step(local, at, weights)
             # A step longer than a fraction of the line width would leave the minimum.
             limit = 1.0 / span
             step = np.clip(step, -limit, limit)
@@ -130,11 +126,8 @@ def fit_sines(
             at = _project(local, data, omega, kept, drift)
             if iteration > 2 and np.all(np.abs(step) * span < 1e-11):
                 break
-        weights = freedom / np.maximum((at.residual**2).sum(axis=2), floor)
-        _, curvature = _frequency_step(local, at, weights)
-        omega_std = 1.0 / np.sqrt(curvature)
 
-    return _collect(local, omega, kept, at, freedom, centre, omega_std)
+    return _collect(local, omega, kept, at, freedom, centre)
 
 
 def dominant_frequency(signals: FloatArray, dt: float) -> FloatArray:
@@ -197,18 +190,15 @@ def _project(
     return _Projection(design, basis, coefficients, data - projected @ basis.transpose(0, 2, 1))
 
 
-def _frequency_step(
-    local: FloatArray, at: _Projection, weights: FloatArray
-) -> tuple[FloatArray, FloatArray]:
-    """Gauss-Newton step of the common frequency, and the information on it."""
+def _frequency_step(local: FloatArray, at: _Projection, weights: FloatArray) -> FloatArray:
+    """Gauss-Newton step of the common frequency."""
     cosine, sine = at.columns[:, :, 0] * local, at.columns[:, :, 1] * local
     slope = at.coefficients[..., 1:2] * cosine[:, None]
     slope -= at.coefficients[..., 0:1] * sine[:, None]
     slope -= (slope @ at.basis) @ at.basis.transpose(0, 2, 1)
     curvature = (weights * (slope**2).sum(axis=2)).sum(axis=1)
     gradient = (weights * (slope * at.residual).sum(axis=2)).sum(axis=1)
-    curvature = np.maximum(curvature, np.finfo(float).tiny)
-    return gradient / curvature, curvature
+    return np.asarray(gradient / np.maximum(curvature, np.finfo(float).tiny))
 
 
 def _collect(
@@ -218,7 +208,6 @@ def _collect(
     at: _Projection,
     freedom: FloatArray,
     centre: FloatArray,
-    omega_std: FloatArray,
 ) -> SineFit:
     """Convert the result from centred time back to the caller's, with its covariance."""
     coefficients = at.coefficients
@@ -243,7 +232,6 @@ def _collect(
         offset=offset,
         slope=slope,
         noise_variance=noise_variance,
-        omega_std=omega_std,
         phasor_covariance=noise_variance[..., None, None] * turned[:, None],
     )
 
