@@ -12,7 +12,7 @@ from .._checks import check_type, one_of
 from ..data import Record
 from ..data.given import check_complete, check_input
 from ..errors import DataError, UnsuitableSystemError
-from ..numerics.arrays import FloatArray, later
+from ..numerics.arrays import FloatArray, later, unit_columns
 from ..numerics.internal_delays.form import DelayForm, delayed_ends
 from ..numerics.state_space.responses import markov, step_response
 from ..numerics.state_space.sampling import continuous_ends
@@ -48,10 +48,8 @@ def simulate_record(
     regressors = np.hstack(columns)
     # Every output is scaled to its unit, so that outputs with large numbers do not dominate.
     unit = np.repeat(_units(y), N)
-    alike = regressors / unit[:, None]
-    scale = np.linalg.norm(alike, axis=0)
-    scale[scale == 0] = 1.0
-    alike, target = alike / scale, (y - forced).ravel() / unit
+    alike, scale = unit_columns(regressors / unit[:, None])
+    target = (y - forced).ravel() / unit
     if gaps:
         seen = ~np.isnan(target)
         alike, target = alike[seen], target[seen]

@@ -26,6 +26,13 @@ def lock_fields(result: object, *names: str) -> None:
         object.__setattr__(result, name, read_only(getattr(result, name)))
 
 
+def unit_columns(columns: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Columns (N, k) of norm 1, zero columns unchanged, and their norms (k,)."""
+    norm = np.linalg.norm(columns, axis=0)
+    norm[norm == 0] = 1.0
+    return columns / norm, norm
+
+
 def without_gaps(values: FloatArray) -> FloatArray:
     """Interpolate missing values (NaN) of a signal (N,), for starting values and displays only."""
     missing = np.isnan(values)

@@ -18,7 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import ndtr, ndtri
 
-from ..arrays import BoolArray, ComplexArray, FloatArray
+from ..arrays import BoolArray, ComplexArray, FloatArray, unit_columns
 from ..constants import SMALLEST, Z_95
 from .eliminate import eliminate
 from .modal import partial_fractions, responses
@@ -166,10 +166,8 @@ class LocalErrors:
 
     def _root(self, seen: BoolArray) -> FloatArray:
         """Root R (r, s) of the covariance ``R^T R`` of some of the slopes' parameters."""
-        columns = np.concatenate([self.slopes[:, seen], self.own], axis=1)
-        size = np.linalg.norm(columns, axis=0)
-        size[size == 0] = 1.0
-        _, singular, turned = np.linalg.svd(columns / size, full_matrices=False)
+        columns, size = unit_columns(np.concatenate([self.slopes[:, seen], self.own], axis=1))
+        _, singular, turned = np.linalg.svd(columns, full_matrices=False)
         singular = np.maximum(singular, max(_NOTHING * singular[0], SMALLEST))
         count = int(seen.sum())
         return np.asarray((turned / singular[:, None])[:, :count] / size[:count])

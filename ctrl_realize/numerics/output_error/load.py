@@ -30,7 +30,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..arrays import FloatArray
+from ..arrays import FloatArray, unit_columns
 from ..constants import OUTLIER, SMALLEST, VERY_STRONG
 from ..engine.descend import descend
 from ..engine.eliminate import eliminate, evaluate
@@ -246,8 +246,7 @@ def _scan(
     numerator = eliminate(own, candidate.structure, candidate.parameters[None]).numerator[0]
     errors = local_errors(p, candidate, numerator, fits.scales.length)
     taken = np.concatenate([errors.slopes, errors.own], axis=1)
-    size = np.linalg.norm(taken, axis=0)
-    basis, singular, _ = np.linalg.svd(taken / np.where(size > 0, size, 1.0), full_matrices=False)
+    basis, singular, _ = np.linalg.svd(unit_columns(taken)[0], full_matrices=False)
     basis = basis[:, singular > _NOTHING * singular[0]]
     middle = _on_bins(fits, clock[:, None])[:, 0]
     # A load faster than a bin differs from a jump there alone.

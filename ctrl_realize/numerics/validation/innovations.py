@@ -28,7 +28,7 @@ from itertools import pairwise
 import numpy as np
 from scipy.special import fdtrc
 
-from ..arrays import FloatArray, IntArray
+from ..arrays import FloatArray, IntArray, unit_columns
 from ..constants import LEAST_FREEDOM, SMALLEST
 from ..signals.noise import mad_sigma, quantisation_step
 
@@ -290,7 +290,7 @@ def _least_absolute(
     columns, weights = np.stack(rows, axis=1), np.ones((target.size, 1))
     for _ in range(_TURNS):
         weighted = weights * columns, weights[:, 0] * target
-        found = np.linalg.lstsq(*weighted, rcond=_RANK)[0]
+        found = np.asarray(np.linalg.lstsq(*weighted, rcond=_RANK)[0], dtype=np.float64)
         left = target - columns @ found
         size = np.abs(left)
         least = max(_FLOOR * float(np.median(size)), _RANK * float(np.std(target)), SMALLEST)
@@ -300,7 +300,6 @@ def _least_absolute(
 
 def _left(columns: FloatArray, targets: FloatArray, least: float) -> tuple[FloatArray, int]:
     """What least squares leave of targets, and the rank of the columns, scaled to one size."""
-    size = np.linalg.norm(columns, axis=0)
-    scaled = columns / np.where(size > 0, size, 1.0)
+    scaled, _ = unit_columns(columns)
     solution, _, rank, _ = np.linalg.lstsq(scaled, targets, rcond=least)
     return targets - scaled @ solution, int(rank)

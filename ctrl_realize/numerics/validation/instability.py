@@ -16,7 +16,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.special import stdtr
 
-from ..arrays import FloatArray
+from ..arrays import FloatArray, unit_columns
 from ..constants import LEAST_FREEDOM
 
 OWN_PAST = 30
@@ -56,12 +56,11 @@ def unstable_chance(output: FloatArray, drive: FloatArray, past: int) -> float:
     here = np.arange(before, before + rows)
     own = [output[here - i] for i in range(1, OWN_PAST + 1)]
     earlier = [one[here - i] for one in inputs for i in range(1, past + 1)]
-    columns = np.stack([*own, *earlier, np.ones(rows), here / rows], axis=1)
-    size = np.linalg.norm(columns, axis=0)
-    size[size == 0] = 1.0
+    everything = np.stack([*own, *earlier, np.ones(rows), here / rows], axis=1)
+    columns, size = unit_columns(everything)
     target = output[here]
     # The triangle has the same right singular vectors, and far fewer rows.
-    triangle = np.asarray(np.linalg.qr(np.column_stack([columns / size, target]), mode="r"))
+    triangle = np.asarray(np.linalg.qr(np.column_stack([columns, target]), mode="r"))
     left, singular, right = np.linalg.svd(triangle[:-1, :-1])
     rank = int(np.count_nonzero(singular > _RANK * singular[0]))
     inside, outside = np.split(left.T @ triangle[:-1, -1], [rank])

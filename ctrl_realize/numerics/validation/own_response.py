@@ -21,7 +21,7 @@ from typing import NamedTuple, TypeAlias
 import numpy as np
 from scipy.special import chdtrc, ndtri, stdtrit
 
-from ..arrays import ComplexArray, FloatArray
+from ..arrays import ComplexArray, FloatArray, unit_columns
 from ..engine.modal import respond
 from ..engine.poles import parameters_from_poles
 from ..engine.problem import KnownFactor
@@ -274,9 +274,7 @@ def _moved(
 
 def _regression(columns: FloatArray, output: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Least squares and standard errors, including correlation of the residual."""
-    size = np.linalg.norm(columns, axis=0)
-    size[size == 0] = 1.0
-    scaled = columns / size
+    scaled, size = unit_columns(columns)
     solution = np.linalg.lstsq(scaled, output, rcond=None)[0]
     left = output - scaled @ solution
     freedom = max(output.size - columns.shape[1], 1)
