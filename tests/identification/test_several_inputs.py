@@ -13,7 +13,7 @@ PLANTS = {"valve": (2.0, 20.0, 5.3), "load": (-1.2, 30.0, 9.0)}
 def record(seed, alike=0.0, acting=tuple(PLANTS)):
     """Binary signals of two inputs, of which one may follow the other in part, or not act."""
     rng = np.random.default_rng(seed)
-    first, second = np.repeat(rng.choice([-1.0, 1.0], (2, T.size // 20)), 20, axis=1)
+    first, second = np.repeat(rng.choice([-1.0, 1.0], (2, T.size // 10)), 10, axis=1)
     inputs = np.stack([first, alike * first + (1 - alike) * second])
     y = 0.1 * rng.standard_normal(T.size)
     for u, name in zip(inputs, PLANTS, strict=True):

@@ -255,10 +255,13 @@ def test_a_plain_continuous_model_is_stored_without_delay(tmp_path):
 
 
 def test_an_actuator_is_stored_with_its_model(tmp_path):
-    slow = cr.actuators.SlewRateLimit(300.0)
-    valve = cr.bench.valve(actuator=slow, actuator_at="input", lvdt_hz=None)
-    record = valve.step_record(16, rng=1)
-    sys = cr.fit_output_error(record, structures=[(3, 3)], actuator="slew_rate")
+    command = 10.0 + 8.0 * (np.arange(400) > 80)
+    slow = cr.actuators.SlewRateLimit(16.0).simulate(command, 0.01)
+    smooth = np.concatenate([np.zeros(9), np.cumsum(0.1 * 0.9 ** np.arange(391))])
+    output = np.convolve(np.diff(slow, prepend=10.0), smooth)[:400]
+    noise = 0.005 * np.random.default_rng(1).standard_normal(400)
+    record = cr.Record(0.01 * np.arange(400), command, output + noise)
+    sys = cr.fit_output_error(record, structures=[(1, 1)], actuator="slew_rate")
     file = tmp_path / "model.json"
     save_model(file, sys)
     loaded = load_model(file)
