@@ -50,11 +50,16 @@ def connected(n_workers):
 @pytest.fixture(scope="module")
 def client():
     """Of two workers; one of them is started again whenever it dies."""
-    with (
-        dask.config.set({"distributed.scheduler.allowed-failures": 1}),
-        connected(2) as shared,
+    # forks of one process that has loaded what each of them would load for two seconds
+    with dask.config.set(
+        {
+            "distributed.scheduler.allowed-failures": 1,
+            "distributed.worker.multiprocessing-method": "forkserver",
+        }
     ):
-        yield shared
+        distributed.utils.get_mp_context().set_forkserver_preload(["distributed", "control"])
+        with connected(2) as shared:
+            yield shared
 
 
 def test_a_record_that_kills_its_worker_is_a_row_and_others_have_the_same_bits(client, tmp_path):
