@@ -47,13 +47,11 @@ def laid_out(draw: Callable[[Figure], Any], size: tuple[float, float]) -> Figure
     size : tuple of float
         Width and height in inches of 72 points.
     """
-    layout = ConstrainedLayoutEngine()
-    figure = Figure(figsize=size, layout=layout)
+    figure = Figure(figsize=size)  # without an engine, for which saving would draw once more
     with missing_glyphs_allowed():
         draw(figure)
         thin_lines(figure)
-        layout.execute(figure)
-    figure.set_layout_engine("none")
+        ConstrainedLayoutEngine().execute(figure)
     return figure
 
 
