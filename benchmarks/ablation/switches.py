@@ -233,7 +233,7 @@ SWITCHES = (
     ),
     Switch(
         "integrator beside a lag of any ratio",
-        {f"{ENGINE}.window_fit:_RAMP": value(0.0)},
+        {f"{ENGINE}.window_fit:RAMP": value(0.0)},
         (f"{STEP}:fit_window", f"{FITS}.any_input.window:fit_window"),
         called=True,
     ),

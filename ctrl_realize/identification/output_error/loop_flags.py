@@ -13,6 +13,7 @@ from ...data import Record
 from ...numerics.arrays import BoolArray, FloatArray
 from ...numerics.constants import Z_95
 from ...numerics.engine.plausible_models import PlausibleModel
+from ...numerics.loops.relay import switched_by_relay
 from ...numerics.signals.excitation import lively_start
 from ...numerics.validation.innovations import (
     RARE,
@@ -111,7 +112,8 @@ def answers_the_output(records: Sequence[Record]) -> bool:
     """Whether inputs are those of controllers: no response within a sample explains that."""
     if any(record.n_missing for record in records):
         return False
-    return shows_feedback([(np.ravel(one.output), np.ravel(one.input)) for one in records])
+    signals = [(np.ravel(one.output), np.ravel(one.input)) for one in records]
+    return all(switched_by_relay(*each) for each in signals) or shows_feedback(signals)
 
 
 def late_input(records: Sequence[Record]) -> Flag | None:

@@ -44,8 +44,8 @@ from .structures import (
 from .window import Window
 
 _PASSES = 2  # of modified residuals; see `fit_window`
-_RAMP = 0.1
-"""Pole of a first-order fit times the length of the record, below which there may be an integrator
+RAMP = 0.1
+"""Slowest pole times the length of the record, below which there may be an integrator
 beside a lag that is faster by any ratio. Ablation: integrator beside a lag of any ratio."""
 _HALF_A_TURN = 0.95 * np.pi  # rad a sample; a pair of that frequency moves by some hundredths
 _LEAST_FREEDOM = 3.0  # of a variance that is estimated: fewer tell none
@@ -245,7 +245,7 @@ def fit_window(
     scales = replace(
         scales,
         ringing=_ringing(error[window.start :], spacing),
-        integrating=bool(np.abs(rough.poles[0]) * scales.length < _RAMP),
+        integrating=bool(np.abs(rough.poles[0]) * scales.length < RAMP),
     )
     others = [s for s in structures if s not in first]
     beside = first if len(others) < len(structures) else None

@@ -1,4 +1,4 @@
-"""A plant that a relay switches, sample by sample: our own loop of the test of [1]_.
+"""A plant that a relay switches, sample by sample, and how a record shows it: the test of [1]_.
 
 References
 ----------
@@ -16,6 +16,8 @@ from ..arrays import FloatArray
 
 Sampled = tuple[FloatArray, FloatArray, FloatArray, FloatArray, int]
 """A, B, C, D and the samples of input delay of a plant behind a hold."""
+
+_FEWEST = 6  # switches: the first two start a test, and two of each direction are no accident
 
 
 def relay_loop(
@@ -54,3 +56,27 @@ def relay_loop(
         arrived[k + delay] = levels[0] if up else levels[1]
         state = A @ state + B[:, 0] * arrived[k]
     return arrived[delay:], output
+
+
+def switched_by_relay(output: FloatArray, drive: FloatArray) -> bool:
+    """Whether the input (N,) of a record is that of a relay: the output (N,) tells every switch.
+
+    From the third switch on there are two levels, each of which ends where the output of the same
+    sample, or of the one before, has passed a threshold, and nowhere else.
+    """
+    switches = np.flatnonzero(np.diff(drive)) + 1
+    if switches.size < _FEWEST:
+        return False
+    here = np.arange(switches[1] + 1, drive.size)
+    before = drive[here - 1]
+    ends, upper = drive[here] != before, before > before.mean()
+    held = upper[~ends]
+    if np.unique(before).size != 2 or held.all() or not held.any():
+        return False
+    # The output falls to the threshold at which the lower level ends, or rises to it.
+    return any(
+        np.max(seen[~upper & ends]) < np.min(seen[~upper & ~ends])
+        and np.min(seen[upper & ends]) > np.max(seen[upper & ~ends])
+        for late in (0, 1)
+        for seen in (output[here - late], -output[here - late])
+    )

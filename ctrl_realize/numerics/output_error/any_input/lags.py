@@ -47,7 +47,7 @@ from ...engine.profile import (
     profile_points,
 )
 from ...engine.structures import Candidate
-from ...engine.window_fit import WindowFit, clipped, has_outliers
+from ...engine.window_fit import RAMP, WindowFit, clipped, has_outliers
 from ...families.form_fit import fit_form
 from ...families.lag_profiles import with_profiled_lags
 from ...families.process_form import ProcessForm
@@ -237,15 +237,19 @@ def _with_dead_time(
 
 
 def _with_noise(fits: WindowFit, lags: Sequence[Candidate]) -> WindowFit:
-    """Compare lags with the noise that the closest of them leaves."""
+    """Compare lags with the noise that the closest of them leaves.
+
+    One lag may look like an integrator where several do not.
+    """
     closest = min(lags, key=lambda one: one.cost)
     residual = evaluate(fits.problem, closest.structure, closest.parameters[None]).residual[0]
     terms = 2 + closest.structure.order + fits.problem.local_count(closest.structure.order)
     sigma = float(np.sqrt(closest.cost / max(residual.size - terms, 1)))
     correlation = correlation_time(residual)
+    slowest = float(np.abs(closest.poles).min()) * fits.scales.length
     return fits.of(
         {one.structure: one for one in lags}, sigma=sigma, rounding=0.0, correlation=correlation,
-        rivals={}, normalized_rms=1.0,
+        rivals={}, normalized_rms=1.0, scales=replace(fits.scales, integrating=slowest < RAMP),
     )  # fmt: skip
 
 
