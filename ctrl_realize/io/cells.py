@@ -44,18 +44,20 @@ _NO_VALUES = MISSING.union(BAD_VALUES, _WORDS["cells"]["infinite"])
 STATES = {word: number for number, words in _WORDS["states"].items() for word in words}
 """Positions of a switch, as numbers."""
 
+ENDS = "\0\x1a"
+"""What stands behind the last cell of a file: zeros of an interrupted writer, the mark of DOS."""
+
 FILLED = ("number", "time")
 """Kinds of cells that hold data, see `kind_of`."""
 
 
 def split_line(line: str, delimiter: str) -> list[str]:
     """Cells of a line; a quoted cell may contain the delimiter; runs of blanks are one."""
-    if delimiter == " ":
-        return line.split()
     if '"' not in line:
-        return [cell.strip() for cell in line.split(delimiter)]
+        cells = line.split() if delimiter == " " else line.split(delimiter)
+        return [cell.strip() for cell in cells]
     try:
-        (cells,) = csv.reader([line], delimiter=delimiter, skipinitialspace=True)
+        (cells,) = csv.reader([line.strip()], delimiter=delimiter, skipinitialspace=True)
     except (csv.Error, ValueError):
         # a stray quote or a cell longer than csv's limit: not a line of numbers
         return line.split(delimiter)

@@ -11,7 +11,7 @@ import numpy as np
 
 from ..errors import DataError
 from ..numerics.arrays import BoolArray
-from .cells import BAD_VALUES, MISSING, NUMBER, STATES, complex_of, measured, number_of
+from .cells import BAD_VALUES, ENDS, MISSING, NUMBER, STATES, complex_of, measured, number_of
 
 _NOTHING = np.empty(0)
 _LONGEST_WORD = 60
@@ -143,7 +143,7 @@ class Table:
         import pandas as pd
 
         # cells that are equal are read once
-        texts = [str(cell).strip() for cell in self.columns[index].cells]
+        texts = [str(cell).strip().rstrip(ENDS) for cell in self.columns[index].cells]
         place, kinds = pd.factorize(np.array(texts, dtype=object))
         low = [kind[:_LONGEST_WORD].lower() for kind in kinds]
         missing = MISSING | BAD_VALUES | {word.strip().lower() for word in words}

@@ -1,12 +1,20 @@
 """Files of many kinds with known truth: read right with no argument, or not at all."""
 
 import warnings
+from contextlib import nullcontext
 
 import numpy as np
 import pytest
 
 import ctrl_realize as cr
-from ctrl_realize.errors import CtrlRealizeError, DataError, DataWarning, OptionError, TimeAxisError
+from ctrl_realize.errors import (
+    CtrlRealizeError,
+    DataError,
+    DataWarning,
+    FileFormatError,
+    OptionError,
+    TimeAxisError,
+)
 from tests.io.made_files import MADE
 
 
@@ -75,6 +83,31 @@ def test_a_gap_in_which_the_input_moved_is_refused_and_others_are_kept_and_told(
     with pytest.warns(DataWarning) as told:
         cr.read_record(wrote(np.where(t < 40, 0.0, 1.0)))
     assert "moved" not in str(told[0].message)
+
+
+@pytest.mark.parametrize(
+    ("head", "names"),
+    [
+        ("temps (s) entrée [%] sortie [°C]", ("entrée [%]", "sortie [°C]")),
+        ("temps  (s)  entrée  sortie", ("entrée", "sortie")),
+        ('"time" "u 1" "y"', ("u 1", "y")),
+        ("time u y\n[s] [%] [K]", ("u", "y")),
+    ],
+)
+def test_names_above_columns_between_blanks(tmp_path, head, names):
+    """A unit behind a blank once shifted the names: input and output were exchanged."""
+    path = tmp_path / "a.txt"
+    rows = [f"{0.5 * k} {40 + 20 * (k > 9)} {300.1 + k}" for k in range(40)]
+    # the mark of DOS at the end of a file, or zeros of a writer without power
+    for end in ("\n", "\n\x1a", "\x1a", "\0\0"):
+        path.write_text("\n".join([head, *rows]) + end, encoding="utf-8")
+        with pytest.warns(DataWarning) if end == "\n\x1a" else nullcontext():
+            record = cr.read_record(path)
+        assert (record.input_labels, record.output_labels) == ((names[0],), (names[1],))
+        np.testing.assert_array_equal(record.output, 300.1 + np.arange(40))
+    path.write_text("\n".join(["time valve opening output", *rows]), encoding="utf-8")
+    with pytest.raises(FileFormatError, match=r"line 1 of .* has 4 cells, the lines below have 3"):
+        cr.read_record(path)
 
 
 def test_thousands_separators_are_told_apart_from_decimal_signs(tmp_path):

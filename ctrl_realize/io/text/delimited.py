@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from ...errors import DataWarning, FileFormatError, warn_caller
-from ..cells import NUMBER, number_of, split_line
+from ..cells import ENDS, NUMBER, number_of, split_line
 from ..tables import Column, Table
 from ..text_options import TextOptions
 from .sniff import TextLayout, sniff
@@ -137,7 +137,7 @@ def _cut_last_line(source: TextSource, layout: TextLayout) -> str:
     if layout.comment:
         lines = [line for line in lines if not line.lstrip().startswith(layout.comment)]
     # An interrupted writer may leave zeros: at the end they are an incomplete line.
-    rows = [split_line(line.rstrip("\0"), layout.delimiter) for line in lines]
+    rows = [split_line(line.rstrip(ENDS), layout.delimiter) for line in lines]
     before, last = [row for row in rows[:-1] if any(row)], rows[-1] if rows else []
     if not before:
         return ""

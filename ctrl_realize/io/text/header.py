@@ -124,7 +124,10 @@ def column_names(head: Head, first: int) -> tuple[list[str], list[str]]:
 
 def _header_cells(head: Head, row: int, first: int) -> list[str] | None:
     """Cells of a line above the data, or None if they do not match the columns."""
-    cells = head.cells[row]
+    cells, line = head.cells[row], head.lines[head.rows[row]].strip()
+    blanks = head.delimiter == " "
+    if blanks and len(cells) != head.width:  # a unit in brackets belongs to the name before it
+        cells = re.split(r"\s++(?![(\[])", line)
     if len(cells) == head.width:
         return cells
     if len(cells) == head.width - 1 > 1 and not any(
@@ -132,10 +135,10 @@ def _header_cells(head: Head, row: int, first: int) -> list[str] | None:
     ):
         # the lines of data end with a delimiter, the header does not
         return [*cells, ""]
-    if len(cells) == head.width + 1 and (first == row + 1 or not cells[-1]):
+    if len(cells) == head.width + 1 and not blanks and (first == row + 1 or not cells[-1]):
         return cells[:-1]  # a column of remarks, of which there are none
     # names that contain blanks, above columns that are separated by blanks
-    apart = re.split(r"\t+|\s{2,}", head.lines[head.rows[row]].strip())
+    apart = re.split(r"\t+|\s{2,}", line)
     return apart if len(apart) == head.width else None
 
 
