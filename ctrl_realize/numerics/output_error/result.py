@@ -44,6 +44,9 @@ _TEMPERED = 0.5
 """Power of the evidence with which a structure counts: the criterion says too surely which one of
 two is right (five lags: a further one is seldom seen). Measured: `benchmarks.verdicts`, seeds below
 100."""
+_OVER = 7.0
+"""Lags in a sample from which on less than a thousandth of a mode is left at the next one: to the
+data such a lag is dead time, and the error of the sum of both is rounding."""
 _ON_THE_GRID = 1e-3
 """Steps by which an end may be beyond a rounded value and count as equal to it: ends often lie on
 samples, which are such values."""
@@ -404,6 +407,7 @@ def assembled(
         (fits.static(fits.candidates[s]), weight)
         for s, weight in evidence.items()
         if s != chosen.structure
+        and np.abs(fits.candidates[s].poles.real).max() * fits.scales.dt < _OVER
     ]
     return OutputErrorEstimate(
         dead_time=chosen.dead_time,

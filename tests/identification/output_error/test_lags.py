@@ -83,6 +83,18 @@ def test_a_lag_that_is_not_there_is_not_in_the_formula_and_the_report_says_so():
     assert "not distinguished from 0" in fit.report()
 
 
+@pytest.mark.parametrize("seed", [0, 11])
+def test_a_second_lag_of_nothing_leaves_the_total_delay_known(seed):
+    """Its slope is that of the dead time: the error of their sum was rounding (0 to 202 s)."""
+    t = 0.5 * np.arange(160)
+    y = 2 * (t >= 13) * (1 - np.exp(-(t - 13) / 5))
+    y += 0.01 * np.random.default_rng(seed).standard_normal(t.size)
+    fit = cr.identify(cr.Record(t, (t >= 10).astype(float), y)).fit
+    first, last = fit.total_delay_interval
+    assert first < 8.0 < last < first + 0.1
+    assert fit.structure == (1, 1)
+
+
 @pytest.mark.parametrize("structure", ["P1D", "P2D"])
 @pytest.mark.parametrize("seed", [0, 2])
 def test_a_pure_dead_time_is_told_in_samples(structure, seed):
