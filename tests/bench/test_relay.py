@@ -1,7 +1,9 @@
 """Relay tests against the limit cycles of theory, and what a fit of their records tells."""
 
+import control as ct
 import numpy as np
 import pytest
+from scipy.signal import cont2discrete
 
 import ctrl_realize as cr
 from ctrl_realize import bench, design
@@ -112,3 +114,23 @@ def test_in_a_drift_a_relay_is_fitted_as_a_controller():
     )
     # One lag looks like an integrator here, two do not: models about these once had Ms of 9.
     assert fit.verdicts[-1].number < 2
+
+
+def test_a_drift_that_a_relay_answers_is_no_part_of_the_plant():
+    """Slow states explained it no better than a drift, and gave a period of 2500 s for 28 s."""
+    dt, rng = 0.9, np.random.default_rng(0)
+    lags = [1.46], np.polymul(np.polymul([7.6, 1], [5.1, 1]), [2.9, 1])
+    plant = cr.delayed_ss(ct.tf(*lags), dead_time=3 * dt, dt=dt)
+    num, den, _ = cont2discrete(lags, dt)
+    u, clean, y, level = *np.zeros((3, 400)), 1.0
+    for k in range(400):
+        if k >= 40:
+            clean[k] = num[0, 1:] @ u[k - 6 : k - 3][::-1] - den[1:] @ clean[k - 3 : k][::-1]
+        y[k] = clean[k] + 0.0027 * k + 0.04 * rng.standard_normal()
+        level = -1.0 if y[k] > 0.1 else 1.0 if y[k] < -0.1 else level
+        u[k] = 10 * level if k >= 40 else 0.0
+    found = cr.identify(cr.Record(dt * np.arange(400), u, y))
+    assert found.fit.interval[0] <= 3 * dt <= found.fit.interval[1]
+    told, true = design.ultimate(found), design.ultimate(plant)
+    assert told.gain == pytest.approx(true.gain, rel=0.05)
+    assert told.period == pytest.approx(true.period, rel=0.02)

@@ -33,6 +33,7 @@ over the record they bend by an eighth of that, 0.06 % of the excursion."""
 SIGNIFICANT = Z_95  # standard errors: a gain of less may as well be none, or have the other sign
 
 _STEP = 1e-4  # of logarithms, and part of a numerator: for slopes by differences
+_CLEAR = 0.01  # relative distance of poles, twice that below which they are set apart
 _TOGETHER = 2**16  # samples of responses that are found at a time
 _HALVINGS = 60  # of an interval, until a double has no more digits
 _ROUNDED = 1e-7  # part of a derivative that differences leave of nothing
@@ -102,6 +103,7 @@ def static_gain(
     theta = candidate.theta
     numerator = eliminate(problem, candidate.structure, candidate.parameters[None]).numerator[0]
     point = np.concatenate([theta, numerator])
+    there = np.concatenate([_clear(candidate), numerator])
     moves = parameter_steps(candidate, numerator, length)
 
     # Poles that are nearly equal would jump apart in one difference, and not in the other.
@@ -109,7 +111,7 @@ def static_gain(
         return np.array(_steady_values(at[: theta.size], at[theta.size :], length, apart))
 
     gradient = np.stack(
-        [(steady_values(point + m) - steady_values(point - m)) / (2 * m.sum()) for m in moves],
+        [(steady_values(there + m) - steady_values(there - m)) / (2 * m.sum()) for m in moves],
         axis=1,
     )
     errors = local_errors(problem, candidate, numerator, length)
@@ -184,7 +186,7 @@ def local_errors(
         slopes, tangent = candidate.structure.directions(problem, candidate.parameters)
         along = tangent.any(axis=0)
         return LocalErrors(slopes[:, along], slopes[:, ~along], tangent[:, along])
-    theta = candidate.parameters
+    theta = _clear(candidate)
     moves = parameter_steps(candidate, numerator, length)
     # A dead time is not negative: the derivatives at zero are those slightly later.
     inside = np.concatenate([[max(theta[0], moves[0, 0])], theta[1:], numerator])
@@ -200,6 +202,25 @@ def local_errors(
         columns = problem.local_terms(candidate.poles[None]).without(columns[None])[0]
     count = moves.shape[0]
     return LocalErrors(columns[:, :count], columns[:, count:])
+
+
+def _clear(candidate: Candidate) -> FloatArray:
+    """Dead time and pole parameters, with factors so far apart that no step jumps.
+
+    `poles_from_parameters` sets poles that coincide apart: a difference over its limit is no slope.
+    """
+    theta = np.array(candidate.theta)
+    if isinstance(candidate.structure, Family):
+        return theta
+    order = theta.size - 1
+    for head in range(2 - order % 2, order, 2):
+        while True:
+            poles = poles_from_parameters(theta[None, 1:], apart=False)[0][0]
+            own, others = poles[head : head + 2, None], poles[:head]
+            if not (np.abs(own - others) < _CLEAR * np.abs(own)).any():
+                break
+            theta[1 + head] += _CLEAR
+    return theta
 
 
 def parameter_steps(candidate: Candidate, numerator: FloatArray, length: float) -> FloatArray:
