@@ -36,6 +36,17 @@ def test_continuous_and_back_is_the_identity(valve, dead_time):
     np.testing.assert_allclose(again.step(500), plant.step(500), atol=1e-11)
 
 
+@pytest.mark.parametrize("fraction", [0.0134, 0.0099, 0.5, 0.782])
+@pytest.mark.parametrize("den", [[0.233, 1.052, 1.0], [1.094, 1.0, 0.0], [9.46, 14.96, 8.05, 1, 0]])
+def test_a_fraction_at_which_the_feedthrough_touches_its_value_is_found(fraction, den):
+    """There is no change of sign: the fraction was left in a core whose response jumps."""
+    plant = cr.delayed_ss(ct.tf([2.0], den), dead_time=(11 + fraction) * 0.05, dt=0.05)
+    core, dead_time = cr.design.to_continuous(plant)
+    # an integrator behind three lags leaves (f dt)^4 of a fraction to see
+    assert dead_time == pytest.approx((11 + fraction) * 0.05, abs=1e-4)
+    assert abs(core.D.item()) == 0
+
+
 @pytest.mark.parametrize("order", [1, 2, 3, 5, 10, 15, 20])
 def test_pade_is_the_ratio_of_exact_polynomials(order):
     """Q(-s)/Q(s) with integer coefficients, in 60 digits."""

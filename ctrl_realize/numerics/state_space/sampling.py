@@ -245,16 +245,16 @@ def _roots_in_unit_interval(function: Callable[[float], float], scale: float) ->
     grid = np.linspace(0, 1, 33)
     values = np.array([function(float(x)) for x in grid])
     nodes = list(zip(grid.tolist(), values.tolist(), strict=True))
-    size = np.abs(values)
-    for i in np.flatnonzero((size[1:-1] <= size[:-2]) & (size[1:-1] <= size[2:])) + 1:
+    size = np.pad(np.abs(values), 1, constant_values=np.inf)
+    for i in np.flatnonzero((size[1:-1] <= size[:-2]) & (size[1:-1] <= size[2:])):
         sign = np.sign(values[i])
-        low, high = float(grid[i - 1]), float(grid[i + 1])
+        low, high = float(grid[max(i - 1, 0)]), float(grid[min(i + 1, grid.size - 1)])
         least = float(fminbound(lambda x, s=sign: s * function(float(x)), low, high, xtol=1e-12))
         nodes.append((least, function(least)))
     nodes.sort()
     roots = []
     for (a, at_a), (b, at_b) in pairwise(nodes):
-        if abs(at_a) <= 1e-13 * scale:
+        if abs(at_a) <= _EXPLAINED * scale:
             roots.append(a)
         elif at_a * at_b < 0:
             roots.append(float(brentq(function, a, b, xtol=1e-15)))
