@@ -36,7 +36,6 @@ from .impulse.from_io import impulse_from_io
 from .output_error.fit import fit_output_error, model_alone
 from .output_error.result import OutputErrorFit
 from .output_error.summary import fitted_model
-from .plausible import continuous_core
 from .several_inputs_result import SeveralInputsFit
 
 if TYPE_CHECKING:
@@ -162,7 +161,7 @@ def _sampled(system: DelayedStateSpace, step: float) -> DelayedStateSpace:
     """Model with the sample time of irregular stamps, fitted at the steps of their time axis."""
     fit = fit_of(system, OutputErrorFit)
     fit = replace(fit, records=tuple(one.__replace__(sample_time=step) for one in fit.records))
-    return fitted_model(continuous_core(fit.estimate.numerator, fit.poles), fit)
+    return fitted_model(fit)
 
 
 def _kept(fit: OutputErrorFit, structures: Structures | None) -> Any:

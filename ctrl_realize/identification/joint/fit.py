@@ -37,7 +37,6 @@ from ..output_error.repeat_flags import BY_CHANCE
 from ..output_error.result import OutputErrorFit
 from ..output_error.summary import fitted_model
 from ..output_error.words import order_words
-from ..plausible import continuous_core
 from ..process_structures import Structures, plain_pairs
 from .flags import joint_flags
 from .result import JointFit
@@ -182,7 +181,7 @@ def fit_joint(
     )
     stated = tuple(flag for flag in first.flags if flag.code == "parameter_at_bound")
     result = replace(result, flags=(*joint_flags(result, latest), *stated))
-    return fitted_model(continuous_core(estimate.numerator, result.poles), result)
+    return fitted_model(result)
 
 
 def _records(

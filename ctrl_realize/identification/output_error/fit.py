@@ -25,7 +25,6 @@ from ...numerics.output_error.step_data import StepData
 from ...numerics.output_error.step_fit import fit_step_record
 from ...numerics.validation.own_response import OwnResponse
 from ...results import Flag
-from ..plausible import continuous_core
 from ..process_structures import Structures, requested
 from .actuated.alternatives import ASKED, Asked
 from .actuated.fit import with_actuator
@@ -280,10 +279,7 @@ def fit_output_error(
         result = with_actuator(plain, without_actuator, actuator, tried.structures)
     if stated is not None:
         result = told(result, stated, free)
-    core = continuous_core(result.estimate.numerator, result.poles)
-    if include_known and known is not None:
-        core = ct.ss(known) * core
-    return fitted_model(core, result)
+    return fitted_model(result, known if include_known else None)
 
 
 def model_alone(
@@ -292,7 +288,7 @@ def model_alone(
     """Fit a record without checks, and without structures that were not requested."""
     tried = replace(_requested((record,), structures, max_delay, noise), compared=False)
     result = _linear((record,), tried, own_gains=False, may_clip=True)
-    return fitted_model(continuous_core(result.estimate.numerator, result.poles), result)
+    return fitted_model(result)
 
 
 def _requested(

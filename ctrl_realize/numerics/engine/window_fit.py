@@ -141,6 +141,10 @@ class WindowFit:
         fit = replace(self, candidates=candidates, **changes)
         return replace(fit, criterion=fit.criteria(candidates))
 
+    def residual(self, candidate: Candidate) -> FloatArray:
+        """Output less the response of a candidate, at all samples of the window (N,)."""
+        return self.window.output - self.window.predict(self.problem, candidate)
+
     def misfit(self, candidate: Candidate) -> float:
         """Root mean square of the residual of a candidate, in units of `normalized_rms`."""
         least = self.candidates[choose(self.criterion)].cost

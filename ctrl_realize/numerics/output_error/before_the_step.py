@@ -70,7 +70,7 @@ def _most_evident(ways: list[tuple[StepData, WindowFit]]) -> StepData:
     def criterion(way: tuple[StepData, WindowFit]) -> float:
         data, fits = way
         best = fits.best.structure
-        error = fits.window.output - fits.window.predict(fits.problem, fits.best)
+        error = fits.residual(fits.best)
         squares = float(np.sum(np.clip(error, -worst, worst) ** 2))
         terms = best.order + best.zeros + 2 * len(data.hum)
         terms += best.order if data.relaxing else bool(data.drift)

@@ -63,7 +63,7 @@ def in_coloured_noise(fits: WindowFit, data: StepData) -> WindowFit:
         return fits
     if np.ptp(np.diff(data.rows)) > 0:
         return fits
-    error = fits.window.output - fits.window.predict(fits.problem, fits.best)
+    error = fits.residual(fits.best)
     rest = error[: data.edge]
     samples = correlation_time(rest)
     told = rest.size >= max(_FEWEST, _TIMES * samples)

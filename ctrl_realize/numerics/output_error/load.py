@@ -128,7 +128,7 @@ def load_of(
     if since < _SOONEST * rise or load.lag > _MOST_LAG * (data.clock[-1] - load.time):
         return None
     also = refit(loaded, data.output.size, tuple(fits.candidates))
-    error = also.window.output - also.window.predict(also.problem, also.best)
+    error = also.residual(also.best)
     white = also.correlation == 1.0
     least = VERY_STRONG if white and not early else _IN_SLOW_NOISE
     left = (also.normalized_rms / fits.normalized_rms) ** 2
@@ -162,11 +162,8 @@ def _ends(data: StepData, fits: WindowFit) -> tuple[float, float]:
 
 def _evidence(fits: WindowFit, error: FloatArray, structure: Structure) -> float:
     """Decrease of the criterion for a model with a load of a given structure and residual (N,)."""
-    plain, own = (
-        fits.window.output - fits.window.predict(fits.problem, fits.best),
-        fits.best.structure,
-    )
-    before, after = _innovations(plain), _innovations(error)
+    own = fits.best.structure
+    before, after = _innovations(fits.residual(fits.best)), _innovations(error)
     # Not of the residuals, of which the larger one would become constant.
     limit = OUTLIER * max(mad_sigma(before), mad_sigma(after), SMALLEST)
     before, after = (np.clip(new, -limit, limit) for new in (before, after))

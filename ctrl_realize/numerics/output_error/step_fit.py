@@ -258,7 +258,7 @@ def _is_noise(data: StepData, fits: WindowFit, candidate: Candidate) -> bool:
         return False
     if fits.correlation == 1.0 and candidate is fits.best:
         return True
-    error = fits.window.output - fits.window.predict(fits.problem, candidate)
+    error = fits.residual(candidate)
     if continues(error[: data.edge], error[data.edge :], ADEQUATE):
         return True
     state = evaluate(fits.problem, candidate.structure, candidate.parameters[None])
@@ -307,10 +307,9 @@ def _unseen(fits: WindowFit, model: Candidate) -> float:
     171 to 178 samples, where the dead time is 166. Ablation: time to move by the misfit.
     """
     window = fits.window
-    missed = window.output - window.predict(fits.problem, model)
     state = evaluate(fits.problem, model.structure, model.parameters[None])
     forced = respond(window.drive, fits.problem.known, state.numerator[0], model.parameters)
-    moved = np.abs(forced[window.start :]) > np.std(missed[window.start :])
+    moved = np.abs(forced[window.start :]) > np.std(fits.residual(model)[window.start :])
     since = float(np.argmax(moved)) * window.spacing * fits.scales.dt
     return max(since - model.dead_time, 0.0) if moved.any() else fits.scales.latest
 

@@ -62,7 +62,8 @@ def response_bins(stop: int, edges: list[int], crossing: int, *, relaxing: bool 
     if relaxing:
         bounds, k, onsets = [0], 0, np.append(onsets, 0)
     else:
-        bounds, k = _at_rest(edges[0]), edges[0]
+        k = edges[0]
+        bounds = sorted({*np.linspace(0, k, min(BINS_AT_REST, k) + 1).astype(int)})
     while k < stop:
         distance = float(np.abs(onsets - k).min())
         width = int(_WIDTHS[np.searchsorted(_WIDTHS, max(_GROWTH * distance, 1.0), "right") - 1])
@@ -71,8 +72,3 @@ def response_bins(stop: int, edges: list[int], crossing: int, *, relaxing: bool 
         bounds.append(k)
     limits = np.array(bounds)
     return Bins(limits[:-1], np.diff(limits))
-
-
-def _at_rest(edge: int) -> list[int]:
-    """Bounds of equal bins before the first edge."""
-    return sorted({*np.linspace(0, edge, min(BINS_AT_REST, edge) + 1).astype(int)})

@@ -68,7 +68,9 @@ def parameter_change(
     ParameterChange
         None if fewer than two groups move enough, or there are too few samples.
     """
-    slope, size = _derivatives(fitted, rows)
+    # derivatives with respect to the delay in samples and the relative gain
+    slope = -(np.gradient(fitted) if rows is None else np.gradient(fitted, rows))
+    size = fitted - np.mean(fitted)
     energy = np.bincount(groups, slope**2)
     used = np.flatnonzero(energy > _LEAST_SHARE * energy.sum())
     if used.size < 2 or not np.any(residual):
@@ -100,12 +102,6 @@ def parameter_change(
     found = np.linalg.lstsq(plain / scale, residual, rcond=1e-9)[0] / scale
     chance = float(fdtrc(3 * (used.size - 1), freedom, max(ratio, 0.0)))
     return ParameterChange(found[1::3], errors[1::3], found[2::3], errors[2::3], chance)
-
-
-def _derivatives(fitted: FloatArray, rows: IntArray | None) -> tuple[FloatArray, FloatArray]:
-    """Derivatives of a response w.r.t. its delay in samples and its relative gain."""
-    slope = np.gradient(fitted) if rows is None else np.gradient(fitted, rows)
-    return -slope, fitted - np.mean(fitted)
 
 
 def whitened(columns: FloatArray, residual: FloatArray) -> tuple[FloatArray, FloatArray, int]:

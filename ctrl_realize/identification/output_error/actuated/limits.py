@@ -18,7 +18,6 @@ from ....errors import DataError, UnsuitableSystemError
 from ....numerics.arrays import BoolArray, FloatArray
 from ....numerics.constants import STRONG
 from ....numerics.validation.limits import at_limit, clips, ends, passed, plateaus
-from ...plausible import continuous_core
 from ..arguments import FEWEST_SAMPLES, step_data_of
 from ..loop_flags import feedback_flags
 from ..result import OutputErrorFit
@@ -119,10 +118,9 @@ def _without_plateaus(record: Record, linear: OutputErrorFit, fit: Fit) -> Outpu
 
 def _simulated(found: OutputErrorFit) -> FloatArray:
     """Response of a model to its record (N,), also where samples are missing."""
-    system = fitted_model(continuous_core(found.estimate.numerator, found.poles), found)
     rest = np.isfinite(found.onset) and not found.data.relaxing
     start = "rest" if rest else "estimate"
-    return np.ravel(simulate_record(system, found.records[0], start, gaps=True))
+    return np.ravel(simulate_record(fitted_model(found), found.records[0], start, gaps=True))
 
 
 def _levels(output: FloatArray, held: BoolArray) -> str:

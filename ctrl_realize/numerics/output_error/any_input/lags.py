@@ -175,7 +175,7 @@ def _robust(
 ) -> tuple[WindowFit, list[Candidate]]:
     """Repeat the fit with Huber's loss if there are outliers, as `fit_window` does."""
     window, best = fits.window, _plain(min(fitted, key=partial(_value, fits)))
-    error = window.output - window.predict(fits.problem, best)
+    error = fits.residual(best)
     if not has_outliers(error):
         return fits, fitted
     pulled = window.output - error + clipped(error, 0.0)

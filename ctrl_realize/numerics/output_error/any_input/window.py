@@ -202,7 +202,7 @@ def modelled(data: SampledData, parameters: FloatArray, numerator: FloatArray) -
 
 def _noise_levels(data: SampledData, fits: WindowFit) -> FloatArray:
     """Residual of the best model in every record, in its unit."""
-    error = fits.window.output - fits.window.predict(fits.problem, fits.best)
+    error = fits.residual(fits.best)
     floor = _SMALLEST * float(np.ptp(fits.window.output))
     return np.array(
         [max(winsorised_sigma(part, 0.0), floor) for part in np.split(error, data.edges[1:-1])]
