@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from typing import Any
 
 import numpy as np
@@ -33,22 +33,53 @@ def as_record(given: Any) -> Record:
 
 
 def as_records(given: Any) -> tuple[Record, ...]:
-    """Return one record or several as a tuple.
+    """Return one record or several as a tuple; see `each_record`."""
+    return tuple(each_record(given))
+
+
+def each_record(given: Any) -> Iterator[Record]:
+    """Yield one record or several: what a generator makes need not fit into memory together.
 
     Raises
     ------
     DataError
         There is none, or something else is among them.
     """
-    if isinstance(given, Record):
-        return (given,)
-    several = tuple(given) if isinstance(given, Iterable) else (given,)
-    if not several:
+    if isinstance(given, Record) or not isinstance(given, Iterable):
+        yield as_record(given)
+        return
+    one = None
+    for one in given:
+        if not isinstance(given, list | tuple) and not isinstance(one, Record):
+            # Text, an array or a table is reported as such, not by its letters, rows or columns.
+            as_record(given)
+        yield as_record(one)
+    if one is None:
         raise DataError("no records; expected at least one Record")
-    if not isinstance(given, list | tuple) and not isinstance(several[0], Record):
-        # Text, an array or a table is reported as such, not by its letters, rows or columns.
-        return (as_record(given),)
-    return tuple(map(as_record, several))
+
+
+def records_alike(given: Any) -> Iterator[Record]:
+    """Yield records as `each_record` does, if sample time and channels are those of the first.
+
+    Raises
+    ------
+    DataError
+        Others, or as `each_record`.
+    """
+    first: Record | None = None
+    for i, record in enumerate(each_record(given)):
+        first = record if first is None else first
+        if not np.isclose(record.dt, first.dt, rtol=1e-3, atol=0):
+            raise DataError(
+                f"record {i} has the sample time {record.dt:g} s, the first one {first.dt:g} s; "
+                "resample one of them"
+            )
+        if (record.ninputs, record.noutputs) != (first.ninputs, first.noutputs):
+            raise DataError(
+                f"record {i} has {record.ninputs} inputs and {record.noutputs} outputs, the "
+                f"first one {first.ninputs} and {first.noutputs}"
+            )
+        yield record
 
 
 def check_input(record: Record, task: str) -> None:

@@ -9,8 +9,8 @@ import numpy as np
 
 from .._checks import integer, one_of, within
 from ..data import MeasuredFRF, Record
-from ..data.given import as_records, check_complete
-from ..errors import DataError, OptionError, TimeAxisError
+from ..data.given import check_complete, records_alike
+from ..errors import DataError, OptionError
 from .periods import from_periods
 from .welch import Stream, from_segments
 
@@ -150,26 +150,9 @@ def spectral_frf(
 
 def _aligned(records: Record | Iterable[Record], delay: int) -> Stream:
     """Yield input, output (advanced by `delay`) and sample time of each record."""
-    first_dt, channels = None, None
-    for record in as_records(records):
+    for record in records_alike(records):
         check_complete(record, "spectral_frf")
-        if first_dt is None:
-            first_dt = record.dt
-        elif abs(record.dt - first_dt) > 1e-6 * first_dt:
-            raise TimeAxisError(
-                f"the records have sample times of {first_dt:g} s and {record.dt:g} s; "
-                "expected the same for all"
-            )
         u, y = np.atleast_2d(record.input), np.atleast_2d(record.output)
-        if channels is None:
-            channels = len(u), len(y)
-        elif channels != (len(u), len(y)):
-            raise DataError(
-                f"{record!r} has {len(u)} inputs and {len(y)} outputs, the first record "
-                f"{channels[0]} and {channels[1]}"
-            )
         if delay >= u.shape[1]:
             raise DataError(f"delay={delay} leaves no samples of {record!r}")
         yield u[:, : u.shape[1] - delay], y[:, delay:], record.dt
-    if first_dt is None:
-        raise DataError("no records; expected at least one")

@@ -1,6 +1,7 @@
 """Frequency responses from noise and periodic records."""
 
 import pickle
+import weakref
 
 import control as ct
 import numpy as np
@@ -82,6 +83,24 @@ def test_h1_is_unmoved_by_output_noise_and_h2_by_input_noise():
     assert band["in", "H1"] == pytest.approx(1 / 1.49, rel=0.02)
     assert band["out", "H2"] > 1.3
     assert band["out", "Hv"] ** 2 == pytest.approx(band["out", "H1"] * band["out", "H2"], rel=0.02)
+
+
+def test_pieces_of_a_long_record_are_not_kept():
+    made, most = [], 0
+
+    def pieces():
+        nonlocal most
+        for seed in range(8):
+            piece = noise_record(4000, seed=seed)
+            made.append(weakref.ref(piece.output))
+            yield piece
+            del piece
+            most = max(most, sum(one() is not None for one in made))
+
+    frf = cr.spectral_frf(pieces(), segment=500)
+    whole = cr.spectral_frf([noise_record(4000, seed=seed) for seed in range(8)], segment=500)
+    assert_allclose(frf.complex, whole.complex)
+    assert most <= 2  # the first, with which the others are compared, and the present one
 
 
 def test_known_delay_taken_out_removes_its_bias():

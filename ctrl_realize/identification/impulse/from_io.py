@@ -11,9 +11,9 @@ import numpy as np
 from ..._checks import integer, one_of
 from ..._flags import Flag, flagged
 from ...data import Record
-from ...data.given import as_records
+from ...data.given import records_alike
 from ...data.impulse_estimate import ImpulseEstimate
-from ...errors import DataError, DataWarning
+from ...errors import DataWarning
 from ...numerics.blas_threads import single_threaded
 from ...numerics.signals.onset import correlation_onset
 from .estimator import Choice, choose_estimate
@@ -129,7 +129,7 @@ def impulse_from_io(
     method = one_of(method, "method", ("auto", "regularized", "least_squares", "okid"))
     kernel = one_of(kernel, "kernel", ("auto", "TC", "SS"))
     start = one_of(start, "start", ("unknown", "rest"))
-    group = as_group(records)
+    group = tuple(records_alike(records))
     longest = max(record.n_samples for record in group)
     most = max(min(int(LONGEST * longest), MOST_UNKNOWNS // group[0].ninputs), 2)
     if length is None:
@@ -211,21 +211,3 @@ def _tail_flags(found: PulseRegression) -> tuple[Flag, ...]:
         return ()
     share = 100 * share[alive].max()
     return (flagged("not_died_away.impulse", samples=count, share=share),)
-
-
-def as_group(records: Record | Sequence[Record]) -> tuple[Record, ...]:
-    """Check that all records have the same sample time and signals."""
-    group = as_records(records)
-    first = group[0]
-    for i, other in enumerate(group[1:], start=1):
-        if not np.isclose(other.dt, first.dt, rtol=1e-3, atol=0):
-            raise DataError(
-                f"record {i} has the sample time {other.dt:g} s, the first one {first.dt:g} s; "
-                "resample one of them"
-            )
-        if (other.ninputs, other.noutputs) != (first.ninputs, first.noutputs):
-            raise DataError(
-                f"record {i} has {other.ninputs} inputs and {other.noutputs} outputs, the "
-                f"first one {first.ninputs} and {first.noutputs}"
-            )
-    return group

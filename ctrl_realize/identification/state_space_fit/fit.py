@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from ..._checks import integers
 from ..._wording import chosen, in_time
 from ...data import Record
-from ...data.given import as_records
+from ...data.given import as_records, records_alike
 from ...data.shown_units import in_shown_units
 from ...delayed import DelayedStateSpace, fit_of
 from ...delayed.simulation import as_delayed
@@ -21,7 +21,6 @@ from ...numerics.blas_threads import single_threaded
 from ...numerics.constants import SMALLEST
 from ...numerics.state_space.section_fit import fit_sections
 from ...numerics.state_space.sections import in_sections
-from ..impulse.from_io import as_group
 from ..long_records import lively_parts
 from .result import StateSpaceFit, fitted_system
 from .search import Candidate, experiments
@@ -106,7 +105,7 @@ def fit_state_space(
     (2, (2, 5), (0, 0))
     """
     given = as_records(records)
-    group = as_group([one.at_equal_distances() for one in given])
+    group = tuple(records_alike([one.at_equal_distances() for one in given]))
     asked = None if order is None else integers(order, "order", 1)
     _check_signals(group, feedthrough)
     parts, cut = lively_parts(group)
@@ -163,7 +162,7 @@ def refine_state_space(
     >>> print(refined.poles().real.max().round(6))
     0.8
     """
-    everything = as_group([one.at_equal_distances() for one in as_records(records)])
+    everything = tuple(records_alike([one.at_equal_distances() for one in as_records(records)]))
     _check_signals(everything, feedthrough)
     group, cut = lively_parts(everything)
     model = as_delayed(system, group[0], stable=False)

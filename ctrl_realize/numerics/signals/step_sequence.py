@@ -64,7 +64,9 @@ def input_moves(
 
 def _steady(values: FloatArray, noise: float, grow: bool) -> FloatArray:
     """Piecewise means; a single mean if they do not differ significantly."""
-    values = _without_spikes(values, noise)
+    # Spikes: outliers from a running median of seven samples, at most three in a row.
+    middle = median_filter(values, size=7, mode="nearest")
+    values = np.where(np.abs(values - middle) > 6 * noise, middle, values)
     n = values.size
     mean = np.full(n, float(np.median(values)))
     if not grow or n < 16:
@@ -78,9 +80,3 @@ def _steady(values: FloatArray, noise: float, grow: bool) -> FloatArray:
     if np.all(off <= 6 * noise / np.sqrt(widths)):
         return mean
     return np.repeat(means, widths)
-
-
-def _without_spikes(values: FloatArray, noise: float) -> FloatArray:
-    """Replace outliers from a running median of seven samples, at most three in a row."""
-    middle = median_filter(values, size=7, mode="nearest")
-    return np.where(np.abs(values - middle) > 6 * noise, middle, values)
