@@ -80,6 +80,7 @@ def test_a_column_with_the_unit_of_another_quantity_is_no_time(tmp_path, name):
     assert cr.read_record(columns(tmp_path / "b.csv", above)).output_labels == ("T",)
 
 
+@pytest.mark.usefixtures("without_figures")
 def test_seconds_that_were_assumed_are_said(tmp_path):
     path = columns(tmp_path / "a.csv", "t_stamp,u,y")
     record = cr.read_record(path)
