@@ -115,7 +115,9 @@ def test_the_fit_finds_the_stiction_of_a_simulated_loop_and_none_in_a_linear_one
     linear = cr.bench.valve_loop(process=process, oscillation=(2.0, period), noise=0.05)
     for loop, truth in ((sticking, 5.0), (linear, 0.0)):
         record = loop.simulate(15 * period, rng=1).record
-        fit = cr.valves.diagnose_loop(record, process=process).stiction_fit
+        found = cr.valves.diagnose_loop(record, process=process)
+        assert found.verdict == (STICKS if truth else NOT_SO)
+        fit = found.stiction_fit
         # of the swing: a linear loop has a stem that could stick by as much unseen
         assert abs(fit.S - truth) < 0.1 * truth + 0.25 * (truth == 0) * fit.swing
         assert fit.S_range[0] <= fit.S <= fit.S_range[1]
@@ -130,22 +132,20 @@ def test_the_fit_finds_the_stiction_of_a_simulated_loop_and_none_in_a_linear_one
         assert diagnosed(-record.input, record.output).stiction_fit.gain < 0
 
 
-def worlds():
-    sticky = cr.actuators.KanoStiction
-    kinds = {"flow": (900.0, 15.0), "first-order": (1500.0, 60.0), "integrating": (2500.0, 100.0)}
-    for process, (duration, period) in kinds.items():
-        stem = sticky(8, 4) if process == "first-order" else sticky(5, 2)
-        yield STICKS, process, duration, {"actuator": stem, "noise": 0.1}
-        yield NOT_SO, process, duration, {"oscillation": (2.0, period), "noise": 0.1}
-        # of a level at the limit of stability only the fit says that it does not stick; a flow has
-        # six samples in a cycle
-        told = "cannot tell" if process == "integrating" else NOT_SO
-        if process != "flow":
-            yield told, process, duration, {"tightness": 0.97, "noise": 0.3}
-        yield "no oscillation", process, duration, {"noise": 0.3}
+WORLDS = [  # beside those above
+    (STICKS, "first-order", 1500.0, {"actuator": cr.actuators.KanoStiction(8, 4), "noise": 0.1}),
+    (NOT_SO, "first-order", 1500.0, {"oscillation": (2.0, 60.0), "noise": 0.1}),
+    # of a level at the limit of stability only the fit says that it does not stick; a flow has six
+    # samples in a cycle
+    (NOT_SO, "first-order", 1500.0, {"tightness": 0.97, "noise": 0.3}),
+    ("cannot tell", "integrating", 2500.0, {"tightness": 0.97, "noise": 0.3}),
+    ("no oscillation", "flow", 900.0, {"noise": 0.3}),
+    ("no oscillation", "first-order", 1500.0, {"noise": 0.3}),
+    ("no oscillation", "integrating", 2500.0, {"noise": 0.3}),
+]
 
 
-@pytest.mark.parametrize(("truth", "process", "duration", "options"), list(worlds()))
+@pytest.mark.parametrize(("truth", "process", "duration", "options"), WORLDS)
 def test_the_cause_of_a_simulated_oscillation_is_told(truth, process, duration, options):
     kind = "self-regulating" if process == "first-order" else process
     if "tightness" in options:  # of the limit of stability
