@@ -51,6 +51,8 @@ IMPULSE = cr.ImpulseResponse(PLANT.markov(300), PLANT.dt)
 STEP = step_record(R1, noise=1e-3, before=150, after=400)
 OMEGA = np.geomspace(0.5, 60, 30)
 FRF = cr.MeasuredFRF(PLANT(np.exp(1j * OMEGA * PLANT.dt)), OMEGA / 2 / np.pi)
+NOISE = np.random.default_rng(0).standard_normal((30, 2)) @ [0.01, 0.01j]
+NOISY = cr.MeasuredFRF(FRF.complex + NOISE, FRF.frequency_hz, std=np.full(30, 0.014))
 
 
 def driven():
@@ -71,7 +73,7 @@ RESULTS = {
     "a comparison": lambda: cr.compare_frf(PLANT, FRF),
     "margins": lambda: cr.design.margins(PLANT, cr.design.pid(PLANT)),
     "a check of residuals": lambda: cr.validation.analyse_residuals(PLANT, driven()),
-    "a check of the delay": lambda: cr.validation.compare_delay_estimates(frf=FRF, order=1),
+    "a check of the delay": lambda: cr.validation.compare_delay_estimates(frf=NOISY),
     "a record": lambda: STEP,
     "a step response": lambda: cr.unit_step(STEP),
     "a system": lambda: PLANT,
