@@ -31,6 +31,7 @@ from ..engine.poles import lag_sum
 from ..engine.problem import Bounds, Mapped, Problem, Structure
 from ..engine.profile import dead_time_error
 from ..engine.structures import Candidate, Scales
+from ..engine.window_fit import WindowFit
 from .shaped import LagFamily, lowest, paired
 
 SHORTEST, LONGEST = 4, 8
@@ -107,36 +108,27 @@ class _Chain(LagFamily):
         )  # fmt: skip
 
 
-def fit_chains(
-    problem: Problem, like: Candidate, scales: Scales, variance: float, penalty: float
-) -> list[LagChain]:
+def fit_chains(fits: WindowFit) -> list[LagChain]:
     """Fit chains of four to eight lags, as long as the fit improves.
 
     Parameters
     ----------
-    problem : Problem
-    like : Candidate
-        A model whose dead time and spread in time (mean and variance of the impulse response) are
-        the initial values.
-    scales : Scales
-        Bounds of the dead time.
-    variance : float
-        Variance of the noise.
-    penalty : float
-        Penalty on a parameter in the criterion.
+    fits : WindowFit
+        The best of them has the dead time and the spread in time (mean and variance of the impulse
+        response) of the initial values.
 
     Returns
     -------
     list of LagChain
-        Empty if `like` has no positive spread, as with an inverse response.
+        Empty if the best fit has no positive spread, as with an inverse response.
     """
     chains: list[LagChain] = []
-    moments = time_moments(problem, like)
+    moments = time_moments(fits.problem, fits.best)
     if not moments[1] > 0:
         return chains
     for order in range(SHORTEST, LONGEST + 1):
-        chain = _chain(problem, order, TANKS, moments, scales, variance, penalty)
-        if _over_within_a_sample(chain, scales):
+        chain = _chain(fits, order, TANKS, moments)
+        if _over_within_a_sample(chain, fits.scales):
             break
         if chains and chain.criterion > chains[-1].criterion + _WORSE:
             break
@@ -144,15 +136,13 @@ def fit_chains(
     return chains
 
 
-def fit_diffusion(
-    problem: Problem, like: Candidate, scales: Scales, variance: float, penalty: float
-) -> list[LagChain]:
+def fit_diffusion(fits: WindowFit) -> list[LagChain]:
     """Fit the first eight modes of diffusion; see `fit_chains`. One chain, or none."""
-    moments = time_moments(problem, like)
+    moments = time_moments(fits.problem, fits.best)
     if not moments[1] > 0:
         return []
-    chain = _chain(problem, LONGEST, _DIFFUSION, moments, scales, variance, penalty)
-    if _over_within_a_sample(chain, scales):
+    chain = _chain(fits, LONGEST, _DIFFUSION, moments)
+    if _over_within_a_sample(chain, fits.scales):
         return []
     # The sum of 1 / (k - c)^2 beyond n is approximated by the integral from n + 1/2 - c on.
     slowest, second = np.sort(np.abs(chain.candidate.poles))[:2]
@@ -206,15 +196,8 @@ def time_moments(problem: Problem, like: Candidate) -> tuple[float, float]:
     return mean, float(np.sum(like.poles**-2.0).real - np.sum(zeros**-2.0).real)
 
 
-def _chain(
-    problem: Problem,
-    order: int,
-    law: _Law,
-    moments: tuple[float, float],
-    scales: Scales,
-    variance: float,
-    penalty: float,
-) -> LagChain:
+def _chain(fits: WindowFit, order: int, law: _Law, moments: tuple[float, float]) -> LagChain:
+    problem, scales = fits.problem, fits.scales
     mean, spread = moments
     lags = np.exp(-law.rates(order, law.first)[0])
     lag = float(np.sqrt(spread / (lags @ lags)))
@@ -226,7 +209,7 @@ def _chain(
         smooth=True,
     )
     fit = lowest(problem, _Chain(order, order, bounds, (-np.inf, np.inf), law), start, scales.dt)
-    value = fit.cost / variance + (FREE_IN_A_CHAIN + 2) * penalty
+    value = fit.cost / fits.variance + (FREE_IN_A_CHAIN + 2) * fits.penalty
     value += problem.local_count(order)
-    error = dead_time_error(problem, fit, variance)
+    error = dead_time_error(problem, fit, fits.variance)
     return LagChain(Candidate(Structure(order, order), fit.theta, fit.cost), value, error)

@@ -25,7 +25,8 @@ from ..engine.eliminate import eliminate
 from ..engine.modal import moved_amplitudes, partial_fractions
 from ..engine.problem import Bounds, KnownFactor, Problem
 from ..engine.responses import StepSequence
-from ..engine.structures import Candidate, Scales
+from ..engine.structures import Candidate
+from ..engine.window_fit import WindowFit
 from .equal_lags import time_moments
 from .residence import flow_modes
 from .shaped import ShapedFamily, UnitResponse, lowest
@@ -172,26 +173,14 @@ class DispersedFlow:
         return 2 / self.spread**2
 
 
-def fit_flows(
-    problem: Problem,
-    like: Candidate,
-    scales: Scales,
-    variance: float,
-    penalty: float,
-    level: float,
-) -> list[DispersedFlow]:
+def fit_flows(fits: WindowFit, level: float) -> list[DispersedFlow]:
     """Fit dispersion with a dead time, with and without a lag in series.
 
     Parameters
     ----------
-    problem : Problem
-        Of a step record.
-    like : Candidate
-        A model with the dead time and the spread in time for the initial values.
-    scales : Scales
-        Bounds of the dead time.
-    variance, penalty : float
-        Variance of the noise, and the penalty on a parameter.
+    fits : WindowFit
+        Of a step record; the best of them has the dead time and the spread in time of the initial
+        values.
     level : float
         Criterion of the best lags: fits far above it are abandoned.
 
@@ -200,12 +189,13 @@ def fit_flows(
     list of DispersedFlow
         Only fits whose spread is at least half of the lag in series; otherwise a second lag would
         be equivalent. A short flow with a long lag and a long flow alone are often equally good:
-        both are returned. Empty if the spread in time of `like` is less than a sample, or if the
-        record has a free response, for which dispersion has no poles.
+        both are returned. Empty if the spread in time of the best fit is less than a sample, or if
+        the record has a free response, for which dispersion has no poles.
     """
+    problem, scales, penalty = fits.problem, fits.scales, fits.penalty
     if problem.segments is not None or not isinstance(problem.drive, StepSequence):
         return []
-    mean, square = time_moments(problem, like)
+    mean, square = time_moments(problem, fits.best)
     if not square > scales.dt**2:
         return []
     flows: list[DispersedFlow] = []
@@ -220,13 +210,14 @@ def fit_flows(
         )
         bounds = Bounds(low, high, smooth=True)
         family = FlowFamily(int(lagging), int(lagging), bounds, (-np.inf, np.inf))
-        starts = np.array(list(_starts(family, like.dead_time, mean, float(np.sqrt(square)))))
+        starts = np.array(list(_starts(family, fits.best.dead_time, mean, float(np.sqrt(square)))))
         if not starts.size:  # responses that begin the other way have a short mean, or none
             break
         promising = starts[np.argsort(eliminate(problem, family, starts).cost)[:_FOLLOWED]]
         charge = (family.bounds.low.size + 1) * penalty + _CHARGE
-        fit = lowest(problem, family, promising, scales.dt, (level + REACH - charge) * variance)
-        criterion = fit.cost / variance + charge
+        most = (level + REACH - charge) * fits.variance
+        fit = lowest(problem, family, promising, scales.dt, most)
+        criterion = fit.cost / fits.variance + charge
         flows.append(
             DispersedFlow(fit, *family.times(fit.parameters), criterion, criterion - level)
         )

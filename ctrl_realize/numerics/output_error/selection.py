@@ -60,20 +60,17 @@ class Choice:
 
 def chains_of(fits: WindowFit) -> list[LagChain]:
     """Fit chains of lags if the best order suggests more lags than were tried."""
-    best = fits.best
-    setting = fits.problem, best, fits.scales, fits.variance, fits.penalty
-    equal_lags = fit_chains(*setting) if best.structure.order >= _LAGS_OF_TANKS else []
-    diffusion = fit_diffusion(*setting) if best.structure.order >= _LAGS_OF_DIFFUSION else []
-    return equal_lags + diffusion
+    order = fits.best.structure.order
+    equal_lags = fit_chains(fits) if order >= _LAGS_OF_TANKS else []
+    return equal_lags + (fit_diffusion(fits) if order >= _LAGS_OF_DIFFUSION else [])
 
 
 def flows_of(fits: WindowFit, chains: Sequence[LagChain]) -> list[DispersedFlow]:
     """Fit dispersion if there is more than one lag."""
-    best = fits.best
-    if best.structure.order < _LAGS_OF_DIFFUSION:
+    if fits.best.structure.order < _LAGS_OF_DIFFUSION:
         return []
     level = min([*fits.criterion.values(), *(chain.criterion for chain in chains)])
-    return fit_flows(fits.problem, best, fits.scales, fits.variance, fits.penalty, level)
+    return fit_flows(fits, level)
 
 
 def choose_model(

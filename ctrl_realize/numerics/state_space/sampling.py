@@ -246,7 +246,7 @@ def _roots_in_unit_interval(function: Callable[[float], float], scale: float) ->
     values = np.array([function(float(x)) for x in grid])
     nodes = list(zip(grid.tolist(), values.tolist(), strict=True))
     size = np.pad(np.abs(values), 1, constant_values=np.inf)
-    for i in np.flatnonzero((size[1:-1] <= size[:-2]) & (size[1:-1] <= size[2:])):
+    for i in np.flatnonzero((size[1:-1] <= size[:-2]) & (size[1:-1] <= size[2:])).tolist():
         sign = np.sign(values[i])
         low, high = float(grid[max(i - 1, 0)]), float(grid[min(i + 1, grid.size - 1)])
         least = float(fminbound(lambda x, s=sign: s * function(float(x)), low, high, xtol=1e-12))

@@ -11,6 +11,8 @@ from ctrl_realize.numerics.engine.batch_search import fit_batch
 from ctrl_realize.numerics.engine.poles import parameters_from_poles
 from ctrl_realize.numerics.engine.problem import KnownFactor, Structure
 from ctrl_realize.numerics.engine.structures import Candidate, parameter_bounds
+from ctrl_realize.numerics.engine.window import window_of_rows
+from ctrl_realize.numerics.engine.window_fit import with_known_noise
 from ctrl_realize.numerics.families.equal_lags import fit_diffusion
 from ctrl_realize.numerics.families.residence import flow_modes
 from ctrl_realize.numerics.output_error.step_data import step_data, step_scales, window
@@ -52,7 +54,8 @@ def test_the_modes_of_diffusion_are_found_and_the_hidden_ones_counted(shift):
     bounds = parameter_bounds(Structure(2, 2), scales)
     parameters, cost = fit_batch(problem, Structure(2, 2), start[None], bounds)
     like = Candidate(Structure(2, 2), parameters[0], float(cost[0]))
-    (chain,) = fit_diffusion(problem, like, scales, 1e-8, 7.0)
+    fits = with_known_noise(window_of_rows(problem), {like.structure: like}, scales, 1e-4)
+    (chain,) = fit_diffusion(fits)
     beyond = float(np.sum(1 / rates[8:]))
     # Modes beyond the eighth are a dead time but for their spread; 0.05 samples are seen.
     assert abs(chain.candidate.dead_time - beyond - 20) < 0.2

@@ -11,6 +11,8 @@ from ctrl_realize.numerics.engine.eliminate import eliminate
 from ctrl_realize.numerics.engine.problem import Bounds, KnownFactor, Structure
 from ctrl_realize.numerics.engine.static_gain import static_gain
 from ctrl_realize.numerics.engine.structures import Candidate
+from ctrl_realize.numerics.engine.window import window_of_rows
+from ctrl_realize.numerics.engine.window_fit import with_known_noise
 from ctrl_realize.numerics.families.equal_lags import fit_chains
 from ctrl_realize.numerics.families.flow import fit_flows
 from ctrl_realize.numerics.families.form_fit import fit_form, form_family
@@ -70,11 +72,12 @@ def test_derivatives_of_chains_and_flows_are_limits_of_differences(case):
     problem, scales = case
     theta = np.array([25.0, np.log(0.05), np.log(0.04), np.log(1.1)])
     like = Candidate(Structure(3, 3), theta, 1.0)
-    flows = fit_flows(problem, like, scales, SIGMA**2, 7.0, 0.0)
+    fits = with_known_noise(window_of_rows(problem), {like.structure: like}, scales, SIGMA)
+    flows = fit_flows(fits, 0.0)
     assert flows
     for flow in flows:
         assert_exact(problem, flow.fit.structure, flow.fit.parameters + 0.1)
-    chain = fit_chains(problem, like, scales, SIGMA**2, 7.0)[0]
+    chain = fit_chains(fits)[0]
     assert abs(chain.candidate.dead_time - DELAY) < 4 * chain.error
 
 
