@@ -248,7 +248,7 @@ def test_an_input_that_does_not_hold_its_level_is_any_input():
 
 def test_wild_samples_move_least_squares_more_than_the_usual_loss():
     errors = {"huber": [], "least_squares": []}
-    for seed in range(3):
+    for seed in range(2):
         rng = np.random.default_rng(seed)
         record = lag_record(seed)
         wild = np.where(rng.random(120) < 0.05, 1.5 * rng.standard_normal(120), 0.0)
