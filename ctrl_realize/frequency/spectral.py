@@ -10,7 +10,7 @@ import numpy as np
 from .._checks import integer, one_of, within
 from ..data import MeasuredFRF, Record
 from ..data.given import check_complete, records_alike
-from ..errors import DataError, OptionError
+from ..errors import DataError, DataWarning, OptionError, warn_caller
 from .periods import from_periods
 from .welch import Stream, from_segments
 
@@ -75,6 +75,12 @@ def spectral_frf(
         inputs that do not excite the plant or are not independent.
     OptionError
         Invalid options.
+
+    Warns
+    -----
+    DataWarning
+        A record has a set point: the controller answers the noise, which makes a ratio of spectra
+        that of plant and controller together [1]_.
 
     Notes
     -----
@@ -150,7 +156,17 @@ def spectral_frf(
 
 def _aligned(records: Record | Iterable[Record], delay: int) -> Stream:
     """Yield input, output (advanced by `delay`) and sample time of each record."""
+    told = False
     for record in records_alike(records):
+        if record.reference is not None and not told:
+            told = True
+            warn_caller(
+                f"{record!r} has a set point: noise that the controller answers pulls the response "
+                "towards the inverse of the controller. identify(record) uses the set point r; so "
+                "does the quotient of spectral_frf(Record(t, r, y)) and spectral_frf(Record(t, r, "
+                "u)), for fit_frf(..., hold='zoh', dt=)",
+                DataWarning,
+            )
         check_complete(record, "spectral_frf")
         u, y = np.atleast_2d(record.input), np.atleast_2d(record.output)
         if delay >= u.shape[1]:

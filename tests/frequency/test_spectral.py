@@ -10,6 +10,7 @@ from numpy.testing import assert_allclose
 from scipy import signal
 
 import ctrl_realize as cr
+from ctrl_realize.errors import DataWarning
 
 DT = 0.01
 PLANT = ct.sample_system(ct.tf([400], [1, 8, 400]), DT, "zoh")
@@ -215,3 +216,26 @@ def test_motor_bench_resonates_at_77_hz_and_is_still_at_53():
     assert near.frequency_hz[np.argmax(np.abs(near.complex))] == pytest.approx(77)
     assert near.frequency_hz[np.argmin(np.abs(near.complex))] == pytest.approx(53)
     assert np.all(frf.std < 0.02 * np.abs(frf.complex).max())
+
+
+def test_a_record_of_a_loop_is_told_and_the_quotient_is_the_plant():
+    """Noise that a controller answers pulls the ratio of spectra to -1 / C."""
+    rng, n = np.random.default_rng(3), 60_000
+    r = np.repeat(rng.choice([-1.0, 1.0], n // 20), 20)
+    noise = signal.lfilter([0.3], [1, -0.9], rng.standard_normal(n))
+    u, x, y = np.zeros((3, n))
+    for k in range(4, n):
+        x[k] = 0.9 * x[k - 1] + 0.1 * u[k - 4]
+        y[k] = x[k] + noise[k]
+        u[k] = 0.8 * (r[k] - y[k])
+    t = 1.0 * np.arange(n)
+    with pytest.warns(DataWarning, match="has a set point: noise"):
+        direct = cr.spectral_frf(cr.Record(t, u, y, reference=r), segment=512)
+    to_output = cr.spectral_frf(cr.Record(t, r, y), segment=512)
+    quotient = to_output.complex / cr.spectral_frf(cr.Record(t, r, u), segment=512).complex
+    z = np.exp(2j * np.pi * direct.frequency_hz)
+    band = direct.frequency_hz < 0.02
+    plant = (0.1 * z**-4 / (1 - 0.9 / z))[band]
+    # ten lines that scatter by 0.1 (three standard errors), and a bias
+    assert np.abs(np.mean(quotient[band] / plant - 1)) < 0.1
+    assert np.abs(np.mean(direct.complex[band] / plant - 1)) > 0.2
