@@ -89,7 +89,7 @@ def _check_signal(response: ComplexArray, sigma: FloatArray) -> None:
         raise DataError(
             f"the response is {plainly(np.sqrt(power), 2)} times its standard deviation, as for "
             "pure noise: the input does not excite the output at these frequencies; choose "
-            "another band or measure longer"
+            "another band or measure longer (a periodic input: spectral_frf with period=)"
         )
 
 
