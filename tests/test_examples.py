@@ -19,6 +19,7 @@ def demo():
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("without_figures")  # of the reports; those of the paper are drawn
 def test_the_demo_does_the_paper_from_end_to_end(demo, tmp_path, capsys):
     out = tmp_path / "demo"
     demo(["-o", str(out), "--seed", "3"])
