@@ -31,9 +31,10 @@ from scipy.optimize import brentq
 
 from ..arrays import FloatArray
 from ..constants import Z_95
-from ..engine.problem import Bounds, Problem
+from ..engine.problem import Bounds
 from ..engine.profile import root_of
-from ..engine.structures import Candidate, Scales
+from ..engine.structures import Candidate
+from ..engine.window_fit import WindowFit
 from .form_fit import FormFamily, form_family
 from .physical import ProcessParameter
 from .process_form import ProcessForm
@@ -52,24 +53,18 @@ _EXACT = 0.02  # of the step in which an end lies, to which it is solved
 
 
 def with_profiled_lags(
-    problem: Problem,
-    scales: Scales,
-    form: ProcessForm,
-    parameters: Sequence[ProcessParameter],
-    variance: float,
+    fits: WindowFit, form: ProcessForm, parameters: Sequence[ProcessParameter]
 ) -> tuple[ProcessParameter, ...]:
     """Replace the errors of lags that are nearly equal, or may be zero.
 
     Parameters
     ----------
-    problem : Problem
-    scales : Scales
+    fits : WindowFit
     form : ProcessForm
     parameters : sequence of ProcessParameter
         At the optimum.
-    variance : float
-        Of the noise, per sample.
     """
+    problem, scales, variance = fits.problem, fits.scales, fits.error_variance
     lags = [p for p in parameters if p.name.startswith("lag_") and p.name not in form.fixed]
     free = form.free_lags
     if variance <= 0 or all(p.name not in free or _alone(p, lags) for p in lags):

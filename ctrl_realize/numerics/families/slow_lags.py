@@ -22,7 +22,8 @@ from ..constants import CHI2_95
 from ..engine.eliminate import eliminate
 from ..engine.problem import Bounds, Mapped, Problem
 from ..engine.static_gain import local_errors
-from ..engine.structures import LEAST_DAMPING, SLOWEST, SLOWEST_PAIR, Candidate, Scales
+from ..engine.structures import LEAST_DAMPING, SLOWEST, SLOWEST_PAIR, Candidate
+from ..engine.window_fit import WindowFit
 from .shaped import MappedFamily, lowest, paired
 
 _APART = 0.03  # in logarithm: poles that are nearly equal have no derivatives by differences
@@ -59,46 +60,34 @@ class SlowLags(MappedFamily):
 
 
 def fit_slow_lags(
-    problem: Problem,
-    like: Candidate,
-    others: Iterable[Candidate],
-    scales: Scales,
-    variance: float,
-    fastest: float,
+    fits: WindowFit, like: Candidate, others: Iterable[Candidate], fastest: float
 ) -> Candidate:
     """Fit a structure without lags that are faster.
 
     Parameters
     ----------
-    problem : Problem
+    fits : WindowFit
+        Its data and noise: poles are a pair if that is significantly better than real ones.
     like : Candidate
         Fit of the structure without that bound.
     others : iterable of Candidate
         Fits of structures of lower order, from which the search starts as well.
-    scales : Scales
-    variance : float
-        Of the noise: poles are a pair if that is significantly better than real ones.
     fastest : float
         Fastest lag in s, and 1 / omega of pairs.
     """
-    real = _lowest(problem, like, [like, *others], 0, scales, fastest)
+    real = _lowest(fits, like, [like, *others], 0, fastest)
     pairs = int(np.count_nonzero(like.poles.imag > 0))
     if not pairs:
         return real
-    swinging = _lowest(problem, like, [like], pairs, scales, fastest)
-    return swinging if real.cost - swinging.cost > CHI2_95 * variance else real
+    swinging = _lowest(fits, like, [like], pairs, fastest)
+    return swinging if real.cost - swinging.cost > CHI2_95 * fits.variance else real
 
 
 def _lowest(
-    problem: Problem,
-    like: Candidate,
-    starts: Iterable[Candidate],
-    pairs: int,
-    scales: Scales,
-    fastest: float,
+    fits: WindowFit, like: Candidate, starts: Iterable[Candidate], pairs: int, fastest: float
 ) -> Candidate:
     """Best model with so many pairs that oscillate; missing lags start as the fastest."""
-    structure, most = like.structure, float(-np.log(fastest))
+    structure, scales, most = like.structure, fits.scales, float(-np.log(fastest))
     real = structure.order - 2 * pairs
     slow, swing = np.log(np.array([SLOWEST, SLOWEST_PAIR]) / scales.length)
     low = [scales.earliest, *[slow] * real, *[swing, np.log(LEAST_DAMPING)] * pairs]
@@ -116,4 +105,4 @@ def _lowest(
     bounds = Bounds(np.array(low), np.array(high))
     order, degree = structure.order, structure.relative_degree
     family = SlowLags(order, degree, bounds, pairs, scales.length)
-    return lowest(problem, family, np.array(tried), scales.dt)
+    return lowest(fits.problem, family, np.array(tried), scales.dt)

@@ -112,8 +112,7 @@ def fit_without_fast_lags(
     for host in every:
         order = host.structure.order
         fewer = [one for one in every if order - 1 <= one.structure.order < order]
-        setting = fits.scales, fits.variance, fastest
-        model = fit_slow_lags(fits.problem, host, fewer, *setting)
+        model = fit_slow_lags(fits, host, fewer, fastest)
         models[model.structure] = model
     given = fits.of(models, rivals={})
     excess = given.best.cost / max(fits.best.cost, SMALLEST)
@@ -130,11 +129,8 @@ def fit_without_fast_lags(
 def _with_profiles(fits: WindowFit, process: ProcessEstimate) -> ProcessEstimate:
     """Profiled intervals of lags where the curvature does not describe them."""
     assert process.form is not None
-    setting = fits.problem, fits.scales, process.form
-    return replace(
-        process,
-        find=lambda: with_profiled_lags(*setting, process.parameters, fits.error_variance),
-    )
+    form = process.form
+    return replace(process, find=lambda: with_profiled_lags(fits, form, process.parameters))
 
 
 def _better(fits: WindowFit, chosen: Candidate, better: StructureFit | None) -> StructureFit | None:

@@ -128,8 +128,9 @@ def test_derivatives_of_slow_lags_are_limits_of_differences(case, pairs):
 def test_the_fastest_lag_is_a_bound_of_the_best_fit(case):
     problem, scales = case
     free = Candidate(Structure(2, 2), np.array([25.0, np.log(0.06), np.log(1.2)]), 0.0)
-    free = fit_slow_lags(problem, free, [], scales, SIGMA**2, 1.0)  # two lags for four: 19 each
-    slow = fit_slow_lags(problem, free, [], scales, SIGMA**2, 24.0)
+    fits = with_known_noise(window_of_rows(problem), {free.structure: free}, scales, SIGMA)
+    free = fit_slow_lags(fits, free, [], 1.0)  # two lags for four: 19 each
+    slow = fit_slow_lags(fits, free, [], 24.0)
     assert np.all(np.abs(free.poles) > 1 / 24)
     assert slow.cost > free.cost
     assert_allclose(np.abs(slow.poles).max(), 1 / 24, rtol=0.02)  # equal poles are set apart

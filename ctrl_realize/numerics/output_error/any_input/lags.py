@@ -143,10 +143,8 @@ def fit_lags(data: SampledData, requested: Requested) -> tuple[SampledWindow, Ou
         curves[chosen.structure],
     )  # fmt: skip
     form = forms[fitted.index(fits.candidates[chosen.structure])]
-    setting = problem, scales, form, found.process.parameters, fits.error_variance
-    process = ProcessEstimate(
-        partial(with_profiled_lags, *setting), form if requested.forms else None
-    )
+    find = partial(with_profiled_lags, fits, form, found.process.parameters)
+    process = ProcessEstimate(find, form if requested.forms else None)
     plain = {s.plain: _plain(one) for s, one in fits.candidates.items()}
     plainly = fits.of(plain)
     better = _better(part, min(fitted, key=partial(_value, fits)), within)
