@@ -43,8 +43,9 @@ def common_sample_time(records: tuple[Record, ...]) -> float:
         if abs(record.dt - first) > 1e-6 * first:
             raise DataError(
                 f"{named('record', record.name)} has dt={record.dt:g} s, the first has "
-                f"{first:g} s; records fitted together need the same sample time: "
-                f"Record.resampled(time, input, output, dt={first:g}) interpolates"
+                f"{first:g} s; records fitted together need the same sample time: each as "
+                f"Record.from_samples(time, input, output, dt={min(first, record.dt):g}), which "
+                "holds the input and leaves the output missing between its samples"
             )
     return first
 

@@ -7,6 +7,7 @@ from scipy.special import chdtrc
 
 import ctrl_realize as cr
 from ctrl_realize import report
+from ctrl_realize.errors import DataError
 from ctrl_realize.report.verdict import campaign_verdict
 from tests import rigs
 from tests.rigs import codes
@@ -227,3 +228,20 @@ def test_tests_of_several_kinds_add_up_to_one_interval():
     assert both.interval[0] <= 20.0 <= both.interval[1]
     assert both.gain_interval[0] <= 0.9 <= both.gain_interval[1]
     assert both.gain == pytest.approx(0.9, rel=0.01)
+
+
+def test_records_of_two_sample_times_are_fitted_as_the_error_says():
+    """Interpolated, as it once said, a step has a value in between: early by a sample."""
+
+    def taken(every, make, **options):
+        t = every * np.arange(int(360 / every))
+        y = 2 * (t >= 67.3) * (1 - np.exp(-(t - 67.3) / 20))
+        y += 0.005 * np.random.default_rng(int(every)).standard_normal(t.size)
+        return make(t, (t >= 60.0).astype(float), y, **options)
+
+    with pytest.raises(DataError, match=r"Record.from_samples\(time, input, output, dt=1\)"):
+        cr.identify([taken(1.0, cr.Record), taken(4.0, cr.Record)])
+    again = [taken(every, cr.Record.from_samples, dt=1.0) for every in (1.0, 4.0)]
+    fit = cr.identify(again, structures="FOPDT").fit
+    assert fit.interval[0] <= 7.3 <= fit.interval[1]
+    assert fit.dead_time == pytest.approx(7.3, abs=0.1)
