@@ -17,7 +17,7 @@ References
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.signal import lfilter
@@ -143,23 +143,6 @@ def first_motion(
         Samples that there are, relative to the edge of the input, if others are missing. Slope and
         times are then in these units, and every duration is one of existing samples.
     """
-    found = _motion(output, edge, sigma, quantum, drift, rows)
-    if found is None or rows is None:
-        return found
-    after = rows[edge:]
-    onset = float(np.interp(found.onset, np.arange(after.size), after))
-    return replace(found, crossing=int(after[found.crossing]), onset=onset)
-
-
-def _motion(
-    output: FloatArray,
-    edge: int,
-    sigma: float,
-    quantum: float,
-    drift: float,
-    rows: IntArray | None,
-) -> FirstMotion | None:
-    """Visible onset in existing samples; arguments of `first_motion`."""
     n = output.size
     if edge >= 8:
         level = output - drift * _clipped_index(n, edge, rows) if drift else output
@@ -194,9 +177,12 @@ def _motion(
     inside = max(sigma, 0.5 * quantum) / np.sqrt(width)
     still = np.flatnonzero(rise[edge : edge + crossing + 1] <= inside)
     last = float(still[-1]) if still.size else 0.0
-    return FirstMotion(
-        crossing, max(_extrapolate(rise[edge:], crossing, threshold), last), rest, sign, span
-    )
+    onset = max(_extrapolate(rise[edge:], crossing, threshold), last)
+    if rows is not None:
+        after = rows[edge:]
+        onset = float(np.interp(onset, np.arange(after.size), after))
+        crossing = int(after[crossing])
+    return FirstMotion(crossing, onset, rest, sign, span)
 
 
 def _clipped_index(n: int, edge: int, rows: IntArray | None) -> FloatArray:
