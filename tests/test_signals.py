@@ -201,6 +201,12 @@ def test_a_table_may_have_its_time_in_a_column_and_missing_values():
             OptionError,
             r"'t \[min\]'; numbers are seconds: convert and rename min",
         ),
+        (
+            frame.set_index(pd.Index(1.77e12 + 500.0 * np.arange(4), name="time")),
+            {"output": "y"},
+            OptionError,
+            r"convert and rename ms \(such as 1770000001500\)",
+        ),
         (U, {"output": "y"}, DataError, "got a ndarray"),
     ):
         with pytest.raises(error, match=match):

@@ -10,6 +10,7 @@ import numpy as np
 
 from ..errors import DataError, OptionError
 from ..numerics.arrays import FloatArray
+from ..numerics.signals.counters import clock_unit
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -94,10 +95,13 @@ def _refuse_others(stamps: Any, frame: pd.DataFrame) -> None:
     """Refuse numbers that are no seconds: another unit in their name, or a count of the rows."""
     if stamps.dtype.kind not in "iuf":
         return
-    if found := _NO_SECONDS.search(str(stamps.name)):
+    named = _NO_SECONDS.search(str(stamps.name))
+    unit = named[1] if named else clock_unit(np.asarray(stamps, dtype=np.float64))
+    if unit != "":
         raise OptionError(
             f"the time of the table is {stamps.name!r}; numbers are seconds: convert and rename "
-            f"{found[1]}, or give dates or durations (pandas.to_timedelta)"
+            f"{unit or 'them'} (such as {np.max(stamps):.14g}), or give dates or durations "
+            "(pandas.to_timedelta)"
         )
     counts = stamps.name is None and stamps.dtype.kind != "f" and len(stamps) > 1
     if counts and np.median(np.diff(stamps)) == 1:
