@@ -118,13 +118,15 @@ def _about(
         cost = eliminate(problem, structure, at).cost
         return np.asarray(-0.5 * (cost - candidate.cost) / variance)
 
-    moves = rng.standard_normal((_PROPOSED * count, n))
+    # One of a few may lie anywhere: as many are drawn as tell a valley, and some of them kept.
+    enough = max(count, 2 * n + 2)
+    moves = rng.standard_normal((_PROPOSED * enough, n))
     tried = np.clip(theta + moves @ rows, bounds.low, bounds.high)
     value = likelihood(tried)
     weight = value + 0.5 * np.sum(moves**2, axis=1)
     weight = np.exp(weight - weight.max())
-    if np.sum(weight) ** 2 < _EFFECTIVE * count * np.sum(weight**2):
-        first = np.argsort(value)[-max(count, 2 * n + 2) :]
+    if np.sum(weight) ** 2 < _EFFECTIVE * enough * np.sum(weight**2):
+        first = np.argsort(value)[-enough:]
         drawn = _stretched(likelihood, bounds, tried[first], value[first], rng)[-count:]
     else:
         places = (np.arange(count) + rng.random()) / count * weight.sum()
