@@ -1,4 +1,4 @@
-"""Step records of simulated plants of many kinds, with their true frequency responses."""
+"""Records of simulated plants of many kinds, with their true frequency responses."""
 
 from __future__ import annotations
 
@@ -8,10 +8,12 @@ import numpy as np
 from scipy.signal import lfilter
 
 import ctrl_realize as cr
+from benchmarks.closed_loop import cases as loops
 
 KINDS = (
     "one lag", "two lags", "three lags", "four lags", "five lags", "zero on the left",
     "zero on the right", "pair", "slow noise", "load", "clipped", "rising at its end", "loud noise",
+    "running loop",
 )  # fmt: skip
 Rng = np.random.Generator
 
@@ -92,6 +94,8 @@ def _plant(kind: str, rng: Rng) -> Plant:
 def case(kind: str, seed: int) -> Case:
     """Make one record of a kind: dt 1 s, noise of 0.2 to 4 % of the response, loud 10 to 50 %."""
     rng = np.random.default_rng([KINDS.index(kind), seed])
+    if kind == "running loop":
+        return _loop(seed, rng)
     plant = _plant(kind, rng)
     before = int(rng.integers(40, 120))
     after = int(plant.settled * rng.uniform(1.1, 2.5))
@@ -113,6 +117,17 @@ def case(kind: str, seed: int) -> Case:
     if kind == "slow noise" or (kind == "load" and rng.random() < 0.3):
         noise = lfilter([np.sqrt(1 - 0.9**2)], [1, -0.9], noise)
     return Case(kind, seed, plant, cr.Record(time, u, 5 + y + level * noise[200:]))
+
+
+def _loop(seed: int, rng: Rng) -> Case:
+    """A loop of `benchmarks.closed_loop` whose set point, recorded, moves once or three times."""
+    plant = loops.PLANTS[str(rng.choice(list(loops.PLANTS)))]
+    noise = loops.CASES[str(rng.choice(["white", "AR(0.9)", "AR(0.97)"]))]
+    moves = str(rng.choice(list(loops.MOVES)))
+    wanted, made = loops.record(plant, noise, moves, int(rng.integers(2**31)))
+    record = cr.Record(made.time, made.input, made.output, reference=wanted)
+    lags = tuple(map(complex, plant.lags))
+    return Case("running loop", seed, Plant(loops.GAIN, plant.dead_time, lags), record)
 
 
 def _load(plant: Plant, rng: Rng, time: np.ndarray, before: int, height: float) -> np.ndarray:

@@ -101,7 +101,7 @@ def feedback_flags(records: tuple[Record, ...], delay: float) -> Iterator[Flag]:
     if not _rare(chances):
         return
     if all(in_automatic(record) for record in records):
-        yield flagged("feedback.moved", chance=min(chances))
+        yield flagged("closed_loop", chance=min(chances))
     elif late := late_input(records):
         yield late
     else:

@@ -49,7 +49,7 @@ def test_it_is_said_what_was_used_and_that_noise_hides_the_lags(slow):
     said = " ".join(slow.choices)
     for words in ("direct identification", "mean over 1 to 3 real lags", "noise model of order 1"):
         assert words in said
-    assert "its set point moved" in flag(slow, "feedback")
+    assert "its set point moved" in flag(slow, "closed_loop")
     hidden = flag(slow, "small_set_point")
     assert f"total delay, {slow.total_delay:.3g} s" in hidden
     assert "Moves of 2, or 4 times as many" in hidden
