@@ -87,8 +87,7 @@ def with_modes_judged(
             # A feedthrough alone leaves nothing of the input in this residual, a controller does.
             loop = not any(follows) and any(c.flags for c in _checks(found.system, records))
             # In a loop it is that of the controller: u = K (r - y) explains the noise.
-            loop |= found.fit.feedthrough and answers_the_output(records)
-            if loop:
+            if loop or (found.fit.feedthrough and answers_the_output(records)):
                 return system  # coloured noise that a controller answers is correlated with it
             if gain > VERY_STRONG and not late:
                 return _chosen(found, fit, sum(related), gain, cut)
