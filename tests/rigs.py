@@ -4,6 +4,10 @@ R3, R4, R2 and R1 are the lags that the project's accuracy figures refer to: a 2
 8 Hz pair of damping 0.7 (R3), the same with a 30 Hz sensor (R4), 2.2 Hz and 11 Hz (R2), 2 Hz (R1).
 """
 
+import signal
+from collections.abc import Iterator
+from contextlib import contextmanager
+
 import control as ct
 import numpy as np
 from scipy.signal import lfilter
@@ -114,3 +118,13 @@ def step_record(
     y = amplitude * exact_step(plant, (k - before - delay) * dt)
     y = baseline + y + noise * amplitude * rng.standard_normal(k.size)
     return cr.Record(k * dt, u, y, name="simulated")
+
+
+@contextmanager
+def interruptible() -> Iterator[None]:
+    """Let what is started here be interrupted: where the tests run detached, it ignores that."""
+    listening = signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, listening)

@@ -16,6 +16,7 @@ from ctrl_realize.interactive.hosting import Host
 from ctrl_realize.interactive.server import AppServer
 from ctrl_realize.interactive.session import Session
 from tests.app_records import messy_csv, step_record
+from tests.rigs import interruptible
 
 
 @pytest.fixture(scope="module")
@@ -125,7 +126,9 @@ def test_the_command_says_its_address_and_ends_when_it_is_interrupted(tmp_path):
     file.write_bytes(messy_csv())
     wrong.write_bytes(b"\x00\x01")
     words = [sys.executable, "-m", "ctrl_realize", "app", str(file), str(wrong), "--no-browser"]
-    with subprocess.Popen(words, stdout=subprocess.PIPE, text=True) as running:
+    with interruptible():
+        running = subprocess.Popen(words, stdout=subprocess.PIPE, text=True)
+    with running:
         assert "wrong.csv" in running.stdout.readline()
         address = running.stdout.readline().partition("http://")[2].strip()
         place, _, path = address.partition("/")

@@ -23,6 +23,7 @@ from ctrl_realize.cli.staging import appearing
 from ctrl_realize.errors import OptionError
 from ctrl_realize.identification.campaign import rows
 from tests.killing_records import COUNT, OPTIONS, killed, killed_here, record
+from tests.rigs import interruptible
 
 QUICK = ["--method", "scan", "--order", "1", "--max-delay", "40"]
 
@@ -225,12 +226,8 @@ def test_an_interruption_while_the_program_is_loaded_is_one_line(tmp_path):
         "import sys, time\nprint('loading', flush=True)\ntime.sleep(60)\n", encoding="utf-8"
     )
     paths = os.pathsep.join(filter(None, [str(tmp_path), os.environ.get("PYTHONPATH")]))
-    # where the tests run detached, the interruption is ignored by what they start, too
-    listening = signal.signal(signal.SIGINT, signal.default_int_handler)
-    try:
+    with interruptible():
         process = started("identify", "a.csv", env={**os.environ, "PYTHONPATH": paths})
-    finally:
-        signal.signal(signal.SIGINT, listening)
     assert process.stdout.readline() == "loading\n"
     process.send_signal(signal.SIGINT)
     assert process.communicate(timeout=60) == ("", "ctrl-realize: interrupted\n")

@@ -2,6 +2,7 @@
 
 import pickle
 import re
+import warnings
 
 import control as ct
 import numpy as np
@@ -291,7 +292,10 @@ def test_dead_times_of_plausible_models_are_their_own_not_whole_samples():
     rng = np.random.default_rng(1)
     y = -np.expm1(-np.maximum(t - 60, 0) / 15) + 0.005 * rng.standard_normal(600)
     sys = cr.identify(cr.Record(t, (t >= 60) * 1.0, y))
-    check = cr.design.pid(sys).check
+    with warnings.catch_warnings():
+        # Ms is 2 and more: the loop is as fast as the sampling lets it be
+        warnings.simplefilter("ignore", ModelWarning)
+        check = cr.design.pid(sys).check
     assert sys.fit.interval[1] < 0.2
     assert check.margins.delay_margin < 1.0
     assert check.stable_within_interval

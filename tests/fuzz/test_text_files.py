@@ -188,6 +188,7 @@ def test_any_name_is_shown_in_a_figure_as_it_is_written(rng):
     name = any_name(rng)
 
     def draw(figure):
+        figure.subplots().set_axis_off()
         figure.text(0, 0, plain(name))
         figure.text(0, 0.5, wrapped(name, rng.randint(3, 80)))
 
