@@ -103,6 +103,16 @@ def test_the_interval_of_an_integrating_plant_is_narrow():
     assert 0.9 * truth < low <= truth <= high < 1.1 * truth
 
 
+def test_a_lag_of_hundreds_of_records_is_an_integrator():
+    # it was told as a lag of 200 records, with a gain of thousands that was known to a thousandth
+    plant = relay.plant("integrating", 0.02, 0.0, 1.0)
+    fit = cr.identify(bench.relay_test(plant, relay.AMPLITUDE, 0, hysteresis=0.06, cycles=6)).fit
+    assert fit.integrators == 1
+    assert [p.name for p in fit.parameters if p.name.startswith("lag")] == ["lag_2"]
+    low, high = fit.gain_interval
+    assert 0.09 < low <= 0.1 <= high < 0.11
+
+
 def test_in_a_drift_a_relay_is_fitted_as_a_controller():
     # as an open loop a state-space model of the drift was chosen, and the gain 55 % off
     plant = relay.plant("a quarter of a lag", 0.09, 1.38, 1000.0)

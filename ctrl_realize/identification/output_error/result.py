@@ -174,16 +174,14 @@ class OutputErrorFit(FractionalDelayFit):
     @property
     def _plain_poles(self) -> ComplexArray:
         """Poles of the estimate; those of integrators are exactly 0."""
-        length = self.data.length
         poles = self.estimate.poles.copy()
-        poles[np.abs(poles) < INTEGRATOR / length] = 0.0
+        poles[np.abs(poles) < INTEGRATOR / self.data.length] = 0.0
         return poles
 
     @property
     def _moving_poles(self) -> ComplexArray:
         poles = self._plain_poles
-        moving: ComplexArray = poles[poles != 0]
-        return moving
+        return np.asarray(poles[poles != 0])
 
     @property
     def poles(self) -> ComplexArray:
@@ -235,8 +233,10 @@ class OutputErrorFit(FractionalDelayFit):
         of the chosen one. Standard errors are NaN where no likelihood describes the error of the
         fit, and for lags that follow a law (many equal lags, axial dispersion).
         """
+        longest = self.data.length / INTEGRATOR
+        found = self.estimate.process.parameters
         return with_intervals(
-            self.estimate.process.parameters,
+            tuple(p for p in found if not p.name.startswith("lag_") or p.value <= longest),
             gain_unit(self.output_unit, self.input_unit),
             gain=(self.gain, self.gain_std_given_structure, self.gain_interval),
             dead_time=(self.std_given_structure, self.interval),

@@ -139,7 +139,8 @@ def form_family(form: ProcessForm, scales: Scales) -> FormFamily:
 
 
 def _limits(form: ProcessForm, scales: Scales) -> dict[str, tuple[float, float]]:
-    lag = scales.dt / FASTEST, scales.length / INTEGRATOR
+    # A lag at its limit counts as an integrator.
+    lag = scales.dt / FASTEST, 2 * scales.length / INTEGRATOR
     lead = 1e3 * scales.length
     wide = {
         "gain": (-np.inf, np.inf),
