@@ -135,10 +135,7 @@ def _gain(
     other = 2 * modes.order + modes.feedthrough + 1 + starts * modes.order
     theirs = _residuals(_checks(found.system, records))
     fewer = (lags - other) * float(np.log(samples))
-    # The lags with their drift and free response, too: of a drift, which a relay answers, states
-    # make slow modes that explain no more.
-    smaller = 2 * samples * np.log(fit.residual / np.sqrt(np.mean(np.concatenate(theirs) ** 2)))
-    return fewer + min(float(smaller), coloured_criterion(left)[0] - coloured_criterion(theirs)[0])
+    return float(coloured_criterion(left)[0] - coloured_criterion(theirs)[0] + fewer)
 
 
 def _chosen(
