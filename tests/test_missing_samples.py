@@ -246,6 +246,12 @@ def test_models_and_controllers_have_the_sample_time_of_irregular_stamps():
     assert table.to_numpy().min() > 99
 
 
+def test_the_onset_between_irregular_stamps_is_in_seconds():
+    fit = cr.fit_output_error(cr.Record.from_samples(*jittered(delay=5.3))).fit
+    # within a stamp; in steps of the fine time axis it was told as 270 s and more
+    assert_allclose(fit.onset, 5.3, atol=1.0)
+
+
 def test_the_sample_time_of_irregular_stamps_may_be_stated():
     record = cr.Record.from_samples(*jittered(), sample_time=2.0)
     assert cr.identify(record, structures="FOPDT").dt == 2.0

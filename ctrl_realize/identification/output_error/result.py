@@ -140,7 +140,7 @@ class OutputErrorFit(FractionalDelayFit):
     def onset(self) -> float:
         """Visible onset of the response after the step in s; NaN if the input is not a step."""
         motion = self.data.motion
-        return float("nan") if motion is None else motion.onset * self.dt
+        return float("nan") if motion is None else motion.onset * self.data.dt
 
     @property
     def total_delay(self) -> float:
