@@ -19,7 +19,7 @@ from ..design.loops.margins import margins
 from ..design.loops.performance import (
     controller_responses,
     lasting,
-    loop_time,
+    loop_times,
     settled_responses,
     step_responses,
 )
@@ -324,7 +324,7 @@ def _span(plant: DelayedStateSpace, controllers: Mapping[str, Any]) -> float:
     """1.25 times the time in s until the slowest loop has settled."""
     samples = 8
     for name, controller in controllers.items():
-        time = loop_time(plant, controller, name)
-        setpoint, load, _ = settled_responses(plant, controller, time)
+        slow, _ = loop_times(plant, controller, name)
+        setpoint, load, _ = settled_responses(plant, controller, slow)
         samples = max(samples, lasting(setpoint, load))
     return 1.25 * samples * float(plant.dt)

@@ -154,3 +154,30 @@ def test_the_setpoint_error_in_continuous_time_has_its_closed_form():
     found = design.performance(plant, design.PIDController(0.08 / 4 / 0.029, 0.08))
     assert found.overshoot == 0
     assert found.setpoint_error == pytest.approx(4 * 0.029, rel=3e-4)
+
+
+@pytest.mark.parametrize("kind", ["PI", "PID"])
+def test_a_plant_of_short_dead_time_has_the_optimum_of_an_integrator(kind):
+    # 1 / (s + 1) behind 1 ms is 1 / s behind 1 ms for a loop of 10 ms; Ms on a grid of 0.05 rad,
+    # and with a hold of 1/50 of the dead time
+    short, integrating = (
+        design.pid(design.ProcessModel(1.0, lag, 1e-3, integrating=not lag), "optimal", kind)
+        for lag in (1.0, 0.0)
+    )
+    assert_allclose([short.kp, short.ti], [integrating.kp, integrating.ti], rtol=0.03)
+    assert short.check.margins.ms == pytest.approx(1.4, rel=1e-2)
+
+
+def test_responses_of_a_fast_loop_around_a_slow_plant_are_resolved():
+    # the integrated error of a load is ti / kp if the response has one sign
+    model = design.ProcessModel(gain=1.0, lag=1.0, dead_time=1e-3)
+    plant = ct.tf(model.transfer_function()) * cr.delay(1e-3)
+    pi = design.pid(model, "amigo")
+    found = design.performance(plant, pi)
+    assert found.load_error == pytest.approx(pi.ti / pi.kp, rel=1e-4)
+    fine = design.performance(model.system(5e-6), pi.discretised(5e-6))
+    table = design.compare_pid(model, ["amigo"], ["PI"]).performance[0]
+    for of in (found, table):
+        assert of.overshoot == pytest.approx(fine.overshoot, rel=0.03)
+        assert of.settling_time == pytest.approx(fine.settling_time, rel=0.01)
+        assert of.setpoint_error == pytest.approx(fine.setpoint_error, rel=0.02)

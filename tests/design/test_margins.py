@@ -271,3 +271,14 @@ def test_crossings_that_rounding_makes_near_nyquist_do_not_hide_the_gain_margin(
     gain_margin = ct.stability_margins(ct.frd(loop(np.exp(1j * omega * valve.dt)), omega))[0]
     assert np.all(np.isfinite(found.gain_margins))
     assert found.gain_margin == pytest.approx(gain_margin, rel=1e-5)  # interpolation of the FRD
+
+
+def test_the_first_crossover_of_a_dead_time_far_longer_than_the_lag_is_found():
+    # the phase of exp(-s) / (1e-5 s + 1) behind a hold of 1 ms reaches -180 deg at w (1 + dt/2)
+    for unit in (1.0, 1e7):
+        model = cr.design.ProcessModel(gain=0.5, lag=1e-5 * unit, dead_time=unit)
+        found = cr.design.margins(model.system(1e-3 * unit))
+        assert found.phase_crossovers[0] * unit == pytest.approx(np.pi / 1.001, rel=1e-4)
+        plant = ct.tf(model.transfer_function()) * cr.delay(unit)
+        found = cr.design.margins(plant)
+        assert found.phase_crossovers[0] * unit == pytest.approx(np.pi / (1 + 1e-5), rel=1e-8)

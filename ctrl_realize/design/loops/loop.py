@@ -103,20 +103,24 @@ class Loop:
         scale = 1e-7 if self.dt else 1e-9 * max(1.0, float(np.abs(self.poles).max(initial=0.0)))
         return int(np.sum(np.abs(self.poles - origin) < scale))
 
+    def sign(self) -> float:
+        """Sign of the static gain, or of the slope of an integrating loop."""
+        count = self.integrators()
+        slow = self(self.grid()[:1] if count else np.zeros(1))[0]
+        return -1.0 if (1j**count * slow).real < 0 else 1.0
+
     def grid(self) -> FloatArray:
         """Frequencies from far below the slowest pole up to the end, for following the loop."""
         features = np.concatenate([part.features for part in self.factors])
         sizes = np.abs(features)
         sizes = sizes[sizes > 1e-9 * max(sizes.max(initial=0.0), 1e-300)]
-        if self.dt:
-            top = np.pi / self.dt
-            slowest = min(float(sizes.min(initial=top)), top)
-            hidden = sum(part.hidden_delay for part in self.factors) * self.dt
-            low = self._low_end(1e-3 * slowest)
-            return frequency_grid(low, top, features, self.delay + hidden)
-        slowest = float(sizes.min(initial=1 / self.delay if self.delay else 1.0))
+        hidden = sum(part.hidden_delay for part in self.factors) * (self.dt or 1.0)
+        dead_time = self.delay + hidden
+        top = np.pi / self.dt if self.dt else 1.0
+        slowest = float(sizes.min(initial=1 / dead_time if dead_time else top))
         low = self._low_end(1e-3 * slowest)
-        dead_time = self.delay + sum(part.hidden_delay for part in self.factors)
+        if self.dt:
+            return frequency_grid(low, top, features, dead_time)
         top = self._high_end(1e3 * float(sizes.max(initial=slowest)), dead_time)
         return frequency_grid(low, top, features, dead_time)
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -22,8 +22,11 @@ LONGEST = 2**19
 """Largest number of samples of a response."""
 SETTLED = 1e-4
 """Relative range of the last part of a response that counts as settled."""
-POINTS, DOUBLINGS = 2001, 8
+POINTS, DOUBLINGS = 2000, 8
 """Samples of the responses of a continuous loop, and how often their duration is doubled."""
+PER_TURN, LATER = 20, 400
+"""Samples while such a loop turns by 1 rad at its crossover, and while times after `POINTS` such
+samples grow by a factor of e."""
 ROUNDING = 1e-8
 """Relative overshoot within the error of a simulated response."""
 SETTLING_BAND = 0.02
@@ -160,10 +163,10 @@ def performance(plant: DelayedStateSpace | DelaySystem, controller: Any) -> Perf
     inf
     """
     warn_unresolved(plant)
-    loop = loop_time(plant, controller)
+    slow, turn = loop_times(plant, controller)
     if not plant.dt:
-        return continuous_performance(plant, controller, loop)
-    setpoint, load, settled = settled_responses(plant, controller, loop)
+        return continuous_performance(plant, controller, slow, turn)
+    setpoint, load, settled = settled_responses(plant, controller, slow)
     if not settled:
         warnings.warn(
             f"the loop has not settled after {setpoint.size} samples of {plant.dt:g} s; its "
@@ -172,19 +175,23 @@ def performance(plant: DelayedStateSpace | DelaySystem, controller: Any) -> Perf
             ModelWarning,
             stacklevel=3,  # one frame more: the limit of BLAS threads
         )
-    return measured(setpoint, load, float(plant.dt))
+    return sampled_performance(setpoint, load, float(plant.dt))
 
 
-def continuous_performance(plant: DelaySystem, controller: Any, total_time: float) -> Performance:
-    """Characteristics of the responses of a continuous loop, sampled `POINTS` times."""
+def continuous_performance(
+    plant: DelaySystem, controller: Any, total_time: float, turn: float
+) -> Performance:
+    """Characteristics of the responses of a continuous loop, which turns by 1 rad in `turn` s."""
     loop = (plant * controller).feedback(1)
     to_load = plant.feedback(controller)
     end = 4 * total_time
     for _ in range(DOUBLINGS):
-        times = np.linspace(0, end, POINTS)
+        near = min(end, POINTS * turn / PER_TURN)
+        later = np.geomspace(near, end, 1 + int(LATER * np.log(end / near)))[1:]
+        times = np.concatenate([np.linspace(0, near, POINTS + 1), later])
         setpoint = np.asarray(loop.step_response(times, tolerance=SETTLED / 100).outputs)
         load = np.asarray(to_load.step_response(times, tolerance=SETTLED / 100).outputs)
-        if _still(setpoint, load, POINTS // 20 + 1):
+        if _still(setpoint, load, int(np.sum(times >= 0.95 * end))):
             break
         end *= 2
     else:
@@ -192,13 +199,8 @@ def continuous_performance(plant: DelaySystem, controller: Any, total_time: floa
             f"the loop has not settled after {end / 2:g} s; its errors are those up to this time",
             ModelWarning,
         )
-    found, half = measured(setpoint, load, float(times[1])), float(times[1]) / 2
-    # the integrals by the trapezoidal rule; the last sample is as good as settled
-    return replace(
-        found,
-        setpoint_error=found.setpoint_error - half * abs(1 - float(setpoint[0])),
-        load_error=found.load_error - half * abs(float(load[0])),
-    )
+    trapezoidal = np.convolve(np.diff(times), [0.5, 0.5])
+    return measured(setpoint, load, times, trapezoidal)
 
 
 def plant_time(plant: DelayedStateSpace | DelaySystem) -> float:
@@ -213,8 +215,10 @@ def plant_time(plant: DelayedStateSpace | DelaySystem) -> float:
     return float(plant.dt * (plant.delay + 2 * slowest + 4))
 
 
-def loop_time(plant: DelayedStateSpace, controller: Any, name: str = "") -> float:
-    """Guess the settling time of a loop in s: that of its plant, or of its slowest crossover.
+def loop_times(plant: DelayedStateSpace, controller: Any, name: str = "") -> tuple[float, float]:
+    """Guess the settling time of a loop in s, and tell in which it turns by 1 rad at crossover.
+
+    The former is that of its plant, or of its slowest crossover; the latter of the fastest.
 
     Raises
     ------
@@ -228,8 +232,8 @@ def loop_time(plant: DelayedStateSpace, controller: Any, name: str = "") -> floa
             f"{found.unstable_poles} poles on or outside the unit circle, so its step "
             "response does not settle; see design.margins"
         )
-    crossovers = found.gain_crossovers
-    return max(plant_time(plant), 1 / float(crossovers[0]) if crossovers.size else 0.0)
+    turns, slow = 1 / found.gain_crossovers, plant_time(plant)
+    return float(turns.max(initial=slow)), float(turns.min(initial=slow))
 
 
 def settled_responses(
@@ -256,17 +260,24 @@ def _still(setpoint: FloatArray, load: FloatArray, last: int) -> bool:
     return bool(max(moving) < SETTLED)
 
 
-def measured(setpoint: FloatArray, load: FloatArray, dt: float) -> Performance:
-    """Compute the characteristics of settled responses."""
+def measured(
+    setpoint: FloatArray, load: FloatArray, times: FloatArray, weights: FloatArray | float
+) -> Performance:
+    """Compute the characteristics of settled responses; `weights` in s are those of integrals."""
     final = float(setpoint[-1])
     # The transform has an error of 1e-5; a steady-state error is far larger.
     kept = (abs(1 - final) > 1e-3, abs(load[-1]) > 1e-3 * np.abs(load).max())
     return Performance(
-        setpoint_error=float("inf") if kept[0] else float(np.abs(1 - setpoint).sum() * dt),
-        load_error=float("inf") if kept[1] else float(np.abs(load).sum() * dt),
-        overshoot=_overshoot(float(setpoint.max()) / final) if final else float("nan"),
-        settling_time=settling(setpoint, final) * dt,
+        setpoint_error=float("inf") if kept[0] else float(np.sum(np.abs(1 - setpoint) * weights)),
+        load_error=float("inf") if kept[1] else float(np.sum(np.abs(load) * weights)),
+        overshoot=_overshoot(float((setpoint / final).max())) if final else float("nan"),
+        settling_time=float(times[settling(setpoint, final)]),
     )
+
+
+def sampled_performance(setpoint: FloatArray, load: FloatArray, dt: float) -> Performance:
+    """The same of responses with a sample time in s."""
+    return measured(setpoint, load, np.arange(setpoint.size, dtype=np.float64) * dt, dt)
 
 
 def lasting(setpoint: FloatArray, load: FloatArray) -> int:

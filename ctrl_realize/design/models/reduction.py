@@ -145,11 +145,11 @@ def _resolution(model: ProcessModel) -> float:
 
 
 def both_forms(
-    system: Any, dead_time: float | None = None
+    system: Any, dead_time: float | None = None, longest: float = np.inf
 ) -> tuple[ContinuousModel | None, DelayedStateSpace]:
     """Return a plant in continuous time, if it is given so, and sampled.
 
-    A continuous one is sampled so fast that it has no effect.
+    A continuous one is sampled so fast that it has no effect; `longest` limits the sample time.
     """
     if isinstance(system, ContinuousModel):
         return system, to_discrete(system)
@@ -161,7 +161,7 @@ def both_forms(
         span = float(np.sum(1 / speeds)) + total
         if span == 0:
             raise UnsuitableSystemError(f"{core.name!r} has no lag and no dead time to reduce")
-        model = ContinuousModel(core, (total,), (0.0,), span / 1000)
+        model = ContinuousModel(core, (total,), (0.0,), min(span / 1000, longest))
         if np.any(core.D):
             # A feedthrough causes a jump; with whole samples it stays in place.
             step = total / max(1, round(total / model.dt)) if total else model.dt

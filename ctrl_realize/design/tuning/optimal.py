@@ -55,14 +55,16 @@ class _Problem:
         unit = self.controller(self.sign, ti, td)
         z = np.exp(1j * self.omega * self.plant.dt)
         shape = self.loop * _values(unit, z)
-        if not (self.integrating and ti < INF):
+        if ti == INF:
             return largest_gain(shape, self.distance)[0]
-        # Two integrators: small gains are badly damped, and the limit has a lower end.
+        # A slow lag is almost an integrator: small gains are badly damped, larger ones are not.
         for low, high in reversed(gain_gaps(shape, self.distance)):
+            if low == 0 and not self.integrating:
+                return high
             if high < INF and high > low * (1 + 1e-6):
                 kp = self.sign * (low * high) ** 0.5 if low else self.sign * high / 2
                 loop = open_loop(self.plant, self.controller(kp, ti, td))
-                if closed_loop_count(loop, self.omega) == (0, False):
+                if closed_loop_count(loop, loop.grid()) == (0, False):
                     return high
         return 0.0
 
@@ -120,14 +122,17 @@ def optimal(
     (kp, ti, td)
     """
     problem = _problem(plant, total_time, max_sensitivity, filter_ratio, method)
-    low, high = 0.03 * total_time, 10 * total_time
+    # behind a short dead time all times are short: 30 / omega at the limit of a P controller
+    _, at = largest_gain(problem.sign * problem.loop, problem.distance)
+    short = min(total_time, 30 / float(problem.omega[at]))
+    low, high = 0.03 * short, 10 * total_time
     if kind == "P":
         ti, td = INF, 0.0
     elif kind == "PI":
         ti, td = smallest_on_line(lambda x: problem.load_error(x, 0.0), low, high)[0], 0.0
     elif kind == "PD":
         ti = INF
-        td = smallest_on_line(lambda x: -problem.gain(INF, x), 0.01 * total_time, total_time)[0]
+        td = smallest_on_line(lambda x: -problem.gain(INF, x), 0.01 * short, total_time)[0]
     else:
         ti, td = _two_times(problem, low, high)
     gain = problem.gain(ti, td)
@@ -155,8 +160,6 @@ def _problem(
     loop = open_loop(plant)
     # Finer than for bracketing: the limit is evaluated at the points of the grid.
     omega, values = follow(loop, loop.grid(), largest_turn=0.05)
-    slow = values[int(np.argmax(np.abs(values)))] if loop.integrators() else loop(np.zeros(1))[0]
-    sign = -1.0 if (slow.imag > 0 if loop.integrators() else slow.real < 0) else 1.0
     count = 2 ** int(np.ceil(np.log2(min(60 * total_time / plant.dt + 64, LONGEST))))
     circle = damped_circle(count)
     return _Problem(
@@ -169,7 +172,7 @@ def _problem(
         circle,
         np.asarray(plant.horner(circle)[0, 0]),
         count,
-        sign,
+        loop.sign(),
         loop.integrators() > 0,
     )
 
@@ -177,7 +180,7 @@ def _problem(
 def _two_times(problem: _Problem, low: float, high: float) -> tuple[float, float]:
     scan = [
         (problem.load_error(ti, share * ti), ti, share * ti)
-        for ti in np.geomspace(low, high / 3, 10)
+        for ti in np.geomspace(low, high, 12)
         for share in (0.05, 0.15, 0.3, 0.6)
     ]
     _, ti, td = min(scan)
@@ -187,11 +190,12 @@ def _two_times(problem: _Problem, low: float, high: float) -> tuple[float, float
 
     start = np.log([ti, td])
     simplex = start + np.array([[0.0, 0.0], [0.25, 0.0], [0.0, 0.25]])
-    found = minimize(
-        error,
-        start,
-        method="Nelder-Mead",
-        options={"xatol": 1e-3, "fatol": 1e-7 * error(start), "initial_simplex": simplex},
-    )
+    with np.errstate(invalid="ignore"):  # errors may be infinite
+        found = minimize(
+            error,
+            start,
+            method="Nelder-Mead",
+            options={"xatol": 1e-3, "fatol": 1e-7 * error(start), "initial_simplex": simplex},
+        )
     best = np.exp(found.x)
     return float(best[0]), float(best[1])

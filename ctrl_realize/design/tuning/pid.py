@@ -218,7 +218,7 @@ def tuned(
             plant, total, kind, max_sensitivity=limit, filter_ratio=ratio, method=method
         )
     else:
-        kp, ti, td = from_ultimate(rule, kind, *critical_point(plant, exact))
+        kp, ti, td = from_ultimate(rule, kind, *critical_point(exact))
     units = gain_and_time_units(plant)
     made = PIDController(
         kp,

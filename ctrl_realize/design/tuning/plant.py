@@ -7,7 +7,6 @@ from typing import Any
 
 import control as ct
 
-from ..._checks import positive
 from ..._parameters import gain_unit
 from ...data.shown_units import shown_time_unit
 from ...delayed import DelayedStateSpace, DelaySystem, delay
@@ -16,10 +15,10 @@ from ..models.conversions import to_discrete
 from ..models.process_model import ProcessModel
 from ..models.reduction import both_forms, reduce_fopdt, reduce_sopdt
 from ..resolved import check_sign, warn_unresolved
-from ..siso import core_and_dead_time, delayed_system, is_continuous, proper_ss
+from ..siso import core_and_dead_time, delayed_system, is_continuous
 
-FINE = 1000
-"""Samples within the total time of a process model, so many that sampling has no effect."""
+FINE = 50
+"""Samples within a dead time, or a turn of the loop by 1 rad, so many that a hold has no effect."""
 
 
 def reference_plant(
@@ -31,21 +30,14 @@ def reference_plant(
     has no effect.
     """
     if isinstance(system, ProcessModel):
-        if dt is None:
-            exact = DelaySystem(ct.ss(system.transfer_function())) * delay(system.dead_time)
-            return system.system(system.total_time / FINE), exact, 0.0
-        step = positive(dt, "dt", "sample time in s")
-        plant = system.system(step)
-        return plant, plant, step
+        system = DelaySystem(ct.ss(system.transfer_function())) * delay(system.dead_time)
     if is_continuous(system):
-        if dt is None:
-            exact = system
-            if not isinstance(system, DelaySystem):
-                exact = DelaySystem(proper_ss(system, purpose))
-            return both_forms(system)[1], exact, 0.0
         core, dead_time = core_and_dead_time(system, purpose)
-        plant = to_discrete(core, dead_time, dt)
-        return plant, plant, float(plant.dt)
+        if dt is not None:
+            plant = to_discrete(core, dead_time, dt)
+            return plant, plant, float(plant.dt)
+        exact = system if isinstance(system, DelaySystem) else DelaySystem(core)
+        return finely_sampled(exact, dead_time), exact, 0.0
     plant = delayed_system(system, purpose)
     check_sign(plant, purpose)
     warn_unresolved(plant)
@@ -55,6 +47,11 @@ def reference_plant(
             f"of a sampled system has its sample time, {plant.dt:g} s"
         )
     return plant, plant, float(plant.dt)
+
+
+def finely_sampled(exact: DelaySystem, time: float) -> DelayedStateSpace:
+    """Sample a continuous plant so fast that a hold has no effect within `time`, if it is not 0."""
+    return both_forms(exact, longest=time / FINE or float("inf"))[1]
 
 
 def reduced(

@@ -8,17 +8,15 @@ from typing import TYPE_CHECKING, Any
 
 from ..._checks import one_of
 from ..._wording import in_time, times_in
-from ...delayed import DelayedStateSpace
 from ...errors import OptionError
 from ...numerics.blas_threads import single_threaded
 from ...results import Flag, Result
-from ..loops.loop_check import loop_check, warn_of
+from ..loops.loop_check import LoopCheck, loop_check, warn_of
 from ..loops.margin_result import Margins
-from ..loops.performance import Performance, measured, plant_time, settled_responses
-from ..models.process_model import ProcessModel
+from ..loops.performance import Performance, plant_time, sampled_performance, settled_responses
 from .controller import PIDController
 from .pid import KINDS, RULES, TuningOptions, tuned
-from .plant import reference_plant
+from .plant import finely_sampled
 from .rules import kinds_of
 
 if TYPE_CHECKING:
@@ -167,7 +165,7 @@ def compare_pid(
     ----------
     system : DelayedStateSpace, DelaySystem or ProcessModel
         See `pid`. For the responses of a continuous plant and controller both are sampled finely
-        (1000 samples per total time).
+        (1000 samples per total time, 50 while the loop turns by 1 rad at its crossover).
     rules : sequence of str, optional
         All by default.
     kinds : sequence of str, optional
@@ -201,8 +199,6 @@ def compare_pid(
     tried = [one_of(rule, "rule", RULES) for rule in rules or RULES]
     kinds = [one_of(kind, "kind", KINDS) for kind in kinds]
     settings = TuningOptions(**options)
-    plant, _, _ = reference_plant(system, settings.dt)
-    total = _span(system, plant)
     made: list[tuple[PIDController, Performance]] = []
     refused: list[tuple[str, str, str]] = []
     for rule in tried:
@@ -218,9 +214,8 @@ def compare_pid(
             if controller.kind != kind and controller.kind in kinds:
                 refused.append((rule, kind, f"for this plant it is the {controller.kind}"))
                 continue
-            sampled = controller if controller.dt else controller.discretised(plant.dt)
             check = loop_check(exact, controller)
-            reached = _performance(plant, sampled, total) if check.stable else UNSTABLE
+            reached = _performance(exact, controller, check) if check.stable else UNSTABLE
             made.append((controller.checked(check), reached))
     if not made:
         reasons = "; ".join(f"{kind} {rule}: {why}" for rule, kind, why in refused)
@@ -229,13 +224,11 @@ def compare_pid(
     return PIDComparison(controllers, performance, tuple(refused))
 
 
-def _performance(plant: DelayedStateSpace, controller: Any, total: float) -> Performance:
-    setpoint, load, _ = settled_responses(plant, controller, total)
-    return measured(setpoint, load, float(plant.dt))
-
-
-def _span(system: Any, plant: DelayedStateSpace) -> float:
-    """Guess the settling time of the plant, in s."""
-    if isinstance(system, ProcessModel):
-        return system.total_time
-    return plant_time(plant)
+def _performance(plant: Any, controller: PIDController, check: LoopCheck) -> Performance:
+    """Performance of a stable loop; one in continuous time is sampled finely."""
+    crossovers = check.margins.gain_crossovers
+    if not controller.dt:
+        plant = finely_sampled(plant, 1 / float(crossovers[-1]) if crossovers.size else 0.0)
+        controller = controller.discretised(plant.dt)
+    setpoint, load, _ = settled_responses(plant, controller, plant_time(plant))
+    return sampled_performance(setpoint, load, float(plant.dt))

@@ -24,8 +24,6 @@ from .plant import gain_and_time_units, reference_plant
 
 Interval = tuple[float, float]
 PURPOSE = "the ultimate gain"
-SETTLED = 10_000
-"""Samples after the delay at which a step response has the sign of the gain."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -148,7 +146,7 @@ def ultimate(system: Any, *, continuous: bool = False, reverse: bool | None = No
             DelaySystem(continuous_core(m.numerator, m.poles)) * delay(m.dead_time)
             for m in (() if models is None else models.models)
         )
-    gain, period = critical_point(plant, exact, reverse)
+    gain, period = critical_point(exact, reverse)
     found = np.array([_crossing(one, np.sign(gain)) for one in others])
     gains: Interval | None = None
     periods: Interval | None = None
@@ -158,18 +156,16 @@ def ultimate(system: Any, *, continuous: bool = False, reverse: bool | None = No
 
 
 def critical_point(
-    plant: DelayedStateSpace, exact: DelayedStateSpace | DelaySystem, reverse: bool | None = None
+    exact: DelayedStateSpace | DelaySystem, reverse: bool | None = None
 ) -> tuple[float, float]:
-    """Ultimate gain and period of `exact`; its sampled form `plant` has the sign of its gain.
+    """Ultimate gain and period of a plant.
 
     Raises
     ------
     UnsuitableSystemError
     """
-    falls = reverse
-    if falls is None:
-        falls = bool(np.real(plant.step(plant.delay + SETTLED)[-1]) < 0)
-    gain, period = _crossing(exact, -1.0 if falls else 1.0)
+    sign = open_loop(exact).sign() if reverse is None else 1.0 - 2.0 * reverse
+    gain, period = _crossing(exact, sign)
     if not np.isfinite(gain):
         raise UnsuitableSystemError(
             "the phase of the plant never reaches -180 deg: it has no ultimate gain"

@@ -29,7 +29,7 @@ _CONVERGED = 1e-14
 """Predicted decrease over the sum of squares at which a fit has converged. What is d variances
 above a minimum is sqrt(d) standard errors from it: with 1000 samples, three millionths of one."""
 _TURNS, _MOST_CELLS = 40, 8  # at most: steps in a cell between two samples, and cells
-_MOST_HESSIANS, _HESSIANS_TO_A_LEVEL = 4, 4
+_MOST_HESSIANS, _HESSIANS_TO_A_LEVEL = 12, 4
 """In a cell, and on the way to a level. From a nearer point, after a step of regula falsi, a level
 is met with fewer: with 12 a record took 11 instead of 8 s, and no end of 76 records changed."""
 _KEPT = 0.1

@@ -134,7 +134,8 @@ def smallest_on_line(
     values = [function(float(x)) for x in grid]
     best = int(np.argmin(values))
     a, b = np.log(grid[max(best - 1, 0)]), np.log(grid[min(best + 1, points - 1)])
-    at, value, *_ = fminbound(
-        lambda x: function(float(np.exp(x))), a, b, xtol=1e-4, full_output=True, disp=0
-    )
+    with np.errstate(invalid="ignore"):  # values may be infinite
+        at, value, *_ = fminbound(
+            lambda x: function(float(np.exp(x))), a, b, xtol=1e-4, full_output=True, disp=0
+        )
     return float(np.exp(at)), float(value)
