@@ -239,8 +239,9 @@ def closed_loop_plot(
         axes[0].set_ylabel("measured value")
         axes[2].set(ylabel="controller output", xlabel=f"time [{unit}]")
         axes[3].set_xlabel(f"time [{unit}]")
-        # The set-point response ends at the set-point: the corner below it is free.
-        return style.finished(axes, drawn, columns=2, loc="lower right")
+        # The corner below the end of the set-point response is free; a given figure may be small.
+        where, loc = (0, "lower right") if ax is None else (1, "above")
+        return style.finished(axes, drawn, columns=2, legends=(where,), loc=loc)
 
 
 def _draw_others(
@@ -271,8 +272,8 @@ def _draw_others(
     if inside:
         for where, signals in zip(axes, zip(*inside, strict=True), strict=True):
             low, high = np.min(signals, axis=0), np.max(signals, axis=0)
-            label = "models that fit as well" if where is axes[0] else None
-            where.fill_between(time, low, high, color=style.BAND, alpha=0.35, lw=0, label=label)
+            looks = {"color": style.BAND, "alpha": 0.35, "lw": 0}
+            where.fill_between(time, low, high, label="models that fit as well", **looks)
 
 
 def _linear(controller: Any) -> Any:

@@ -199,8 +199,8 @@ def continuous_performance(
             f"the loop has not settled after {end / 2:g} s; its errors are those up to this time",
             ModelWarning,
         )
-    trapezoidal = np.convolve(np.diff(times), [0.5, 0.5])
-    return measured(setpoint, load, times, trapezoidal)
+    # with the weights of the trapezoidal rule
+    return measured(setpoint, load, times, np.convolve(np.diff(times), [0.5, 0.5]))
 
 
 def plant_time(plant: DelayedStateSpace | DelaySystem) -> float:
