@@ -113,6 +113,17 @@ def test_a_lag_of_hundreds_of_records_is_an_integrator():
     assert 0.09 < low <= 0.1 <= high < 0.11
 
 
+def test_a_dead_time_beside_an_integrator_has_both_of_its_ends():
+    # a direction in which nothing changes shortened the steps in all others: 5.886 to 5.976 for 6
+    plant = relay.plant("integrating", 0.14, 0.0, 1.0)
+    record = bench.relay_test(plant, relay.AMPLITUDE, 3, hysteresis=0.42, bias=3.0, cycles=6)
+    fit = cr.identify(record).fit
+    low, high = fit.interval
+    assert low <= plant.truth.dead_time <= high
+    # Cramer-Rao bound of rate, lag, dead time and level in that noise: 0.034 s
+    assert high - low > 2 * 1.96 * 0.034
+
+
 def test_in_a_drift_a_relay_is_fitted_as_a_controller():
     # as an open loop a state-space model of the drift was chosen, and the gain 55 % off
     plant = relay.plant("a quarter of a lag", 0.09, 1.38, 1000.0)

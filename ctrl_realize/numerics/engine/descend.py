@@ -200,8 +200,15 @@ def _step(
     excess = np.maximum(np.abs(step[:, 1:]).max(axis=1, initial=0.0) / _LONGEST_STEP, 1.0)
     step = step / excess[:, None]
     change = np.einsum("bmp,bp->bm", columns, step)
-    predicted = np.einsum("bm,bm->b", change, 2 * residual - change)
-    return step, np.maximum(predicted, 0.0)
+    predicted = np.maximum(np.einsum("bm,bm->b", change, 2 * residual - change), 0.0)
+    long = np.flatnonzero(excess > 1.0)
+    if long.size:
+        # A direction in which the misfit is flat would shorten the step in all others.
+        others = free[long] & (np.abs(step[long]) < _LONGEST_STEP)
+        held, gained = _step(residual[long], jacobian[long], others, damping[long])
+        more = gained > predicted[long]
+        step[long[more]], predicted[long[more]] = held[more], gained[more]
+    return step, predicted
 
 
 def cell(

@@ -36,7 +36,7 @@ from scipy.interpolate import PchipInterpolator
 
 from ...arrays import FloatArray
 from ...constants import CHI2_95, SMALLEST
-from ...engine.eliminate import evaluate
+from ...engine.eliminate import eliminate, evaluate
 from ...engine.plausible_models import CALIBRATED, PlausibleDraw
 from ...engine.problem import Structure
 from ...engine.profile import (
@@ -255,7 +255,7 @@ def _profiles(fits: WindowFit, fitted: Sequence[Candidate]) -> list[Points]:
     """Best models with given dead times, the same for every number of lags.
 
     A further lag that vanishes at the minimum has no grid of its own. Every profile starts from
-    that of fewer lags and from its minimum.
+    its minimum or from that of fewer lags, by what is closer at each dead time.
     """
     setting = fits.problem, fits.variance, fits.scales
     grids = [profile_grid(setting[0], one, *setting[1:]) for one in fitted]
@@ -266,8 +266,11 @@ def _profiles(fits: WindowFit, fitted: Sequence[Candidate]) -> list[Points]:
         if found and starts.shape[1] > found[-1][float(grid[0])].parameters.size:
             fewer = np.stack([found[-1][float(at)].parameters for at in grid])
             more = np.arange(1, starts.shape[1] - fewer.shape[1] + 1)
-            starts = np.hstack([fewer, fewer[:, -1:] + np.log(_SHORTER) * more])
-            starts[grid == one.dead_time] = one.parameters
+            nested = np.hstack([fewer, fewer[:, -1:] + np.log(_SHORTER) * more])
+            starts[:, 0] = grid
+            tried = eliminate(setting[0], one.structure, np.vstack([starts, nested])).cost
+            closer = tried[grid.size :] < tried[: grid.size]
+            starts[closer] = nested[closer]
         starts[:, 0] = grid
         found.append(profile_points(setting[0], one, *setting[1:], starts))
     return found
