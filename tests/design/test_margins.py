@@ -282,3 +282,13 @@ def test_the_first_crossover_of_a_dead_time_far_longer_than_the_lag_is_found():
         plant = ct.tf(model.transfer_function()) * cr.delay(unit)
         found = cr.design.margins(plant)
         assert found.phase_crossovers[0] * unit == pytest.approx(np.pi / (1 + 1e-5), rel=1e-8)
+
+
+@pytest.mark.parametrize(("dead_time", "stable"), [(0.1, False), (0.108, True), (1.5035, False)])
+def test_a_resonance_far_above_the_other_gain_is_counted(dead_time, stable):
+    # 0.003 below the resonance, -1.5j at it: towards -1 if 210 tau is pi / 2 and whole turns
+    core = ct.tf([0.003 * 210**2], [1, 2e-3 * 210, 210**2]) * ct.tf([1], [1e-4, 1])
+    plant = core * cr.delay(dead_time)
+    assert ct.feedback(plant).is_stable() is stable
+    assert cr.design.margins(plant).stable is stable
+    assert cr.design.margins(core, dead_time=dead_time).stable is stable

@@ -121,7 +121,8 @@ class Loop:
         low = self._low_end(1e-3 * slowest)
         if self.dt:
             return frequency_grid(low, top, features, dead_time)
-        top = self._high_end(1e3 * float(sizes.max(initial=slowest)), dead_time)
+        top = 20 / dead_time if dead_time else 1e3 * float(sizes.max(initial=slowest))
+        top = self._end(top, sizes)
         return frequency_grid(low, top, features, dead_time)
 
     def _low_end(self, low: float) -> float:
@@ -136,15 +137,11 @@ class Loop:
                     break
         return low
 
-    def _high_end(self, top: float, dead_time: float) -> float:
-        if dead_time == 0:
-            return max(top, self._below(top))
-        return max(self._below(top * 1e-6), 20 / dead_time)
-
-    def _below(self, top: float) -> float:
-        # A strictly proper loop ends where its gain stays small.
+    def _end(self, top: float, sizes: FloatArray) -> float:
+        # A strictly proper loop ends where its gain stays small, also at the features beyond.
         for _ in range(60):
-            gains = np.abs(self.delay_free(top * np.geomspace(1, 1e3, 30)))
+            at = np.concatenate([top * np.geomspace(1, 1e3, 30), sizes[sizes > top]])
+            gains = np.abs(self.delay_free(at))
             if gains.max() < 0.05 or np.ptp(gains) < 1e-3 * gains.max():
                 break
             top *= 2
