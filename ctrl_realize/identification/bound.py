@@ -12,7 +12,7 @@ References
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal, NamedTuple, TypeAlias
 
 import numpy as np
@@ -83,20 +83,30 @@ class Bound:
         found = local_errors(problem, there, numerator, signal.size * self.dt)
         return found.slopes, found.own
 
+    @property
+    def point(self) -> FloatArray:
+        """Dead time, pole parameters and numerator (p,), without those of an integrator."""
+        theta, numerator, _ = self._parts(1)
+        return np.concatenate([theta, numerator])
+
+    def at(self, point: FloatArray) -> Bound:
+        """The same structure with other parameters (p,)."""
+        split = 1 + np.count_nonzero(self.model.poles)
+        poles = poles_from_parameters(point[None, 1:split])[0][0]
+        poles = np.append(poles, self.model.poles[self.model.poles == 0])
+        return replace(self, model=PlausibleModel(float(point[0]), poles, point[split:]))
+
     def gradient(self, wanted: Sequence[Wanted]) -> FloatArray:
         """Derivatives (k, p) of quantities by dead time, pole parameters and numerator."""
-        theta, numerator, known = self._parts(1)
+        theta, numerator, _ = self._parts(1)
         value = quantities(self.model, self.dt, wanted)
-
-        def at(point: FloatArray) -> FloatArray:
-            poles = poles_from_parameters(point[None, 1 : theta.size])[0][0]
-            poles = np.append(poles, np.zeros(known.poles.size))
-            return value(PlausibleModel(float(point[0]), poles, point[theta.size :]))
-
         there = Candidate(Structure(theta.size - 1, theta.size - numerator.size), theta, 0.0)
-        steps = parameter_steps(there, numerator, self.dt)
-        point = np.concatenate([theta, numerator])
-        return np.stack([(at(point + s) - at(point - s)) / (2 * s.sum()) for s in steps], axis=1)
+        steps, point = parameter_steps(there, numerator, self.dt), self.point
+        ends = [(value(self.at(point + s).model), value(self.at(point - s).model)) for s in steps]
+        apart = [
+            (above - below) / (2 * s.sum()) for (above, below), s in zip(ends, steps, strict=True)
+        ]
+        return np.stack(apart, axis=1)
 
     def _drive(self, signal: FloatArray) -> SampledInput:
         return SampledInput(signal - signal[0], self.dt)

@@ -2,7 +2,8 @@
 
 The models are those of the output-error fit, each of the output without the responses to the other
 inputs, in turn until nothing changes: Gauss-Seidel iterations of the common least-squares problem
-[1]_. Each interval then holds for the other models as they are; it is widened by what the other
+[1]_. These are slow where inputs move alike: after the first turns all parameters are fitted
+together. Each interval then holds for the other models as they are; it is widened by what the other
 parameters leave open, from the information matrix of all [2]_.
 
 References
@@ -18,7 +19,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from scipy.signal import lfilter
@@ -28,14 +29,14 @@ from ..data.given import as_records
 from ..data.shown_units import in_shown_units
 from ..delayed import DelayedStateSpace, fit_of
 from ..errors import DataError, DataWarning
-from ..numerics.arrays import FloatArray
+from ..numerics.arrays import BoolArray, FloatArray
 from ..numerics.blas_threads import single_threaded
-from ..numerics.engine.plausible_models import PlausibleModel
-from .bound import Bound
+from ..numerics.constants import SMALLEST
 from .impulse.from_io import impulse_from_io
 from .output_error.fit import fit_output_error, model_alone
 from .output_error.result import OutputErrorFit
 from .output_error.summary import fitted_model
+from .several_inputs_joint import bounds_of, fitted_together, of_step, own_columns, prescribed
 from .several_inputs_result import SeveralInputsFit
 
 if TYPE_CHECKING:
@@ -93,12 +94,12 @@ def fit_several_inputs(
     responses = _starting(record)
     systems: list[DelayedStateSpace] = []
     asked: list[Any] = [structures] * len(inputs)
-    cycle, settled = 0, False
+    cycle, settled, earlier = 0, False, np.zeros(output.size)
     while cycle < MOST_CYCLES:
         cycle, moved, found = cycle + 1, 0.0, []
         # the last turn, once settled, chooses structures again and finds the intervals
         for i in range(len(inputs)):
-            left = output - (responses.sum(axis=0) - responses[i])
+            left = output - earlier - (responses.sum(axis=0) - responses[i])
             fit_one = fit_output_error if settled or cycle == MOST_CYCLES else model_alone
             system = _one(record, i, left, fit_one, structures if settled else asked[i], options)
             response = system.simulate(inputs[i] - inputs[i, 0])
@@ -110,10 +111,15 @@ def fit_several_inputs(
         if settled:
             break
         settled = moved < _SETTLED
+        fits = [fit_of(system, OutputErrorFit) for system in systems]
+        if not settled and cycle < MOST_CYCLES // 2 and not any(map(prescribed, fits)):
+            responses, earlier = fitted_together(fits, record)
     if record.irregular:
         systems = [_sampled(system, record.sample_time) for system in systems]
-    fits = _wider([fit_of(system, OutputErrorFit) for system in systems], record)
-    result = SeveralInputsFit(fits, (record,), responses, cycle, settled)
+    fits = [fit_of(system, OutputErrorFit) for system in systems]
+    result = SeveralInputsFit(
+        _wider(fits, record, ~np.isnan(output - earlier)), (record,), responses, cycle, settled
+    )
     return _joined(systems, result)
 
 
@@ -125,19 +131,31 @@ def _checked(records: tuple[Record, ...]) -> Record:
             "outputs; process models of several inputs need one record with one output. Without "
             "structures= all channels are fitted by fit_state_space"
         )
+    moves = np.diff(record.input)
+    size = np.maximum(np.abs(moves).max(axis=1, keepdims=True), SMALLEST)
+    if np.linalg.matrix_rank(moves / size) < np.count_nonzero(moves.any(axis=1)):
+        raise DataError(
+            f"the inputs {', '.join(record.input_labels)} move alike: the responses to them "
+            "cannot be told apart; expected inputs that also move on their own"
+        )
     return record
 
 
 def _starting(record: Record) -> FloatArray:
     """Responses (m, N) of finite impulse responses to each input."""
     even = record.at_equal_distances()
-    inputs = np.atleast_2d(even.input)
+    inputs, output = np.atleast_2d(even.input), np.ravel(even.output)
+
+    def found(start: Literal["rest", "unknown"]) -> FloatArray:
+        markov = impulse_from_io(even, method="regularized", start=start).markov[0]
+        pairs = zip(markov, inputs, strict=True)
+        return np.array([lfilter(h, [1.0], u - u[0]) for h, u in pairs])
+
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", DataWarning)  # a start need not be exact
-        markov = impulse_from_io(even, method="regularized").markov[0]
-    pairs = zip(markov, inputs, strict=True)
-    found = (lfilter(h, [1.0], u - u[0]) for h, u in pairs)
-    return np.array([np.interp(record.time, even.time, one) for one in found])
+        both = [found("unknown"), found("rest")]
+    best = min(both, key=lambda one: float(np.nanstd(output - one.sum(axis=0))))
+    return np.array([np.interp(record.time, even.time, one) for one in best])
 
 
 def _one(
@@ -148,8 +166,9 @@ def _one(
     units = {label: unit for label, unit in record.units.items() if label in (name, "time")}
     units |= {k: record.units[k] for k in record.output_labels if k in record.units}
     one = Record(
-        record.time, np.atleast_2d(record.input)[i], left, name=f"{record.name}, input {name}",
-        units=units, input_labels=[name], output_labels=list(record.output_labels), missing="keep",
+        record.time, np.atleast_2d(record.input)[i], left, units=units,
+        name=", ".join(filter(None, [record.name, f"input {name}"])),
+        input_labels=[name], output_labels=list(record.output_labels), missing="keep",
     )  # fmt: skip
     try:
         return fit_one(one, structures=structures, **options)
@@ -169,21 +188,19 @@ def _kept(fit: OutputErrorFit, structures: Structures | None) -> Any:
     return structures if fit.estimate.process.form is not None else [fit.structure]
 
 
-def _wider(fits: list[OutputErrorFit], record: Record) -> tuple[OutputErrorFit, ...]:
+def _wider(
+    fits: list[OutputErrorFit], record: Record, seen: BoolArray
+) -> tuple[OutputErrorFit, ...]:
     """Widen the intervals from those with the other models known to those with all estimated."""
-    bounds = [
-        Bound(PlausibleModel(fit.dead_time, fit.poles, fit.estimate.numerator), fit.data.dt)
-        for fit in fits
-    ]
+    bounds = bounds_of(fits)
     inputs = np.atleast_2d(record.input)
     tangents = [bound.slopes(u)[0] for bound, u in zip(bounds, inputs, strict=True)]
-    seen = ~np.isnan(np.ravel(record.output))
-    time = record.time - record.time[0]
-    local = np.stack([np.ones_like(time), time / max(float(time[-1]), 1e-300)], axis=1)
+    clock, at_rest = (record.time - record.time[0])[seen], all(map(of_step, fits))
+    every = [own_columns(fit, clock, at_rest) for fit in fits]
     found = []
     for i, fit in enumerate(fits):
-        own = np.column_stack([tangents[i], local])[seen]
-        others = np.column_stack([tangents[j] for j in range(len(fits)) if j != i])[seen]
+        own = np.column_stack([tangents[i][seen], own_columns(fit, clock, of_step(fit))])
+        others = np.column_stack([*(t[seen] for t in tangents[:i] + tangents[i + 1 :]), *every])
         weights = np.zeros(own.shape[1])
         weights[0] = 1.0
         factor = _ratio(own, others, weights)

@@ -69,3 +69,33 @@ def test_records_that_it_is_not_for_are_refused():
         cr.identify([data, data], structures="FOPDT")
     with pytest.raises(cr.errors.DataError, match="leave the input 'load' out of the record"):
         cr.identify(record(0, acting=("valve",)), structures="FOPDT")
+    alike = cr.Record(T, [data.input[0], 3 - 2 * data.input[0]], data.output)
+    with pytest.raises(cr.errors.DataError, match="move alike"):
+        cr.identify(alike, structures="FOPDT")
+
+
+@pytest.mark.parametrize("structure", ["FOPDT", "P1"])
+def test_the_second_step_may_come_before_the_first_response_is_over(structure):
+    u = np.stack([1.0 * (T > 20), 1.0 * (T > 45)])
+    y = 0.005 * np.random.default_rng(2).standard_normal(T.size)
+    waits = structure == "FOPDT"
+    for signal, (gain, lag, dead_time) in zip(u, PLANTS.values(), strict=True):
+        late = np.clip(T - T[np.argmax(signal)] - dead_time * waits, 0, None)
+        y += gain * -np.expm1(-late / lag)
+    fit = cr.identify(cr.Record(T, u, y), structures=structure).fit
+    for one, (gain, _, dead_time) in zip(fit.fits, PLANTS.values(), strict=True):
+        # four of a standard error of 0.6 % of the gain
+        assert one.gain == pytest.approx(gain, rel=0.025)
+        assert one.dead_time == pytest.approx(dead_time * waits, abs=0.3)
+    assert fit.converged
+    assert not fit.flags
+
+
+def test_a_record_of_operation_begins_with_responses_to_earlier_inputs():
+    long = record(3)
+    part = cr.Record(T[:250], long.input[:, 150:], long.output[150:])
+    fit = cr.identify(part, structures="FOPDT").fit
+    assert fit.residual_std == pytest.approx(0.1, rel=0.1)
+    for one, (gain, _, dead_time) in zip(fit.fits, PLANTS.values(), strict=True):
+        assert one.gain_interval[0] <= gain <= one.gain_interval[1]
+        assert one.interval[0] <= dead_time <= one.interval[1]

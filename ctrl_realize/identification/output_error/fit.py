@@ -287,7 +287,7 @@ def model_alone(
 ) -> DelayedStateSpace:
     """Fit a record without checks, and without structures that were not requested."""
     tried = replace(_requested((record,), structures, max_delay, noise), compared=False)
-    result = _linear((record,), tried, own_gains=False, may_clip=True)
+    result = _linear((record,), tried, own_gains=False, may_clip=True, refuses=False)
     return fitted_model(result)
 
 
