@@ -51,7 +51,8 @@ def process_fit(
     Parameters
     ----------
     fits : WindowFit
-        Fit of the structures of the forms, without their prescriptions.
+        Fit of the structures of the forms, without their prescriptions; those that it leaves out,
+        as they are not at noise level, are no alternatives.
     forms : sequence of ProcessForm
     is_noise : callable
     others : Compared
@@ -59,6 +60,7 @@ def process_fit(
     near
         As for `likelihood_fit`.
     """
+    forms = tuple(form for form in forms if form.structure in fits.candidates)
     adequate = is_noise(fits.normalized_rms, fits.correlation)
     if all(form.admits(fits.candidates[form.structure], fits.scales.length) for form in forms):
         found = likelihood_fit(fits, adequate=adequate, near=near)

@@ -6,6 +6,7 @@ import control as ct
 import numpy as np
 import pytest
 from scipy.optimize import curve_fit
+from scipy.signal import lfilter
 
 import ctrl_realize as cr
 from benchmarks.acceptance.cases import PLANTS, made
@@ -111,6 +112,16 @@ def test_the_best_of_several_forms_is_chosen():
         line.delta_bic for line in fit.structures
     )
     assert len(fit.structures) == 3
+
+
+def test_one_of_several_forms_may_be_the_only_one_at_noise_level():
+    t = np.arange(200.0)
+    late = np.clip(t - 65.3, 0, None)
+    y = 2 * (1 - (20 * np.exp(-late / 20) - 3 * np.exp(-late / 3)) / 17)
+    slow = lfilter([1.0], [1.0, -0.9], 0.1 * np.random.default_rng(4).standard_normal(t.size))
+    fit = cr.identify(cr.Record(t, 1.0 * (t > 60), y + slow), structures=["P1D", "P2D", "P2DZ"]).fit
+    assert fit.residual_std == pytest.approx(np.std(slow), rel=0.1)
+    assert fit.gain_interval[0] <= 2 <= fit.gain_interval[1]
 
 
 def test_names_serve_moving_inputs_too():
