@@ -124,7 +124,10 @@ def _delay(system: DelayedStateSpace) -> int:
 def _gain(
     fit: OutputErrorFit, records: Sequence[Record], left: Residuals | None, found: Outcome
 ) -> float:
-    """Difference of the information criteria, lags minus state space."""
+    """Difference of the information criteria, lags minus state space.
+
+    Every record has a noise of its own, as in the fit of lags.
+    """
     if left is None:
         return float("inf")
     modes = found.fit
@@ -135,7 +138,11 @@ def _gain(
     other = 2 * modes.order + modes.feedthrough + 1 + starts * modes.order
     theirs = _residuals(_checks(found.system, records))
     fewer = (lags - other) * float(np.log(samples))
-    return float(coloured_criterion(left)[0] - coloured_criterion(theirs)[0] + fewer)
+    better = (
+        coloured_criterion([of_lags])[0] - coloured_criterion([of_states])[0]
+        for of_lags, of_states in zip(left, theirs, strict=True)
+    )
+    return float(sum(better) + fewer)
 
 
 def _chosen(

@@ -131,6 +131,19 @@ def test_an_input_of_more_than_twelve_edges_is_any_input(edges, stepped):
 # --- several records
 
 
+def test_a_record_in_noise_does_not_choose_the_class_of_the_model():
+    core = ct.tf([2.0], np.polymul([1.2, 1.0], [0.3, 1.0]))
+    plant = cr.delayed_ss(core, dead_time=0.43, dt=DT)
+    records = []
+    for levels, seed, noise in ((0, 1, 0.0005), (5, 2, 2.0)):  # 2.0: louder than the response
+        u = np.repeat(np.random.default_rng(levels).choice([-1.0, 1.0], 40), 10)
+        y = plant.simulate(u - u[0]) + noise * np.random.default_rng(seed).standard_normal(u.size)
+        records.append(cr.Record(DT * np.arange(u.size), u, y))
+    fit = cr.identify(records).fit
+    assert fit.interval[0] <= 0.43 <= fit.interval[1]
+    assert fit.interval[1] - fit.interval[0] < 0.1  # 0.02 of the clear record alone
+
+
 def test_a_record_that_comes_late_is_named_and_does_not_move_the_mean():
     records = [lag_record(k, name=f"r{k}") for k in range(4)]
     alone = cr.fit_output_error(records, **ONE).fit
