@@ -156,3 +156,11 @@ def test_itae_rules_are_refused_outside_the_ratios_that_they_were_fitted_to():
     for rule in ("chr_load_0", "itae_load"):
         with pytest.raises(UnsuitableSystemError, match="integrating"):
             design.pid(INTEGRATOR, rule)
+
+
+def test_the_ultimate_gain_has_its_closed_form_in_every_unit_of_time():
+    for dead_time in (1e-6, 1.0, 1e8):  # pi / (2 k L) and 4 L of k exp(-L s) / s
+        model = design.ProcessModel(1.0, 0.0, dead_time, integrating=True)
+        found = design.ultimate(model)
+        assert found.gain * dead_time == pytest.approx(np.pi / 2, rel=1e-9)
+        assert found.period == pytest.approx(4 * dead_time, rel=1e-9)

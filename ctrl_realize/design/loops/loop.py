@@ -52,6 +52,11 @@ class Loop:
         """Pure delay in s."""
         return self.dead_time + self.dt * sum(part.delay for part in self.factors)
 
+    @property
+    def turn_time(self) -> float:
+        """Delay in s, with those inside of the factors."""
+        return self.delay + sum(part.hidden_delay for part in self.factors) * (self.dt or 1.0)
+
     def delay_free(self, omega: FloatArray) -> ComplexArray:
         """Response without the pure delay."""
         w = self.variable(omega)
@@ -88,7 +93,7 @@ class Loop:
     @cached_property
     def rate(self) -> float:
         """Fastest rate of a continuous loop in rad/s: the scale of the distance to the axis."""
-        dead_time = self.delay + sum(part.hidden_delay for part in self.factors)
+        dead_time = self.turn_time
         sizes = [float(np.abs(part.features).max(initial=0.0)) for part in self.factors]
         return max([*sizes, 1 / dead_time if dead_time else 0.0]) or 1.0
 
@@ -106,24 +111,25 @@ class Loop:
     def sign(self) -> float:
         """Sign of the static gain, or of the slope of an integrating loop."""
         count = self.integrators()
-        slow = self(self.grid()[:1] if count else np.zeros(1))[0]
+        slow = self(np.array([self._start() if count else 0.0]))[0]
         return -1.0 if (1j**count * slow).real < 0 else 1.0
 
     def grid(self) -> FloatArray:
         """Frequencies from far below the slowest pole up to the end, for following the loop."""
         features = np.concatenate([part.features for part in self.factors])
-        sizes = np.abs(features)
-        sizes = sizes[sizes > 1e-9 * max(sizes.max(initial=0.0), 1e-300)]
-        hidden = sum(part.hidden_delay for part in self.factors) * (self.dt or 1.0)
-        dead_time = self.delay + hidden
-        top = np.pi / self.dt if self.dt else 1.0
-        slowest = float(sizes.min(initial=1 / dead_time if dead_time else top))
-        low = self._low_end(1e-3 * slowest)
         if self.dt:
-            return frequency_grid(low, top, features, dead_time)
-        top = 20 / dead_time if dead_time else 1e3 * float(sizes.max(initial=slowest))
-        top = self._end(top, sizes)
-        return frequency_grid(low, top, features, dead_time)
+            return frequency_grid(self._start(), np.pi / self.dt, features, self.turn_time)
+        sizes, dead_time = self._sizes(), self.turn_time
+        top = 20 / dead_time if dead_time else 1e3 * (sizes.max(initial=0.0) or 1.0)
+        return frequency_grid(self._start(), self._end(top, sizes), features, dead_time)
+
+    def _sizes(self) -> FloatArray:
+        sizes = np.abs(np.concatenate([part.features for part in self.factors]))
+        return np.asarray(sizes[sizes > 1e-9 * max(sizes.max(initial=0.0), 1e-300)])
+
+    def _start(self) -> float:
+        slowest = 1 / self.turn_time if self.turn_time else np.pi / self.dt if self.dt else 1.0
+        return self._low_end(1e-3 * float(self._sizes().min(initial=slowest)))
 
     def _low_end(self, low: float) -> float:
         # An integrating loop must start above gain 1, however slow it is. If the gain does not

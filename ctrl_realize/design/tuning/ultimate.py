@@ -179,8 +179,11 @@ def critical_point(
 
 def _crossing(system: Any, sign: float) -> tuple[float, float]:
     """Gain and period of the phase crossover with the smallest gain margin, of those that swing."""
-    found = loop_margins(open_loop(system, sign))
-    gains = np.where(found.phase_crossovers > 0, found.gain_margins, np.inf)
+    loop = open_loop(system)
+    # near 1 where the dead time turns: a loop of far too high a gain has countless poles to count
+    gain = 1 / abs(loop(np.array([1 / loop.turn_time]))[0]) if loop.turn_time else 1.0
+    found = loop_margins(open_loop(system, sign * gain))
+    gains = np.where(found.phase_crossovers > 0, gain * found.gain_margins, np.inf)
     if np.isinf(gains).all():
         return sign * np.inf, 0.0
     at = int(np.argmin(gains))
