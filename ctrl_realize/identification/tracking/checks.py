@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import control as ct
 import numpy as np
 
@@ -12,6 +14,8 @@ from ...delayed import DelayedStateSpace
 from ...delayed.parts import check_entries
 from ...errors import DataError, DelayRangeError, OptionError, UnsuitableSystemError
 from ...numerics.constants import LARGEST
+from ..output_error.result import OutputErrorFit
+from ..output_error.summary import fitted_model
 
 LONGEST = 1e12
 """Upper limit of the forgetting time in samples; beyond it, single samples are lost in rounding."""
@@ -52,8 +56,15 @@ def model_noise(model: ct.StateSpace, given: float | None) -> float:
 
 
 def starting_core(model: ct.StateSpace) -> ct.StateSpace:
-    """Return a model without its delay, if it can be simulated."""
+    """Return a model without its delay, if it can be simulated.
+
+    The core of a model whose dead time is no whole number of samples is early by part of a sample,
+    and the delays that are tracked would be late by that.
+    """
     core = model.delay_free if isinstance(model, DelayedStateSpace) else model
+    if isinstance(model, DelayedStateSpace) and isinstance(model.fit, OutputErrorFit):
+        without = replace(model.fit, estimate=replace(model.fit.estimate, dead_time=0.0))
+        core = fitted_model(without).delay_free
     if not isinstance(core, ct.StateSpace) or not core.issiso():
         raise UnsuitableSystemError("the initial model must have one input and one output")
     if not core.isdtime(strict=True) or core.dt is True:

@@ -70,6 +70,19 @@ def test_a_delay_at_rest_is_known_as_well_as_weighted_samples_can_tell_it():
     assert np.mean(limits) < 0.05  # samples
 
 
+def test_a_model_with_part_of_a_sample_of_dead_time_tracks_the_whole_dead_time():
+    u = np.repeat(np.random.default_rng(0).choice([-1.0, 1.0], 150), 10)
+    y = cr.delayed_ss(ct.tf([2.0], [8.0, 1.0]), dead_time=5.3, dt=1.0).simulate(u)
+    y = y + 0.02 * np.random.default_rng(1).standard_normal(u.size)
+    record = cr.Record(np.arange(u.size) * 1.0, u, y)
+    model = cr.identify(record[0:999], structures="FOPDT")
+    assert model.fit.dead_time == pytest.approx(5.3, abs=0.1)
+    track = cr.DelayTracker(model, max_delay=20, forgetting_time=300.0).track(record)
+    assert np.median(track.dead_time) == pytest.approx(5.3, abs=0.3)  # parabola through samples
+    told = track.resolved
+    assert np.mean((track.low[told] <= 5.3) & (track.high[told] >= 5.3)) > 0.95
+
+
 def test_gain_is_followed_with_the_delay():
     record, _ = worn_valve(seconds=25, gain=0.8)
     bank = tracker()
