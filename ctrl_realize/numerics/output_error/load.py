@@ -125,7 +125,9 @@ def load_of(
     rise = float(data.clock[min(stop_at(loaded, 0.63), data.rows.size - 1)] - edges[0])
     since = load.time - float(edges[edges <= load.time].max())
     early = since < _TOLD_APART * rise
-    if since < _SOONEST * rise or load.lag > _MOST_LAG * (data.clock[-1] - load.time):
+    # Several poles are those of the plant, through which a load may come however slow it is.
+    slowest = load.lag / abs(load.poles[0]) if load.poles.size == 1 else 0.0
+    if since < _SOONEST * rise or slowest > _MOST_LAG * (data.clock[-1] - load.time):
         return None
     also = refit(loaded, data.output.size, tuple(fits.candidates))
     error = also.residual(also.best)

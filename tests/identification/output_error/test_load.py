@@ -53,6 +53,14 @@ def test_a_late_load_is_told_and_taken_out_of_the_gain(size, lags):
     assert fit.interval[0] <= DEAD_TIME <= fit.interval[1]
 
 
+def test_a_load_whose_response_has_only_begun_at_the_end_is_told():
+    # the time to 63 % of its response is longer than what is left: it was a gain of 746000
+    fit = cr.identify(record(11, TIME[-1] - 0.5 * RISE, 0.8, LAGS)).fit
+    assert len(told(fit)) == 1
+    assert fit.gain_interval[0] <= GAIN <= fit.gain_interval[1]
+    assert fit.gain == pytest.approx(GAIN, rel=0.01)
+
+
 def test_a_load_soon_after_the_step_leaves_the_gain_open():
     system = cr.identify(record(11, STEP + 1.6 * RISE, 0.3))
     assert len(told(system.fit)) == 1
