@@ -102,11 +102,11 @@ class Bound:
         value = quantities(self.model, self.dt, wanted)
         there = Candidate(Structure(theta.size - 1, theta.size - numerator.size), theta, 0.0)
         steps, point = parameter_steps(there, numerator, self.dt), self.point
-        ends = [(value(self.at(point + s).model), value(self.at(point - s).model)) for s in steps]
-        apart = [
-            (above - below) / (2 * s.sum()) for (above, below), s in zip(ends, steps, strict=True)
-        ]
-        return np.stack(apart, axis=1)
+
+        def at(moved: FloatArray) -> FloatArray:
+            return value(self.at(moved).model)
+
+        return np.stack([(at(point + s) - at(point - s)) / (2 * s.sum()) for s in steps], axis=1)
 
     def _drive(self, signal: FloatArray) -> SampledInput:
         return SampledInput(signal - signal[0], self.dt)

@@ -19,6 +19,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import reduce
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
@@ -96,7 +97,7 @@ def fit_several_inputs(
     asked: list[Any] = [structures] * len(inputs)
     cycle, settled, earlier = 0, False, np.zeros(output.size)
     while cycle < MOST_CYCLES:
-        cycle, moved, found = cycle + 1, 0.0, []
+        cycle, moved, systems = cycle + 1, 0.0, []
         # the last turn, once settled, chooses structures again and finds the intervals
         for i in range(len(inputs)):
             left = output - earlier - (responses.sum(axis=0) - responses[i])
@@ -105,9 +106,9 @@ def fit_several_inputs(
             response = system.simulate(inputs[i] - inputs[i, 0])
             fit = fit_of(system, OutputErrorFit)
             moved = max(moved, float(np.std(response - responses[i])) / fit.residual_std)
-            responses[i], asked[i] = response, _kept(fit, structures)
-            found.append(system)
-        systems = found
+            responses[i] = response
+            asked[i] = structures if fit.estimate.process.form is not None else [fit.structure]
+            systems.append(system)
         if settled:
             break
         settled = moved < _SETTLED
@@ -163,8 +164,7 @@ def _one(
     structures: Any, options: dict[str, Any],
 ) -> DelayedStateSpace:  # fmt: skip
     name = record.input_labels[i]
-    units = {label: unit for label, unit in record.units.items() if label in (name, "time")}
-    units |= {k: record.units[k] for k in record.output_labels if k in record.units}
+    units = {k: v for k, v in record.units.items() if k in (name, "time", *record.output_labels)}
     one = Record(
         record.time, np.atleast_2d(record.input)[i], left, units=units,
         name=", ".join(filter(None, [record.name, f"input {name}"])),
@@ -183,11 +183,6 @@ def _sampled(system: DelayedStateSpace, step: float) -> DelayedStateSpace:
     return fitted_model(fit)
 
 
-def _kept(fit: OutputErrorFit, structures: Structures | None) -> Any:
-    """Structure of the next turns: that which was chosen."""
-    return structures if fit.estimate.process.form is not None else [fit.structure]
-
-
 def _wider(
     fits: list[OutputErrorFit], record: Record, seen: BoolArray
 ) -> tuple[OutputErrorFit, ...]:
@@ -201,18 +196,14 @@ def _wider(
     for i, fit in enumerate(fits):
         own = np.column_stack([tangents[i][seen], own_columns(fit, clock, of_step(fit))])
         others = np.column_stack([*(t[seen] for t in tangents[:i] + tangents[i + 1 :]), *every])
-        weights = np.zeros(own.shape[1])
-        weights[0] = 1.0
-        factor = _ratio(own, others, weights)
+        factor = _ratio(own, others, np.ones(1))  # of the dead time, which comes first
         estimate = fit.estimate
         at = estimate.dead_time
         low = max(at - factor * (at - estimate.low), 0.0)
         high = at + factor * (estimate.high - at)
         estimate = replace(estimate, low=low, high=high, std=factor * estimate.std)
         if estimate.static is not None:
-            gains = np.zeros(own.shape[1])
-            gains[: tangents[i].shape[1]] = bounds[i].gradient(("gain",))[0]
-            more = _ratio(own, others, gains)
+            more = _ratio(own, others, bounds[i].gradient(("gain",))[0])
             static = replace(estimate.static, gain_std=more * estimate.static.gain_std)
             alike = tuple(
                 (replace(other, gain_std=more * other.gain_std), weight)
@@ -224,18 +215,16 @@ def _wider(
 
 
 def _ratio(own: FloatArray, others: FloatArray, weights: FloatArray) -> float:
-    """Standard error of a sum of own parameters with all estimated, over that with own alone."""
+    """Standard error of a sum of first parameters with all estimated, over that with own alone."""
     # the covariance is the product of the pseudo-inverse with its transpose
-    alone = np.linalg.pinv(own).T @ weights
-    together = np.linalg.pinv(np.column_stack([own, others]))[: own.shape[1]].T @ weights
+    alone = np.linalg.pinv(own)[: weights.size].T @ weights
+    together = np.linalg.pinv(np.column_stack([own, others]))[: weights.size].T @ weights
     return float(np.linalg.norm(together) / np.linalg.norm(alone))
 
 
 def _joined(systems: Sequence[DelayedStateSpace], result: SeveralInputsFit) -> DelayedStateSpace:
     """Add the responses to all inputs."""
-    whole: Any = systems[0]
-    for system in systems[1:]:
-        whole = whole.append(system)
+    whole: Any = reduce(lambda some, one: some.append(one), systems)
     total: DelayedStateSpace = np.ones((1, len(systems))) * whole
     record = result.records[0]
     return total.replace(

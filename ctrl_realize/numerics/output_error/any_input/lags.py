@@ -268,9 +268,8 @@ def _profiles(fits: WindowFit, fitted: Sequence[Candidate]) -> list[Points]:
             more = np.arange(1, starts.shape[1] - fewer.shape[1] + 1)
             nested = np.hstack([fewer, fewer[:, -1:] + np.log(_SHORTER) * more])
             starts[:, 0] = grid
-            tried = eliminate(setting[0], one.structure, np.vstack([starts, nested])).cost
-            closer = tried[grid.size :] < tried[: grid.size]
-            starts[closer] = nested[closer]
+            own, theirs = (eliminate(setting[0], one.structure, x).cost for x in (starts, nested))
+            starts = np.where((theirs < own)[:, None], nested, starts)
         starts[:, 0] = grid
         found.append(profile_points(setting[0], one, *setting[1:], starts))
     return found
