@@ -32,8 +32,9 @@ from .frf_fit import FRFFit, FRFStructure
 from .frf_structures import ComparedFits, compared_fits, key_of, residual_ratio
 from .points import FRFPoints
 
-_POOR_MISFIT = 2.0
-"""Residual over the measured noise from which a word is said."""
+_POOR_MISFIT, _MOST_LEFT = 2.0, 0.5
+"""Residual over the measured noise, and part of a response of unknown noise that is left, from
+which a word is said."""
 _SHARE = 0.1
 """Part of the dead time by which structures must disagree for a word about it: the interval covers
 all of them in any case, and some other structure nearly always widens a narrow one."""
@@ -100,6 +101,9 @@ def chosen_model(
         first, stop = largest_excess(np.abs(data.misfit(chosen)))
         band = f"{hertz(frequency[first])} and {hertz(frequency[stop - 1])}"
         flags.append(flagged("structured_misfit.frf", ratio=plainly(ratio, 2), band=band, order=n))
+    left = np.linalg.norm(data.misfit(chosen)) / np.linalg.norm(data.weight * data.response)
+    if left > _MOST_LEFT and not noise_known:
+        flags.append(flagged("structured_misfit.most", left=plainly(100 * left, 2)))
     flags.extend(_leading_phase(data, fits, chosen, unit))
     poles, pole_std = pole_deviations(data, chosen, scales[key_of(best)], robust=not noise_known)
     A, B, C, D = modal_state_space(data, chosen)
@@ -122,10 +126,7 @@ def chosen_model(
         noise_known=noise_known,
         weighted_rms=ratio,
         matrices=(
-            read_only(A * unit),
-            read_only(B * unit),
-            read_only(C * size),
-            read_only(D * size),
+            read_only(A * unit), read_only(B * unit), read_only(C * size), read_only(D * size),
         ),
         poles=locked(poles * unit),
         pole_std=read_only(pole_std * unit),
@@ -135,7 +136,7 @@ def chosen_model(
         hold_time=held,
         flags=tuple(flags),
         stated=stated,
-    )
+    )  # fmt: skip
     return delayed_ss(result.core, dead_time=used, dt=dt, fit=result, name=name)
 
 

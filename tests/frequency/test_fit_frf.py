@@ -240,6 +240,17 @@ def test_hydrophone_answers_before_its_input_and_that_is_said(shared_data):
     assert "dead time of -0.0073 µs" in str(fit.flags[0]) or "-0.00726 µs" in str(fit.flags[0])
 
 
+def test_what_an_unstable_plant_does_is_left_and_that_is_said():
+    s = 2j * np.pi * np.geomspace(1e-3, 0.25, 60)
+    frf = cr.MeasuredFRF(2 * np.exp(-3 * s) / (20 * s - 1), s.imag / (2 * np.pi))
+    flags = {flag.code: str(flag) for flag in cr.fit_frf(frf).fit.flags}
+    assert "If the plant is unstable" in flags["structured_misfit"]
+    # what a stable plant leaves in loud noise is noise
+    loud = 1 + 0.3 * np.random.default_rng(0).standard_normal(60)
+    frf = cr.MeasuredFRF(2 * np.exp(-3 * s) / (20 * s + 1) * loud, s.imag / (2 * np.pi))
+    assert "structured_misfit" not in [flag.code for flag in cr.fit_frf(frf).fit.flags]
+
+
 def test_resonances_over_three_decades_are_found_in_noise():
     """Six pairs, damping 1 %, 3 % noise: nothing tells where they are but the response."""
     f = np.geomspace(1, 1000, 300)
