@@ -103,7 +103,7 @@ def chosen_model(
         flags.append(flagged("structured_misfit.frf", ratio=plainly(ratio, 2), band=band, order=n))
     left = np.linalg.norm(data.misfit(chosen)) / np.linalg.norm(data.weight * data.response)
     if left > _MOST_LEFT and not noise_known:
-        flags.append(flagged("structured_misfit.most", left=plainly(100 * left, 2)))
+        flags.append(flagged("structured_misfit.most", left=plainly(100 * float(left), 2)))
     flags.extend(_leading_phase(data, fits, chosen, unit))
     poles, pole_std = pole_deviations(data, chosen, scales[key_of(best)], robust=not noise_known)
     A, B, C, D = modal_state_space(data, chosen)
