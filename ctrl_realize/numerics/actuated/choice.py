@@ -188,18 +188,17 @@ def _with_actuators(
     orders: Sequence[int],
     linear: Mapping[Structure, Candidate],
 ) -> list[Candidate]:
-    """Best members of every kind: one number of lags finds the actuator for all."""
+    """Best members of every kind: two lags find the actuator for all, asked for or not."""
     levels, problem = knots(records.parts), records.problem
-    first = sorted(orders)[min(1, len(orders) - 1)]
     minima = [
-        searched(problem, actuated_family(records, scales, first, kind, place, levels), linear)
+        searched(problem, actuated_family(records, scales, LAGS[1], kind, place, levels), linear)
         for kind, place in wanted
     ]
     residual = _residual(problem, [each[0] for each in minima])
     limit = 1 + _HOPELESS * correlation_time(residual) / residual.size
     found = []
     for base, *others in minima:
-        found += [base, *others]
+        found += [base, *others] if LAGS[1] in orders else []
         if base.cost > limit * float(residual @ residual):
             continue
         members = with_other_lags(problem, base, orders)
