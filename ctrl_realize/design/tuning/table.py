@@ -16,7 +16,7 @@ from ..loops.margin_result import Margins
 from ..loops.performance import Performance, plant_time, sampled_performance, settled_responses
 from .controller import PIDController
 from .pid import KINDS, RULES, TuningOptions, tuned
-from .plant import finely_sampled
+from .plant import finely_sampled, reference_plant
 from .rules import kinds_of
 
 if TYPE_CHECKING:
@@ -199,6 +199,7 @@ def compare_pid(
     tried = [one_of(rule, "rule", RULES) for rule in rules or RULES]
     kinds = [one_of(kind, "kind", KINDS) for kind in kinds]
     settings = TuningOptions(**options)
+    reference_plant(system, settings.dt)  # what no rule can tune is refused at once
     made: list[tuple[PIDController, Performance]] = []
     refused: list[tuple[str, str, str]] = []
     for rule in tried:
