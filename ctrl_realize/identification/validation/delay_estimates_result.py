@@ -91,7 +91,7 @@ class DelayComparison(Result):
     >>> record = cr.Record(0.01 * np.arange(u.size), u, y)
     >>> check = cr.validation.compare_delay_estimates(record, order=1)
     >>> print(f"{check.common[0]:.2f} to {check.common[1]:.2f} s, take that of the {check.rely_on}")
-    0.12 to 0.13 s, take that of the output error
+    0.11 to 0.13 s, take that of the output error
     """
 
     estimates: tuple[DelayEstimate, ...]
