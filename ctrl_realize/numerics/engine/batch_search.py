@@ -98,5 +98,5 @@ def _damped_step(
     scale = np.maximum(diagonal, 1e-9 * diagonal.max(axis=1, keepdims=True) + 1e-300)
     damped = normal + np.where(free, damping[:, None] * scale, 1.0)[:, :, None] * np.eye(x.shape[1])
     step = np.linalg.solve(damped, np.where(free, downhill, 0.0)[:, :, None])[:, :, 0] * unit
-    longest = np.append(np.inf, np.full(x.shape[1] - 1, _LONGEST_STEP))
+    longest = np.where(np.arange(x.shape[1]), _LONGEST_STEP, np.inf)
     return np.clip(step, -longest, longest), np.all(np.abs(step) <= longest, axis=1)

@@ -203,8 +203,9 @@ def _step(
     predicted = np.maximum(np.einsum("bm,bm->b", change, 2 * residual - change), 0.0)
     long = np.flatnonzero(excess > 1.0)
     if long.size:
-        # A direction in which the misfit is flat would shorten the step in all others.
-        others = free[long] & (np.abs(step[long]) < _LONGEST_STEP)
+        # A direction in which the misfit is flat would shorten the step in all others. A dead time,
+        # in s, is never one: its steps end at the next sample.
+        others = free[long] & (np.abs(step[long]) < [np.inf] + (count - 1) * [_LONGEST_STEP])
         held, gained = _step(residual[long], jacobian[long], others, damping[long])
         more = gained > predicted[long]
         step[long[more]], predicted[long[more]] = held[more], gained[more]

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.optimize import least_squares
+from scipy.optimize import least_squares, minimize
 
 from ctrl_realize.numerics.engine.batch_search import fit_batch
 from ctrl_realize.numerics.engine.compared_fits import at_dead_time, converged, on_new_data
@@ -107,8 +107,14 @@ def test_at_the_minimum_nothing_slopes(order, degree, within):
     bounds = parameter_bounds(structure, scales)
     first = start(20.0, *np.linspace(8, 35, order))[None]
     near = descend(problem, structure, first, bounds, scales.dt)[0][0]
-    x, _ = settle(problem, structure, near, bounds, scales.dt)
+    x, cost = settle(problem, structure, near, bounds, scales.dt)
     state = evaluate(problem, structure, x[None])
+    # a second method from there: Nelder and Mead's simplex
+    lower = minimize(
+        lambda theta: float(evaluate(problem, structure, theta[None]).cost[0]), x,
+        method="Nelder-Mead", bounds=list(zip(bounds.low, bounds.high, strict=True)),
+    ).fun  # fmt: skip
+    assert cost - lower < 0.01 * SIGMA**2
     slope = state.jacobian[0].T @ state.residual[0]
     size = np.linalg.norm(state.jacobian[0], axis=0) * SIGMA
     free = (x > bounds.low) & (x < bounds.high)
