@@ -255,3 +255,8 @@ def test_what_is_refused():
         cr.experiment.plan(FLOW.system(0.2), **ASKED)
     with pytest.raises(OptionError, match="choose one of"):
         cr.experiment.plan(FLOW, **ASKED).using("knock")
+    for one_sided in ((0, 5), (-5, 0)):  # the input of an integrating plant has to come back
+        with pytest.raises(OptionError, match="integrates"):
+            cr.experiment.plan(LEVEL, **{**ASKED, "amplitude": one_sided})
+    with pytest.raises(UnsuitableSystemError, match="got output_limits beside a model"):
+        cr.experiment.plan(FLOW, **ASKED, output_limits=0.1)

@@ -46,6 +46,10 @@ def known_from(given: Any, options: dict[str, Any]) -> Known:
     DataError
         Neither a model nor records.
     """
+    if options and isinstance(given, PlausibleModel | ProcessModel | DelayedStateSpace):
+        raise UnsuitableSystemError(
+            f"got {', '.join(options)} beside a model; options of identify are for records"
+        )
     if isinstance(given, PlausibleModel):
         return Known(given)
     if isinstance(given, ProcessModel):
@@ -59,10 +63,9 @@ def fitted(given: Any, options: dict[str, Any]) -> OutputErrorFit:
     """Fit of a model, or of records."""
     system = given if isinstance(given, DelayedStateSpace) else None
     fit = (system or identify(as_records(given), **options)).fit
-    if not isinstance(fit, OutputErrorFit) or (system is not None and options):
+    if not isinstance(fit, OutputErrorFit):
         raise UnsuitableSystemError(
-            f"got {given!r}; expected records, a model of identify(record), a "
-            "design.ProcessModel, and options of identify only for records"
+            f"got {given!r}; expected records, a model that identify made, or a ProcessModel"
         )
     return fit
 
@@ -73,7 +76,8 @@ def known_from_fit(fit: OutputErrorFit) -> Known:
     drawn = () if fit.plausible_models is None else fit.plausible_models.models
     others = [_integrating(one, length) for one in drawn[::_OTHERS]]
     model = PlausibleModel(fit.dead_time, fit.poles, fit.estimate.numerator)
-    inputs = [_moved(record) for record in fit.records]
+    held = [np.ravel(record.input) for record in fit.records]
+    inputs = [signal - signal[0] for signal in held]
     residuals = [fit.measured - fit.fitted]
     if len(inputs) > 1:
         # Step records are scaled and averaged before they are fitted.
@@ -84,8 +88,7 @@ def known_from_fit(fit: OutputErrorFit) -> Known:
         for signal, residual in zip(inputs, residuals, strict=True)
     ]
     plausible = tuple(one for one in others if np.sum(one.poles == 0) <= 1)
-    level = float(np.ravel(fit.records[0].input)[0])
-    return Known(model, plausible, fit.dt, tests[-1].noise, tuple(tests), level)
+    return Known(model, plausible, fit.dt, tests[-1].noise, tuple(tests), float(held[0][0]))
 
 
 def _noise_of(residual: FloatArray, dt: float) -> NoiseModel:
@@ -107,11 +110,6 @@ def largest_move(records: Sequence[Experiment]) -> float | None:
     """Farthest deviation of the input in the records, with its sign."""
     moved = np.concatenate([one.input for one in records]) if records else np.zeros(1)
     return float(moved[np.argmax(np.abs(moved))]) or None
-
-
-def _moved(record: Record) -> FloatArray:
-    held = np.ravel(record.input)
-    return np.asarray(held - held[0])
 
 
 def _integrating(model: PlausibleModel, length: float) -> PlausibleModel:

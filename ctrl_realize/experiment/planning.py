@@ -160,7 +160,8 @@ def plan(
     # A record at another rate has its own information, but not in samples of this one.
     records = known.tests if known.dt and abs(dt / known.dt - 1) < 1e-6 else ()
     setting = _Setting(
-        bounds, [bound.gradient([wanted]) for bound in bounds], heard, _limits(move),
+        bounds, [bound.gradient([wanted]) for bound in bounds], heard,
+        _limits(move, bool(np.any(known.model.poles == 0))),
         np.inf if output_limit is None else positive(output_limit, "output_limit", "deviation"),
         records, dt,
     )  # fmt: skip
@@ -193,15 +194,17 @@ def _given(value: float | None, known: float | None, name: str, what: str) -> fl
     return positive(known if value is None else value, name, what)
 
 
-def _limits(amplitude: Any) -> tuple[float, float]:
+def _limits(amplitude: Any, returns: bool) -> tuple[float, float]:
     """Two ends of the input's deviation, that of a single step last."""
     if isinstance(amplitude, Real):
         low, high = sorted((0.0, real(amplitude, "amplitude", "move of the input")))
+        returns = False  # by as much in the other direction
     else:
         low, high = band(amplitude, "amplitude", "deviation of the input")
-    if low == high or not low <= 0 <= high:
+    if low == high or not low <= 0 <= high or (returns and low * high == 0):
         raise OptionError(
-            f"amplitude={amplitude!r}; expected a move, or a low and a high end, 0 between them"
+            f"amplitude={amplitude!r}; expected a move, or a low and a high end, 0 between them, "
+            "not at one of them if the plant integrates"
         )
     return (high, low) if -low > high else (low, high)
 
@@ -268,10 +271,8 @@ def _predicted(setting: _Setting, kind: str, number: int, signal: FloatArray) ->
     moved = max(float(np.abs(bound.response(signal)).max()) for bound in setting.bounds)
     scale = min(1.0, setting.output_limit / max(moved, 1e-300))
     test = Experiment(scale * signal, setting.noise)
-    errors = np.array([
-        float(bound.errors([test], gradient)[0])
-        for bound, gradient in zip(setting.bounds, setting.gradients, strict=True)
-    ])  # fmt: skip
+    pairs = zip(setting.bounds, setting.gradients, strict=True)
+    errors = np.array([float(bound.errors([test], gradient)[0]) for bound, gradient in pairs])
     together = setting.bounds[0].errors([*setting.records, test], setting.gradients[0])[0]
     name = KINDS[kind if kind in KINDS else "steps"][1]
     detail = f"{name} {in_time(number * setting.dt)}" if number else "switched by the output"

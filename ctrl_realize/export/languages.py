@@ -79,8 +79,7 @@ def c_header(program: Program) -> str:
     lines += [f"#ifndef {guard}", f"#define {guard}", "", "typedef struct {"]
     for each in program.states:
         size = f"[{each.length}]" if each.length else ""
-        comment = f" /* {plain(each.words)} */" if each.words else ""
-        lines.append(f"    {C_TYPES[each.kind]} {each.name}{size};{comment}")
+        lines.append(f"    {C_TYPES[each.kind]} {each.name}{size}; /* {plain(each.words)} */")
     if not program.states:
         lines.append("    int unused; /* C has no empty structures */")
     lines += [f"}} {program.name}_state;", ""]
@@ -125,10 +124,9 @@ def python_class(program: Program) -> str:
     """Class in plain Python, without further packages."""
     own = {each.name: f"self.{each.name}" for each in (*program.states, *program.constants)}
     syntax = _Syntax("if {}:", "else:", [], "not ", "{} = {}", own | {"true": "True"})
-    lines = [f'"""{plain(program.words[0])}."""', "", "", f"class {program.name}:"]
-    lines += [f'    """{plain(program.words[0])}.', ""]
-    lines += [f"    {plain(line)}" for line in program.words[1:]]
-    lines += ['    """', ""]
+    first, *more = map(plain, program.words)
+    lines = [f'"""{first}."""', "", "", f"class {program.name}:", f'    """{first}.', ""]
+    lines += [*(f"    {line}" for line in more), '    """', ""]
     for each in program.constants:
         lines.append(f"    {each.name} = {literal(each.value)}  # {plain(each.words)}")
     lines += [*([""] if program.constants else []), "    def __init__(self):"]
