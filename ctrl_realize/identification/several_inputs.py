@@ -102,7 +102,8 @@ def fit_several_inputs(
         for i in range(len(inputs)):
             left = output - earlier - (responses.sum(axis=0) - responses[i])
             fit_one = fit_output_error if settled or cycle == MOST_CYCLES else model_alone
-            system = _one(record, i, left, fit_one, structures if settled else asked[i], options)
+            options["structures"] = structures if settled else asked[i]
+            system = _one(record, i, left, fit_one, settled, options)
             response = system.simulate(inputs[i] - inputs[i, 0])
             fit = fit_of(system, OutputErrorFit)
             moved = max(moved, float(np.std(response - responses[i])) / fit.residual_std)
@@ -145,23 +146,22 @@ def _checked(records: tuple[Record, ...]) -> Record:
 def _starting(record: Record) -> FloatArray:
     """Responses (m, N) of finite impulse responses to each input."""
     even = record.at_equal_distances()
-    inputs, output = np.atleast_2d(even.input), np.ravel(even.output)
 
     def found(start: Literal["rest", "unknown"]) -> FloatArray:
         markov = impulse_from_io(even, method="regularized", start=start).markov[0]
-        pairs = zip(markov, inputs, strict=True)
+        pairs = zip(markov, np.atleast_2d(even.input), strict=True)
         return np.array([lfilter(h, [1.0], u - u[0]) for h, u in pairs])
 
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", DataWarning)  # a start need not be exact
         both = [found("unknown"), found("rest")]
-    best = min(both, key=lambda one: float(np.nanstd(output - one.sum(axis=0))))
+    best = min(both, key=lambda one: float(np.nanstd(even.output - one.sum(axis=0))))
     return np.array([np.interp(record.time, even.time, one) for one in best])
 
 
 def _one(
     record: Record, i: int, left: FloatArray, fit_one: Callable[..., DelayedStateSpace],
-    structures: Any, options: dict[str, Any],
+    settled: bool, options: dict[str, Any],
 ) -> DelayedStateSpace:  # fmt: skip
     name = record.input_labels[i]
     units = {k: v for k, v in record.units.items() if k in (name, "time", *record.output_labels)}
@@ -171,9 +171,15 @@ def _one(
         input_labels=[name], output_labels=list(record.output_labels), missing="keep",
     )  # fmt: skip
     try:
-        return fit_one(one, structures=structures, **options)
+        return fit_one(one, **options)
     except DataError as error:
-        raise DataError(f"{error}. Or leave the input {name!r} out of the record") from None
+        advice = f"leave the input {name!r} out of the record, or "
+        if not settled:
+            advice = "the models of the inputs have not converged: "
+        raise DataError(
+            f"{error}. Or {advice}give structures= that describe every plant, ['FOPDT', 'IPDT'] "
+            "where one may integrate"
+        ) from None
 
 
 def _sampled(system: DelayedStateSpace, step: float) -> DelayedStateSpace:
@@ -204,12 +210,11 @@ def _wider(
         estimate = replace(estimate, low=low, high=high, std=factor * estimate.std)
         if estimate.static is not None:
             more = _ratio(own, others, bounds[i].gradient(("gain",))[0])
-            static = replace(estimate.static, gain_std=more * estimate.static.gain_std)
-            alike = tuple(
-                (replace(other, gain_std=more * other.gain_std), weight)
-                for other, weight in estimate.alike
+            (static, _), *alike = (
+                (replace(one, gain_std=more * one.gain_std), weight)
+                for one, weight in [(estimate.static, 1.0), *estimate.alike]
             )
-            estimate = replace(estimate, static=static, alike=alike)
+            estimate = replace(estimate, static=static, alike=tuple(alike))
         found.append(replace(fit, estimate=estimate))
     return tuple(found)
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import Any
 
-from .._flags import Flag
+from .._flags import Flag, flagged
 from .._wording import interval_in_time, time_within
 from ..data import Record
 from ..numerics.arrays import FloatArray
@@ -85,8 +85,9 @@ class SeveralInputsFit(ModelFit):
 
     @property
     def flags(self) -> tuple[Flag, ...]:
-        """Flags of all fits, with the name of the input."""
-        return tuple(
+        """Whether the iterations have converged, and flags of all fits with the input's name."""
+        own = () if self.converged else (flagged("not_converged", cycles=self.cycles),)
+        return own + tuple(
             replace(flag, message=f"{name}: {flag.message}")
             for name, fit in zip(self.inputs, self.fits, strict=True)
             for flag in fit.flags
@@ -119,16 +120,10 @@ class SeveralInputsFit(ModelFit):
         rows = []
         for name, fit in zip(self.inputs, self.fits, strict=True):
             told = time_within(fit.dead_time, *fit.interval)
-            rows += [
-                (name, fit.formula),
-                ("  dead time", f"{told} ({interval_in_time(*fit.interval)})"),
-            ]
-        state = "converged" if self.converged else "not converged"
-        return [
-            *rows,
-            ("residual", f"{self.residual_std:.3g}"),
-            ("iterations", f"{self.cycles}, {state}"),
-        ]
+            told += f" ({interval_in_time(*fit.interval)})"
+            rows += [(name, fit.formula), ("  dead time", told)]
+        rows.append(("residual", f"{self.residual_std:.3g}"))
+        return [*rows, ("iterations", f"{self.cycles}, {'not ' * (not self.converged)}converged")]
 
     def __repr__(self) -> str:
         return f"<SeveralInputsFit of {', '.join(self.inputs)}>"

@@ -25,6 +25,7 @@ RAISED_BY = {
     "identification/output_error/actuated": "fit_output_error",
     "identification/realization": "realize",
     "identification/realization/scan_curve": "estimate_delay",
+    "identification/several_inputs_result": "identification.fit_several_inputs",
     "identification/state_space_fit": "fit_state_space",
     "identification/validation/delay_estimates": "validation.compare_delay_estimates",
     "identification/validation/residuals": "validation.analyse_residuals",

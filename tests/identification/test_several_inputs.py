@@ -99,3 +99,30 @@ def test_a_record_of_operation_begins_with_responses_to_earlier_inputs():
     for one, (gain, _, dead_time) in zip(fit.fits, PLANTS.values(), strict=True):
         assert one.gain_interval[0] <= gain <= one.gain_interval[1]
         assert one.interval[0] <= dead_time <= one.interval[1]
+
+
+def integrator_and_gain(seed):
+    """An integrating plant, and one whose output follows at once after its dead time."""
+    inputs = np.repeat(
+        np.random.default_rng(seed).choice([-1.0, 1.0], (2, T.size // 10)), 10, axis=1
+    )
+    plants = [(ct.tf([0.05], [1, 0]), 5.3), (ct.tf([2.0], [1]), 3.0)]
+    y = 0.05 * np.random.default_rng(seed + 100).standard_normal(T.size)
+    for u, (core, dead_time) in zip(inputs, plants, strict=True):
+        y += cr.delayed_ss(core, dead_time=dead_time, dt=1.0).simulate(u - u[0])
+    return cr.Record(T, inputs, y, input_labels=["feed", "valve"])
+
+
+def test_structures_that_describe_every_plant_converge_and_others_say_that_they_do_not():
+    data = integrator_and_gain(0)
+    right = cr.identify(data, structures=["FOPDT", "IPDT"]).fit
+    for one, gain, dead_time in zip(right.fits, (0.05, 2.0), (5.3, 3.0), strict=True):
+        assert one.gain == pytest.approx(gain, rel=0.01)
+        assert one.interval[0] <= dead_time <= one.interval[1]
+    assert right.converged
+    assert "not_converged" not in [flag.code for flag in right.flags]
+    wrong = cr.identify(data, structures="P2DI").fit
+    assert not wrong.converged
+    assert wrong.flags[0].code == "not_converged"
+    with pytest.raises(cr.errors.DataError, match=r"not converged: give structures= that describe"):
+        cr.identify(data, structures="IPDT")
