@@ -67,7 +67,7 @@ def read_table(
         if head.startswith(mark):
             raise FileFormatError(f"{file} is {what}")
     if head.startswith(b"PK\x03\x04") and is_workbook(file):
-        sheet = sheet_as_text(file, variable, max_bytes)
+        sheet = sheet_as_text(file, variable, options, max_bytes)
         plain = replace(options, delimiter="\t", decimal=".", encoding="utf-8", comment=None)
         return read_delimited(sheet, plain)
     kind = next((kind for kind, marks in _READERS.items() if head.startswith(marks)), "")

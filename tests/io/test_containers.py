@@ -385,6 +385,26 @@ def test_a_sheet_is_read_like_a_text_table(tmp_path):
         read_record(path, max_bytes=7000)
 
 
+@pytest.mark.parametrize("time", ["numbers", "text"])
+def test_numbers_that_are_stored_as_text_may_have_a_comma(tmp_path, time):
+    """Beside cells that are numbers: a point there does not tell the sign of the others."""
+    sheet = pytest.importorskip("openpyxl").Workbook().active
+    sheet.append(["time_s", "u", "y"])
+    path, output = tmp_path / "a.xlsx", 12.5 + 0.125 * np.arange(9)
+    for k in range(9):
+        at = 0.001 * k if time == "numbers" else f"{0.001 * k:.3f}".replace(".", ",")
+        sheet.append([at, k // 4, f"{output[k]:.3f}".replace(".", ",")])
+    sheet.parent.save(path)
+    if time == "numbers":  # 12,500 to 13,500 may be thousands
+        with pytest.raises(FileFormatError, match=r"'12,500' may be 12.500 or 12500; give decimal"):
+            read_record(path)
+        assert_array_equal(read_record(path, thousands=",").output, 1000 * output)
+    for given in ({"decimal": ","}, {} if time == "text" else {"decimal": ",", "thousands": None}):
+        record = read_record(path, **given)
+        assert_array_equal(record.output, output)
+        assert record.dt == pytest.approx(0.001)
+
+
 @pytest.mark.parametrize("shown", ["h:mm:ss", "[h]:mm:ss", "mm:ss.0"])
 @pytest.mark.parametrize("first", [0.0, 0.9])
 def test_clocks_of_excel_go_on_after_a_day(tmp_path, shown, first):

@@ -126,6 +126,8 @@ def test_thousands_separators_are_told_apart_from_decimal_signs(tmp_path):
         ["999,5", "1\u202f200,25", "1 000 000,5", "2 000,0"],
     ):
         np.testing.assert_array_equal(read(cells), expected)
+    with pytest.raises(DataError, match="line 4: '12,5': is not a number"):  # and not 125
+        read(["999.5", "1,200.5", "12,5", "2,000.5"])
     unclear = ["999", "1,200", "1,300", "2,000"]
     with pytest.raises(CtrlRealizeError, match=r"may be 1\.200 or 1200; give decimal=',' .*thousa"):
         read(unclear)

@@ -15,8 +15,10 @@ from typing import Any
 import numpy as np
 
 from ...errors import FileFormatError, OptionError
+from ..cells import NUMBER, refuse_thousands
 from ..checks import MAX_COLUMNS, check_size, package_for, told_if_damaged
 from ..text.source import TextSource
+from ..text_options import TextOptions
 
 _FEWEST_ROWS = 3
 """A sheet with fewer filled rows is no record."""
@@ -34,14 +36,18 @@ def is_workbook(path: Path) -> bool:
         return False
 
 
-def sheet_as_text(path: Path, name: str | None, max_bytes: float) -> TextSource:
-    """Return a sheet as tab-separated text.
+def sheet_as_text(
+    path: Path, name: str | None, options: TextOptions, max_bytes: float
+) -> TextSource:
+    """Return a sheet as tab-separated text, with points in all numbers.
 
     Parameters
     ----------
     path : pathlib.Path
     name : str or None
         Name of the sheet; None: the only one with data.
+    options : TextOptions
+        How numbers are written that are stored as text.
     max_bytes : float
         Largest size, unpacked.
 
@@ -64,7 +70,7 @@ def sheet_as_text(path: Path, name: str | None, max_bytes: float) -> TextSource:
             if name is not None and name not in sheets:
                 raise OptionError(f"variable={name!r}: {path} has the sheets {_listed(sheets)}")
             chosen = sheets if name is None else {name: sheets[name]}
-            texts = {title: _text(path, sheet.rows) for title, sheet in chosen.items()}
+            texts = {title: _text(path, sheet.rows, options) for title, sheet in chosen.items()}
     filled = {title: text for title, text in texts.items() if text.count("\n") >= _FEWEST_ROWS}
     if len(filled) > 1:
         raise OptionError(
@@ -76,11 +82,17 @@ def sheet_as_text(path: Path, name: str | None, max_bytes: float) -> TextSource:
     return TextSource(path, text.encode("utf-8"), row_name="row")
 
 
-def _text(path: Path, rows: Iterable[Iterable[Any]]) -> str:
+def _text(path: Path, rows: Iterable[Iterable[Any]], options: TextOptions) -> str:
     """Rows as lines of tab-separated cells, without columns that are empty throughout."""
     import pandas as pd
 
-    table = pd.DataFrame([[_cell(cell) for cell in row] for row in rows], dtype=object).fillna("")
+    cells = [[_cell(cell) for cell in row] for row in rows]
+    if options.decimal != "." and options.thousands != ",":
+        if options.decimal == "auto":  # the numbers beside them do not tell
+            refuse_thousands(path, cells, ",")
+        comma = NUMBER[","].fullmatch
+        cells = [[one.replace(",", ".") if comma(one) else one for one in row] for row in cells]
+    table = pd.DataFrame(cells, dtype=object).fillna("")
     if table.shape[1] > MAX_COLUMNS:
         raise FileFormatError(f"{path} has {table.shape[1]} columns, the limit is {MAX_COLUMNS}")
     rows, columns = np.nonzero(np.asarray(table != ""))

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from functools import cached_property
+from collections.abc import Callable
+from functools import cached_property, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -63,7 +63,7 @@ def read_parquet(path: Path, *, max_bytes: float, variable: str | None = None) -
         raise FileFormatError(f"{path} has no columns")
     reader = _Reader(path, unpacked_limit(path, max_bytes))
     columns = tuple(
-        LateColumn(str(field.name)[:MAX_NAME], reader.loader(position, field))
+        LateColumn(str(field.name)[:MAX_NAME], partial(reader.load, position, field))
         for position, field in enumerate(fields)
     )
     return Table(path, columns)
@@ -76,9 +76,6 @@ class _Reader:
         self.path = path
         self.limit = limit
         self.taken = 0
-
-    def loader(self, position: int, field: pa.Field) -> Callable[[int | None], AnyArray]:
-        return lambda count: self.load(position, field, count)
 
     def load(self, position: int, field: pa.Field, count: int | None) -> AnyArray:
         """Return the first `count` cells of a column, or all."""
@@ -99,9 +96,8 @@ class _Reader:
             if [one.name for one in file.schema_arrow].count(field.name) > 1:
                 raise FileFormatError(f"{self.path} has several columns {field.name!r}")
             if count is not None:
-                return next(
-                    (_cells(part.column(0)) for part in _first(file, field, count)), _NOTHING
-                )
+                parts = file.iter_batches(count, columns=[field.name], use_threads=False)
+                return next((_cells(part.column(0)) for part in parts), _NOTHING)
             self._take(file, position, field, kind)
             return _cells(file.read(columns=[field.name], use_threads=False).column(0))
 
@@ -120,10 +116,6 @@ class _Reader:
 
 
 _NOTHING = np.empty(0, dtype=object)
-
-
-def _first(file: Any, field: pa.Field, count: int) -> Iterator[Any]:
-    return iter(file.iter_batches(batch_size=count, columns=[field.name], use_threads=False))
 
 
 def _cells(values: Any) -> AnyArray:

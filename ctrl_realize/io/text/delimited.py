@@ -79,7 +79,6 @@ def _parse(source: TextSource, layout: TextLayout) -> Any:
                 file,
                 sep=separator,
                 decimal=layout.decimal[0],
-                thousands=layout.decimal[1:] or None,
                 header=None,
                 comment=layout.comment,
                 # numbers are ASCII in all encodings here; a wrong character in a name is harmless
@@ -160,10 +159,9 @@ def _cut_last_line(source: TextSource, layout: TextLayout) -> str:
 def _place(source: TextSource, layout: TextLayout, row: int) -> str:
     """Line of the file that contains a row of the table."""
     with source.open(layout.encoding) as file:
-        numbered = enumerate(file, start=1)
         data = (
             number
-            for number, line in numbered
+            for number, line in enumerate(file, start=1)
             if number > layout.first_line
             and line.strip()
             and not (layout.comment and line.lstrip().startswith(layout.comment))
