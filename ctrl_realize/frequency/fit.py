@@ -50,12 +50,12 @@ def fit_frf(
     frf : MeasuredFRF
         One input, one output. Any `control.FrequencyResponseData`.
     order : int or sequence of int, optional
-        Number of poles, or candidates; default 1 to 4, or as many as the points determine, and more
-        (up to 10) as long as the largest is the best or dynamics are missing: where more than a
+        Number of poles, or candidates; default 0 (a gain with dead time) to 4, or as many as the
+        points determine, and more (up to 10) as long as the largest is the best or dynamics are missing: where more than a
         tenth of the response is left and the residual is correlated along frequency.
     relative_degree : int or sequence of int, optional
-        Poles minus zeros, or candidates; default 1 to the order. With 0 the dead time is rounded to
-        whole samples of the model.
+        Poles minus zeros, or candidates; default 1 to the order. With 0, as of order 0, the dead
+        time is rounded to whole samples of the model.
     dt : float, optional
         Sample time of the model in s; default: that of the records behind the FRF, or a twentieth
         of the shortest measured period.
@@ -145,7 +145,7 @@ def fit_frf(
             # Aliases from beyond the Nyquist frequency, which a continuous model cannot describe,
             # have about this size for a plant that falls with 1/omega.
             sigma = np.hypot(sigma, np.abs(response) * (frequency / (1 / held - frequency)) ** 2)
-    orders = None if order is None else integers(order, "order", 1, 30)
+    orders = None if order is None else integers(order, "order", 0, 30)
     degrees = (
         None if relative_degree is None else integers(relative_degree, "relative_degree", 0, 30)
     )
@@ -202,7 +202,7 @@ def _within_points(
     """
     tried = orders or tuple(DEFAULT_ORDERS)
     needed = {
-        n: max(2 * n + 2 - r for r in degrees or range(1, n + 1) if r <= n)
+        n: max(2 * n + 2 - r for r in degrees or range(min(n, 1), n + 1) if r <= n)
         for n in tried
         if degrees is None or min(degrees) <= n
     }

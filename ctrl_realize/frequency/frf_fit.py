@@ -193,7 +193,7 @@ class FRFFit(FractionalDelayFit):
             ("95 % interval", interval_in_time(*self.interval)),
             ("total delay at DC", in_time(self.total_delay, 5)),
             ("structure", f"order {self.order}, relative degree {self.relative_degree}"),
-            ("poles", ", ".join(shown)),
+            ("poles", ", ".join(shown) or "none"),
             ("gain", f"{self.gain:.5g}"),
             ("points", f"{self.frequency_hz.size}, {ends}"),
             ("weighted residual", f"{size} {unit}"),

@@ -151,7 +151,7 @@ def _leading_phase(
     half_radian = 0.5 / float(np.abs(data.s).max())
     if chosen.dead_time > half_radian:
         return
-    n = min(chosen.structure.order, _ORDER_OF_LEAD)
+    n = min(max(chosen.structure.order, 1), _ORDER_OF_LEAD)
     as_is = [fit.cost for key, fit in fits.items() if key.order == n] or [chosen.cost]
     lead = dead_time_bound(data.response.conj(), np.abs(data.s), 1 / data.weight)
     turned = replace(data, response=data.response * np.exp(-data.s * lead), max_dead_time=lead)

@@ -26,7 +26,7 @@ from ..engine.structures import Candidate
 from .frf_data import FRFData, refined
 from .starts import delay_grid, grown_starts, starting_points
 
-DEFAULT_ORDERS = range(1, 5)
+DEFAULT_ORDERS = range(5)
 """Default orders; larger ones are tried if the largest of these is the best."""
 _LARGEST_ORDER = 10  # unless a larger one is asked for: time
 _LARGEST_FROM_GRID = 3  # order up to which a linear problem finds the poles; see `starts`
@@ -77,9 +77,9 @@ def fit_structures(
     ----------
     data : FRFData
     orders : sequence of int or None
-        Increasing. None: from 1 on, until an order is no longer better than the one before.
+        Increasing. None: from 0 on, until an order is no longer better than the one before.
     degrees : sequence of int or None
-        Relative degrees, rising; None: 1 to the order.
+        Relative degrees, rising; None: 1 to the order, 0 of order 0.
 
     Returns
     -------
@@ -89,7 +89,7 @@ def fit_structures(
     ladder = _Ladder(data)
     fits: dict[Structure, Candidate] = {}
     for n in orders if orders is not None else DEFAULT_ORDERS:
-        for r in degrees if degrees is not None else range(1, n + 1):
+        for r in degrees if degrees is not None else range(min(n, 1), n + 1):
             if r <= n:
                 fits[Structure(n, r)] = _fit_one(data, ladder, fits, Structure(n, r))
     if orders is None:
@@ -115,7 +115,7 @@ def _with_larger_orders(
     while fits:
         criteria = information_criteria(data, fits)
         best = min(criteria, key=lambda key: criteria[key])
-        n, r = best.order, best.relative_degree
+        n, r = best.order, best.relative_degree or int(not best.order)
         largest = max(key.order for key in fits)
         closest = min(fits.values(), key=lambda fit: fit.cost)
         missing = unexplained(data, closest) > MISSING and correlation_cost(data, closest) > 1.0

@@ -174,9 +174,9 @@ def starting_points(data: FRFData, order: int, delays: FloatArray) -> list[Float
     found: list[FloatArray] = []
     for delay in delays:
         turned = data.response * np.exp(data.s * delay)
-        for resonant in (False, True)[:order]:
+        for resonant in (False, True)[: max(order, 1)]:
             poles = trial_poles(low, high, order, resonant=resonant)
-            for _ in range(_RELOCATIONS):
+            for _ in range(_RELOCATIONS * min(order, 1)):
                 before, poles = poles, relocate_poles(data.s, turned, data.weight, poles)
                 moved = np.sort_complex(poles) - np.sort_complex(before)
                 if np.max(np.abs(moved) / np.abs(poles)) < 1e-3:
@@ -221,7 +221,7 @@ def grown_starts(data: FRFData, smaller: Candidate, order: int) -> list[FloatArr
 
 def _costs(data: FRFData, order: int, starts: list[FloatArray]) -> tuple[FloatArray, FloatArray]:
     """Starts (B, 1 + n) within bounds, and their misfit with a free numerator (B,)."""
-    free = Structure(order, 1)
+    free = Structure(order, min(order, 1))
     bounds = parameter_bounds(free, data.scales)
     inside = np.clip(starts, bounds.low, bounds.high)
     return inside, eliminate(data.problem, free, inside).cost
