@@ -116,6 +116,11 @@ def test_the_best_of_a_comparison_is_robust_over_the_interval_if_any_is():
     assert found.best().rule == "amigo"
 
 
+def test_a_comparison_refuses_what_no_rule_can_tune_once():
+    with pytest.raises(UnsuitableSystemError, match=r"^a PID controller needs one input"):
+        cr.design.compare_pid(ct.ss([], [], [], np.eye(2), 0.1))
+
+
 def brute_ms(plant, controller):
     """Largest 1 / |1 + L| on a fine grid."""
     z = np.exp(1j * np.linspace(1e-4, np.pi, 40001))
@@ -156,7 +161,7 @@ def test_the_loop_of_an_identified_plant_is_checked_with_models_that_fit_as_well
     made = cr.design.pid(plant)
     every = sorted(brute_ms(each, made) for each in plant.fit.plausible_models.systems)
     assert made.check.worst.ms == pytest.approx(every[-2], rel=1e-4)
-    assert f"Ms {every[-2]:.3g}" in made.report()
+    assert f"Ms {every[-2]:.3g}, with a plausible model: lags of its own, " in made.report()
     assert not made.check.flags
 
 

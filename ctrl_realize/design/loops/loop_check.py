@@ -127,7 +127,8 @@ class LoopCheck(Result):
             interval = interval_in_time(*self.robustness.dead_time_interval)
             rows.append(("over the interval", f"{word}, dead time {interval}"))
         if self.worst is not None:
-            rows.append(("at worst", f"Ms {self.worst.ms:.3g}, at {self.worst}"))
+            where = "with a plausible model: lags of its own" if self.by_models else "whole samples"
+            rows.append(("at worst", f"Ms {self.worst.ms:.3g}, {where}, {self.worst}"))
         return rows
 
     def __repr__(self) -> str:
@@ -248,20 +249,18 @@ def _left_open(made: LoopCheck) -> tuple[Flag, ...]:
     if worst is None or worst.ms <= MOST_SENSITIVE * (1 + ROUNDED):
         return ()
     if worst.ms == float("inf"):
-        return (
-            flagged(
-                "unstable_within_interval.model" if models else "unstable_within_interval.corner",
-                corner=worst,
-            ),
+        found = flagged(
+            "unstable_within_interval.model" if models else "unstable_within_interval.corner",
+            corner=worst,
         )
-    return (
-        flagged(
+    else:
+        found = flagged(
             "sensitive_within_interval.model" if models else "sensitive_within_interval",
             ms=worst.ms,
             most=MOST_SENSITIVE,
             corner=worst,
-        ),
-    )
+        )
+    return (found,)
 
 
 def warn_of(check: LoopCheck, advice: str) -> None:
