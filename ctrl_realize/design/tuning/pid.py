@@ -186,11 +186,11 @@ class TuningOptions:
 
 
 def tuned(
-    system: Any, rule: str, kind: str, options: TuningOptions
+    system: Any, rule: str, kind: str, options: TuningOptions, plants: Any = None
 ) -> tuple[PIDController, DelayedStateSpace | DelaySystem]:
     """Tune by a rule without checking the loop; return the controller and its plant.
 
-    The plant is in the time base of the controller.
+    The plant is in the time base of the controller; `plants` are those of `reference_plant`.
     """
     rule = one_of(rule, "rule", RULES)
     kind = one_of(kind, "kind", KINDS)
@@ -207,7 +207,7 @@ def tuned(
             )
         target = positive(options.closed_loop_time, "closed_loop_time", "time in s")
     limit = within(options.max_sensitivity, "max_sensitivity", "Ms", 1.01, 10)
-    plant, exact, step = reference_plant(system, options.dt)
+    plant, exact, step = plants or reference_plant(system, options.dt)
     model: ProcessModel | None = None
     if rule in MODEL_RULES:
         model = reduced(system, plant, rule, kind, options.reduction, step)
