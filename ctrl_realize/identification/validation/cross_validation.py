@@ -13,6 +13,7 @@ from ...delayed.simulation import simulate_record
 from ...errors import DataError
 from ...numerics.blas_threads import single_threaded
 from ...numerics.signals.correlation import fit_percent
+from ..output_error.repeatability import distinct
 
 if TYPE_CHECKING:
     import control as ct
@@ -79,10 +80,6 @@ def cross_validate(
         measured = np.atleast_2d(record.output)
         return float(fit_percent(measured[:, record.seen], simulated[:, record.seen]).mean())
 
-    columns: dict[str, dict[str, float]] = {}
-    for i, record in enumerate(several):
-        name = record.name or f"record {i}"
-        if name in columns:
-            name = f"{name} ({i})"
-        columns[name] = {label: mean_fit(system, record) for label, system in models.items()}
-    return pd.DataFrame(columns)
+    fits = [[mean_fit(system, record) for record in several] for system in models.values()]
+    names = distinct(record.name for record in several)
+    return pd.DataFrame(fits, index=list(models), columns=list(names))

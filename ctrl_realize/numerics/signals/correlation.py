@@ -128,12 +128,11 @@ def predict_ahead(signal: FloatArray, coefficients: FloatArray, steps: int) -> F
     -------
     ndarray, shape (N,)
     """
-    N = signal.size
-    # ahead[j][k]: prediction of e[k + j] from samples up to k; j <= 0 are the samples themselves.
-    ahead = {-i: later(signal, i) for i in range(coefficients.size)}
-    for j in range(1, steps + 1):
-        ahead[j] = sum(
-            (c * ahead[j - i] for i, c in enumerate(coefficients, start=1)), start=np.zeros(N)
-        )
-    ahead[steps][: max(coefficients.size - 1, 0)] = 0.0
-    return later(ahead[steps], steps)
+    if not coefficients.size:
+        return np.zeros(signal.size)
+    weights = coefficients  # of e[k], e[k - 1], ... in the prediction of e[k + 1], e[k + 2], ...
+    for _ in range(min(steps, signal.size) - 1):
+        weights = weights[0] * coefficients + np.append(weights[1:], 0.0)
+    ahead = np.convolve(signal, weights)[: signal.size]
+    ahead[: coefficients.size - 1] = 0.0
+    return later(ahead, steps)

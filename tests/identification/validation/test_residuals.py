@@ -3,7 +3,7 @@
 import control as ct
 import numpy as np
 import pytest
-from numpy.testing import assert_allclose
+from numpy.testing import assert_allclose, assert_array_equal
 from scipy.signal import lfilter
 
 import ctrl_realize as cr
@@ -119,6 +119,20 @@ def test_predictions_fall_from_the_noise_model_to_the_simulation():
     assert_allclose(np.std(one.output - prediction.output), 0.1, rtol=0.06)
     assert prediction.noise_order == (1,)
     assert "1 samples ahead" in prediction.report()
+    # as far ahead as the record is long there is no past, whatever the horizon
+    analysis = cr.validation.analyse_residuals(TWO_STATES, one)
+    for horizon in (2000, 10**9):
+        assert_array_equal(
+            cr.validation.predict(TWO_STATES, one, horizon).output, analysis.simulated
+        )
+
+
+def test_records_of_equal_names_have_a_column_each():
+    names = {"x": 0.0, "x (2)": 0.1, "x ": 1.0}
+    records = [record(noise=s, n=200, label=name.strip()) for name, s in names.items()]
+    table = cr.validation.cross_validate(TWO_STATES, records)
+    fits = [cr.validation.analyse_residuals(TWO_STATES, one).fit_percent[0] for one in records]
+    assert_allclose(table.to_numpy(), [fits])
 
 
 @pytest.mark.parametrize(
