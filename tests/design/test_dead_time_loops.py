@@ -147,6 +147,17 @@ def test_performance_in_continuous_time_is_the_limit_of_short_samples():
         assert getattr(continuous, name) == pytest.approx(getattr(sampled, name), rel=0.03)
 
 
+@pytest.mark.parametrize("dead_time", [1e-5, 1e-3, 0.0])
+def test_performance_of_a_slow_loop_around_a_short_dead_time_has_its_closed_form(dead_time):
+    lag, pi = ct.tf([1], [1, 1]), design.PIDController(0.5, 1.0)
+    found = design.performance(lag * cr.delay(dead_time) if dead_time else lag, pi)
+    # errors that do not change sign are ti / (K kp) and ti / kp; the open loop is 0.5 e^(-Ls) / s
+    assert found.setpoint_error == pytest.approx(2.0, rel=1e-4)
+    assert found.load_error == pytest.approx(2.0, rel=1e-4)
+    assert found.settling_time == pytest.approx(2 * np.log(50), rel=5e-3)
+    assert found.overshoot == 0
+
+
 def test_the_setpoint_error_in_continuous_time_has_its_closed_form():
     # L = exp(-tau s) / (4 tau s): no overshoot, since the gain of 1/4 is below 1/e, so that the
     # integral of the absolute error is that of the error, 4 tau

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import warnings
 from dataclasses import dataclass
 from typing import Any
 
+import control as ct
 import numpy as np
 
 from ..._wording import in_time
@@ -14,7 +14,9 @@ from ...errors import ModelWarning, UnsuitableSystemError, warn_caller
 from ...numerics.arrays import ComplexArray, FloatArray
 from ...numerics.blas_threads import single_threaded
 from ...numerics.loops.circle import damped_circle, step_on_circle
+from ..models.conversions import to_discrete
 from ..resolved import warn_unresolved
+from ..siso import delayed_system, is_continuous, proper_ss
 from .loop import open_loop
 from .margins import margins
 
@@ -27,6 +29,8 @@ POINTS, DOUBLINGS = 2000, 8
 PER_TURN, LATER = 20, 400
 """Samples while such a loop turns by 1 rad at its crossover, and while times after `POINTS` such
 samples grow by a factor of e."""
+SHORT = 1000
+"""Turn of a continuous loop by 1 rad over a dead time that a hold of its length stands for."""
 ROUNDING = 1e-8
 """Relative overshoot within the error of a simulated response."""
 SETTLING_BAND = 0.02
@@ -68,10 +72,9 @@ class Performance:
             f"{name} {'stays' if error == float('inf') else in_time(error)}" for name, error in both
         )
         over = "unknown" if np.isnan(self.overshoot) else f"{100 * self.overshoot:.3g} %"
-        settled = "does not settle"
-        if np.isfinite(self.settling_time):
-            settled = f"settled after {in_time(self.settling_time)}"
-        return f"<Performance: {', '.join(errors)}, overshoot {over}, {settled}>"
+        ends = f"settled after {in_time(self.settling_time)}"
+        ends = ends if np.isfinite(self.settling_time) else "does not settle"
+        return f"<Performance: {', '.join(errors)}, overshoot {over}, {ends}>"
 
 
 def step_responses(
@@ -126,7 +129,9 @@ def performance(plant: DelayedStateSpace | DelaySystem, controller: Any) -> Perf
     Parameters
     ----------
     plant : DelayedStateSpace or DelaySystem
-        Discrete; or a continuous `DelaySystem`, whose delay differential equation is solved.
+        Discrete; or continuous: its delay differential equation is solved or, of a dead time of
+        less than a thousandth of the time in which the loop turns by 1 rad, the loop is sampled in
+        such steps. Any other system of python-control.
     controller : system or float
         Of the plant's sample time, with negative feedback.
 
@@ -162,18 +167,25 @@ def performance(plant: DelayedStateSpace | DelaySystem, controller: Any) -> Perf
     >>> cr.design.performance(plant, 0.5).setpoint_error
     inf
     """
+    if not is_continuous(plant):
+        plant = delayed_system(plant, "the performance of a loop")
+    elif not isinstance(plant, DelaySystem):
+        plant = DelaySystem(proper_ss(plant, "the performance of a loop"))
     warn_unresolved(plant)
     slow, turn = loop_times(plant, controller)
     if not plant.dt:
-        return continuous_performance(plant, controller, slow, turn)
+        within = isinstance(controller, DelaySystem)
+        if within or not 0 < plant.delay_apart()[1] < turn / SHORT:
+            return continuous_performance(plant, controller, slow, turn)
+        plant = to_discrete(plant, dt=turn / SHORT)
+        if isinstance(controller, ct.LTI):
+            controller = to_discrete(controller, dt=turn / SHORT)
     setpoint, load, settled = settled_responses(plant, controller, slow)
     if not settled:
-        warnings.warn(
-            f"the loop has not settled after {setpoint.size} samples of {plant.dt:g} s; its "
-            "errors are those up to then. Use a longer sample time to cover the whole "
-            "response",
+        warn_caller(
+            f"the loop has not settled after {setpoint.size} samples of {plant.dt:g} s; its errors "
+            "are those up to then. Use a longer sample time to cover the whole response",
             ModelWarning,
-            stacklevel=3,  # one frame more: the limit of BLAS threads
         )
     return sampled_performance(setpoint, load, float(plant.dt))
 

@@ -221,18 +221,9 @@ def tuned(
         kp, ti, td = from_ultimate(rule, kind, *critical_point(exact))
     units = gain_and_time_units(plant)
     made = PIDController(
-        kp,
-        ti,
-        td,
-        td / ratio,
-        dt=step,
-        method=method,
-        rule=rule,
-        model=model,
-        name=options.name,
-        gain_unit=units[0],
-        time_unit=units[1],
-    )
+        kp, ti, td, td / ratio, dt=step, method=method, rule=rule, model=model,
+        name=options.name, gain_unit=units[0], time_unit=units[1],
+    )  # fmt: skip
     return made, exact
 
 
