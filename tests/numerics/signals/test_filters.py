@@ -49,6 +49,14 @@ def test_white_noise_fails_the_test_as_often_as_asked_for():
     assert whiteness(correlation(coloured, coloured, 20)[1:], 400) < 1e-3
 
 
+def test_a_quarter_as_many_lags_as_samples_have_their_share_of_false_alarms():
+    draws = np.random.default_rng(3).standard_normal((2000, 100))
+    chance = np.array([whiteness(correlation(e, e, 25)[1:], 100) for e in draws])
+    # 1 and 5 % of 2000 are 20 +- 4.4 and 100 +- 9.7; with 25 degrees of freedom 58 and 160
+    assert 10 <= np.sum(chance < 0.01) <= 38
+    assert np.sum(chance < 0.05) == pytest.approx(100, abs=30)
+
+
 def test_bound_of_cross_correlation_holds_for_coloured_signals():
     rng = np.random.default_rng(0)
     outside = []
