@@ -12,6 +12,7 @@ KINDS = [None, True, -1, 1.5, float("nan"), "x", b"x", [], {}, np.ones(3), objec
 RECORD = step_record(noise=1e-3, seed=1, before=150, after=500)
 STEP = cr.unit_step(RECORD)
 PLANT = cr.delayed_ss(ct.ss(0.9, 1, 0.1, 0, 0.1), 3)
+PID = cr.design.PIDController(2.0, 10.0, dt=0.1)
 FREQUENCY = np.geomspace(0.05, 4, 20)
 FRF = cr.MeasuredFRF(np.ravel(PLANT(np.exp(0.2j * np.pi * FREQUENCY))), FREQUENCY)
 
@@ -64,6 +65,14 @@ NO_SENSE = [
     lambda: cr.DelayedStateSpace(PLANT, 1, inputs=["a", "b"]),
     lambda: cr.DelayedStateSpace(PLANT, 1, inputs=[1]),
     lambda: cr.DelayedStateSpace(PLANT, 1, outputs=7),
+    lambda: PID.algorithm(output_limits=100),
+    lambda: PID.algorithm(output_limits=("low", np.inf)),
+    lambda: PID.algorithm().simulate(np.ones(3), np.zeros(3), ["auto", "auto", "auto"]),
+    lambda: cr.bench.valve_loop().simulate(100, setpoint="ramp"),
+    lambda: cr.bench.valve_loop().simulate(100, settle=np.inf),
+    lambda: cr.bench.relay_test(PLANT),
+    lambda: cr.experiment.achieved(RECORD, RECORD),
+    lambda: cr.validation.compare_delay_estimates(frf=RECORD),
 ]
 
 

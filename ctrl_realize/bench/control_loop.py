@@ -9,7 +9,7 @@ from typing import Literal, TypeAlias
 import control as ct
 import numpy as np
 
-from .._checks import positive
+from .._checks import numbers, positive, real
 from ..actuators import Actuator, Saturation, Series
 from ..data import Record
 from ..delayed import DelayedStateSpace, delayed_ss
@@ -153,8 +153,10 @@ class ValveLoop:
             raise OptionError(
                 f"duration={duration!r} is {n} samples of {self.dt:g} s; expected at least 10"
             )
-        before = round(0.5 * n) if settle is None else round(max(settle, 0.0) / self.dt)
-        asked = np.full(n, _MIDDLE) if setpoint is None else np.asarray(setpoint, np.float64)
+        before = round(0.5 * n)
+        if settle is not None:
+            before = round(max(real(settle, "settle", "time in s"), 0.0) / self.dt)
+        asked = np.full(n, _MIDDLE) if setpoint is None else numbers(setpoint, "setpoint")
         if asked.shape != (n,) or not np.isfinite(asked).all():
             raise OptionError(
                 f"setpoint has shape {asked.shape}; expected {n} finite numbers, one for each "

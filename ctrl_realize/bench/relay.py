@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from .._checks import integer, not_negative, positive, real
+from .._checks import check_type, integer, not_negative, positive, real
 from ..data import Record
 from ..errors import OptionError
 from ..numerics.loops.relay import relay_loop
@@ -76,6 +76,7 @@ def relay_test(
     >>> sorted(set(record.input.ravel().tolist()))
     [8.0, 20.0, 38.0]
     """
+    check_type(plant, Plant, "plant", "a Plant, such as bench.heater()", OptionError)
     size = positive(
         0.5 * plant.amplitude if amplitude is None else amplitude, "amplitude", "height"
     )

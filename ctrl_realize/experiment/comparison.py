@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
+from .._checks import check_type
 from .._wording import interval_in_time, plainly
 from ..data import Record
 from ..data.given import as_record
@@ -123,6 +124,7 @@ def achieved(plan: ExperimentPlan, record: Record, **options: Any) -> Achieved:
     >>> 0.8 < result.ratio < 1.2
     True
     """
+    check_type(plan, ExperimentPlan, "plan", "an ExperimentPlan of experiment.plan")
     fit = fitted(as_record(record), options)
     known = known_from_fit(fit)
     own, before = Bound(known.model, fit.dt), Bound(plan.model, plan.dt)

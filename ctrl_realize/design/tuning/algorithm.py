@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
+from numbers import Real
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..._checks import band, finite, one_of, positive, real
+from ..._checks import band, finite, numbers, one_of, positive, real
 from ..._wording import in_digits, in_time
 from ...errors import DataError, OptionError
 from ...numerics.arrays import FloatArray
@@ -202,7 +204,7 @@ class PIDAlgorithm(Result):
         ndarray, shape (N,)
         """
         r, y = finite(setpoint, "the setpoint"), finite(measured, "the measured value")
-        hand = np.full(y.shape, np.nan) if manual is None else np.asarray(manual, dtype=float)
+        hand = np.full(y.shape, np.nan) if manual is None else numbers(manual, "manual")
         if r.ndim != 1 or not r.shape == y.shape == hand.shape:
             raise DataError(
                 f"setpoint, measured and manual have shapes {r.shape}, {y.shape}, {hand.shape}; "
@@ -275,7 +277,7 @@ class PIDRun:
 
 
 def _limits(value: Any) -> tuple[float, float]:
-    ends = tuple(value)
-    if len(ends) == 2 and any(abs(end) == INF for end in ends):
+    ends = tuple(value) if isinstance(value, Iterable) else ()
+    if len(ends) == 2 and all(isinstance(end, Real) for end in ends) and INF in map(abs, ends):
         return float(ends[0]), float(ends[1])
     return band(value, "output_limits", "limits of the output")

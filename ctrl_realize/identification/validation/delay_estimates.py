@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from ..._checks import integer
+from ..._checks import check_type, integer
 from ..._flags import Flag, flagged
 from ...data import MeasuredFRF, Record
 from ...data.given import check_complete
@@ -113,6 +113,7 @@ def compare_delay_estimates(
     if record is not None:
         found += _from_record(record, max_delay, order)
     if frf is not None:
+        check_type(frf, MeasuredFRF, "frf", "a MeasuredFRF, such as read_frf(path)")
         found += _from_frf(frf)
     estimates = tuple(one for one in found if isinstance(one, DelayEstimate))
     flags = tuple(one for one in found if isinstance(one, Flag))
