@@ -19,7 +19,7 @@ class LoadStep:
 
     The response to a unit step is the sum of ``residues / poles (exp(poles s) - 1)``, s the time
     since the step over `lag`; times in s. `size` is what the load adds to the last output. `early`:
-    so soon after a step of the input that it cannot be told from the response to that.
+    it cannot be told from the response to the input, mostly since it comes so soon after a step.
     """
 
     time: float
