@@ -9,9 +9,8 @@ misfit does, fewer of them count.
 A score test [2]_ on the fits without load comes first: it needs no further fit. Only where it finds
 something are time and lag determined with dynamics and dead time: by a scan over all times and lags
 about the parameters of the plant, a fit of the plant for the best of them, and steps of Gauss and
-Newton's method in all parameters. The model
-has, with the response to the load, its changes for another time and another lag: their errors are
-then part of those of gain and dead time.
+Newton's method in all parameters. The model has, with the response to the load, its changes for
+another time and another lag: their errors are then part of those of gain and dead time.
 
 Ablation: load during the test.
 
