@@ -205,5 +205,4 @@ def _hold(system: Any, dt: float | None, hold: str | None) -> Literal["zoh"] | N
 
 def _evaluate(system: Any, omega: FloatArray, dt: float | None) -> ComplexArray:
     points = 1j * omega if dt is None else np.exp(1j * omega * dt)
-    response = np.asarray(system(points, squeeze=False), dtype=np.complex128)
-    return np.asarray(response[0, 0])
+    return np.asarray(system(points, squeeze=False)[0, 0], dtype=np.complex128)

@@ -70,10 +70,9 @@ def fit_frf(
         relative weights noise that does not fall with the response, as at an anti-resonance, would
         outweigh all other points.
     hold : {"auto", "zoh", None}
-        "zoh": the FRF was estimated from samples of a held input. The hold is divided out (`dt`
-        must be its sample time if the FRF has none), and points near the Nyquist frequency, where
-        aliasing occurs, have less weight. "auto": do so if the FRF has a sample time, as from
-        `spectral_frf`. None: the FRF contains no hold.
+        "zoh": the FRF was estimated from samples of a held input, and so is the response of the
+        model (`dt` must be its sample time if the FRF has none), aliases included. "auto": do so if
+        the FRF has a sample time, as from `spectral_frf`. None: the FRF contains no hold.
     band_hz : tuple of float, optional
         Use only points in this band.
     name : str, optional
@@ -141,11 +140,8 @@ def fit_frf(
     points = frf_points(frf, weighting, band_hz, below_hz=below_hz)
     frequency, response, sigma = points.frequency_hz, points.response, points.sigma
     if held is not None:
-        response = response / hold_response(2 * np.pi * frequency, held)
-        if points.noise_known:
-            # Aliases from beyond the Nyquist frequency, which a continuous model cannot describe,
-            # have about this size for a plant that falls with 1/omega.
-            sigma = np.hypot(sigma, np.abs(response) * (frequency / (1 / held - frequency)) ** 2)
+        passed = hold_response(2 * np.pi * frequency, held)
+        response, sigma = response / passed, sigma / np.abs(passed)
     orders = None if order is None else integers(order, "order", 0, 30)
     degrees = (
         None if relative_degree is None else integers(relative_degree, "relative_degree", 0, 30)
@@ -167,6 +163,7 @@ def fit_frf(
         response=response / size,
         weight=size / sigma,
         max_dead_time=longest * unit,
+        held=(held or 0.0) * unit,
     )
     if points.assumed:
         data, fits = fit_with_floor(data, orders, degrees)

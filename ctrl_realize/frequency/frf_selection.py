@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
+from math import ceil
 from typing import Any
 
 import numpy as np
@@ -51,18 +52,9 @@ _FAR_BETTER = 0.5
 
 
 def chosen_model(
-    frf: Any,
-    data: FRFData,
-    fits: dict[Structure, Candidate],
-    points: FRFPoints,
-    unit: float,
-    size: float,
-    dt: float,
-    held: float | None,
-    name: str | None,
-    *,
-    stated: bool,
-) -> DelayedStateSpace:
+    frf: Any, data: FRFData, fits: dict[Structure, Candidate], points: FRFPoints, unit: float,
+    size: float, dt: float, held: float | None, name: str | None, *, stated: bool,
+) -> DelayedStateSpace:  # fmt: skip
     """Choose the structure, state the uncertainty and build the model.
 
     Parameters
@@ -109,16 +101,13 @@ def chosen_model(
     A, B, C, D = modal_state_space(data, chosen)
     used = best.dead_time
     if r == 0:
-        # more than any model can hold are refused when it is made
-        used = round(min(used / dt, 1e9)) * dt
+        # more than any model can hold are refused when it is made; a held input waits for a sample
+        used = (round if held is None else ceil)(min(used / dt, 1e9)) * dt
         if abs(used - best.dead_time) > 1e-9 * dt:
             exact = in_time(best.dead_time, 5)
             flags.append(flagged("dead_time_rounded", used=in_time(used, 5), dead_time=exact))
     result = FRFFit(
-        order=n,
-        relative_degree=r,
-        dead_time=best.dead_time,
-        std_given_structure=best.std,
+        order=n, relative_degree=r, dead_time=best.dead_time, std_given_structure=best.std,
         interval=interval,
         frequency_hz=read_only(frequency),
         measured=locked(points.response),

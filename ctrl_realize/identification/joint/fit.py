@@ -180,8 +180,7 @@ def fit_joint(
         choices=tuple(_choices(estimate, first, other, spread)),
     )
     stated = tuple(flag for flag in first.flags if flag.code == "parameter_at_bound")
-    result = replace(result, flags=(*joint_flags(result, latest), *stated))
-    return fitted_model(result)
+    return fitted_model(replace(result, flags=(*joint_flags(result, latest), *stated)))
 
 
 def _records(

@@ -256,8 +256,7 @@ def leaving(
 
 def other_side(dead_time: FloatArray, way: IntArray, dt: float) -> FloatArray:
     """Dead times (B,) beyond the sample that is reached, -1 (earlier) or 1 (later)."""
-    sample = np.round(dead_time / dt)
-    return np.asarray((sample + way * BESIDE) * dt)
+    return np.asarray((np.round(dead_time / dt) + way * BESIDE) * dt)
 
 
 def snapped(dead_time: FloatArray, dt: float) -> FloatArray:

@@ -71,8 +71,7 @@ class Segments:
     @property
     def rows(self) -> list[slice]:
         """Number of rows of every segment."""
-        edges = [int(edge) for edge in self.edges]
-        return [slice(a, b) for a, b in pairwise(edges)]
+        return [slice(int(a), int(b)) for a, b in pairwise(self.edges)]
 
     @cached_property
     def shapes(self) -> int:

@@ -166,7 +166,6 @@ def _innovations(error: FloatArray) -> FloatArray:
 
 def _suspects(data: StepData, fits: WindowFit) -> list[Candidate]:
     """Score test: models about which a load would lower the criterion; none if it is noise."""
-    clock, noise = data.clock, data.sigma * data.colour
     times = _times(data, fits)
     if fits.problem.segments is not None or times.size < _FEWEST_TIMES:
         return []
@@ -175,9 +174,9 @@ def _suspects(data: StepData, fits: WindowFit) -> list[Candidate]:
     tried = [s for s in fits.candidates if s.zeros <= 1 and s.order <= _SIMPLE]
     found = []
     for s in dict.fromkeys((*tried, best.structure)):
-        left, _ = _scan(fits, fits.candidates[s], clock, times)
+        left, _ = _scan(fits, fits.candidates[s], data.clock, times)
         freedom = max(problem.data.size - 2 - s.order - s.zeros - _PARAMETERS, 1)
-        gained = (plain - left) / max(left / freedom, noise**2, SMALLEST)
+        gained = (plain - left) / max(left / freedom, (data.sigma * data.colour) ** 2, SMALLEST)
         charge = _charge(fits, s) + fits.penalty * _PARAMETERS - _charge(fits, best.structure)
         found.append((gained - charge, fits.candidates[s]))
     rich = best.structure.order >= _RICH and best.structure.zeros > 0

@@ -31,7 +31,7 @@ from ..engine.poles import poles_from_parameters
 from ..engine.problem import Bounds, Evaluation, KnownFactor, Problem, Structure
 from ..engine.profile import Points, profile_curve, profile_limits, with_ends, without_points
 from ..engine.structures import Candidate, Scales, parameter_bounds
-from ..signals.sines import Sines, stacked_parts
+from ..signals.sines import HeldSines, Sines, stacked_parts
 
 _FIRST_ITERATIONS = 10  # after which the starts are compared, and the best ones go on
 _BEYOND, _SHARPEST, _DULLEST = 100.0, 1e-4, 1e3
@@ -56,12 +56,15 @@ class FRFData:
         One over the standard deviation of the complex response, up to a factor.
     max_dead_time : float
         Upper bound of the search.
+    held : float
+        Sample time of the hold that was divided out; 0 if there was none.
     """
 
     s: ComplexArray
     response: ComplexArray
     weight: FloatArray
     max_dead_time: float
+    held: float = 0.0
 
     @property
     def omega(self) -> FloatArray:
@@ -79,7 +82,8 @@ class FRFData:
         """Rows whose sum of squares is that of ``|weight (response - model)|``."""
         parts, weights = stacked_parts(self.response), np.concatenate([self.weight, self.weight])
         no_regressor = np.empty((2 * self.s.size, 0))
-        return Problem(parts, weights, Sines(self.omega), no_regressor, KnownFactor())
+        drive = HeldSines(self.omega, self.held) if self.held else Sines(self.omega)
+        return Problem(parts, weights, drive, no_regressor, KnownFactor())
 
     @cached_property
     def scales(self) -> Scales:
@@ -169,7 +173,7 @@ def pole_deviations(
     size = np.maximum(np.linalg.norm(J, axis=0), _LEAST_INFORMATION * state.sensitivity[0])
     size[size == 0] = 1.0
     _, sv, Vt = np.linalg.svd(J / size, full_matrices=False)
-    root = (Vt.T / np.maximum(sv, _LEAST_INFORMATION * sv[0])) / size[:, None]
+    root = (Vt.T / np.maximum(sv, _LEAST_INFORMATION * (sv[0] or 1.0))) / size[:, None]
     if robust:
         lost = fit.structure.order + fit.structure.zeros + 2
         freedom, power = max(residual.size - lost, 1), float(residual @ residual)

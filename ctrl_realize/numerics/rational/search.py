@@ -224,9 +224,7 @@ def residual_variance(data: FRFData, fit: Candidate, freedom: int, noise_known: 
     Correlated residuals count for fewer points. Known noise is never scaled down: a lucky fit is
     not more reliable.
     """
-    scale = 2 * fit.cost / max(freedom, 1)
-    if noise_known:
-        scale = max(scale, 1.0)
+    scale = max(2 * fit.cost / max(freedom, 1), float(noise_known))
     return scale * correlation_cost(data, fit)
 
 
