@@ -50,8 +50,7 @@ class HostMargins(DeferredMatrices):
         """
         check_single(self, "a margin")
         omega, values = self._followed()
-        phase = np.degrees(np.unwrap(np.angle(values)))
-        return iter((np.abs(values), phase, omega))
+        return iter((np.abs(values), np.degrees(np.unwrap(np.angle(values))), omega))
 
     def _followed(self) -> tuple[FloatArray, ComplexArray]:
         """Frequencies so close that the response between them can be interpolated."""

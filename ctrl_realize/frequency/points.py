@@ -104,8 +104,7 @@ def _sigma(
     if weighting == "std":
         raise OptionError("weighting='std', but the FRF has no standard deviation")
     if weighting == "uniform":
-        size = float(np.sqrt(np.mean(np.abs(response) ** 2)))
-        return np.full(response.size, size), False
+        return np.full(response.size, np.sqrt(np.mean(np.abs(response) ** 2))), False
     sigma = np.abs(response)
     if coherence is not None:
         part = np.clip(coherence, 1e-3, 1 - 1e-6)

@@ -210,11 +210,12 @@ def _wider(
         estimate = replace(estimate, low=low, high=high, std=factor * estimate.std)
         if estimate.static is not None:
             more = _ratio(own, others, bounds[i].gradient(("gain",))[0])
-            (static, _), *alike = (
-                (replace(one, gain_std=more * one.gain_std), weight)
-                for one, weight in [(estimate.static, 1.0), *estimate.alike]
+            static = replace(estimate.static, gain_std=more * estimate.static.gain_std)
+            alike = tuple(
+                (replace(other, gain_std=more * other.gain_std), weight)
+                for other, weight in estimate.alike
             )
-            estimate = replace(estimate, static=static, alike=tuple(alike))
+            estimate = replace(estimate, static=static, alike=alike)
         found.append(replace(fit, estimate=estimate))
     return tuple(found)
 

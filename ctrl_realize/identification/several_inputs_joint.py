@@ -84,8 +84,7 @@ def fitted_together(
         return np.hstack([every[0], *(one[:, 2:] for one in every[1:])])  # one level, one drift
 
     def responses(x: FloatArray) -> FloatArray:
-        every = zip(models(x), inputs, strict=True)
-        return np.array([model.response(u) for model, u in every])
+        return np.array([one.response(u) for one, u in zip(models(x), inputs, strict=True)])
 
     def left(x: FloatArray) -> FloatArray:
         return np.asarray((output - responses(x).sum(axis=0))[seen] - columns(x) @ x[ends[-1] :])

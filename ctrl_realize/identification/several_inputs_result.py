@@ -122,8 +122,9 @@ class SeveralInputsFit(ModelFit):
             told = time_within(fit.dead_time, *fit.interval)
             told += f" ({interval_in_time(*fit.interval)})"
             rows += [(name, fit.formula), ("  dead time", told)]
+        state = "converged" if self.converged else "not converged"
         rows.append(("residual", f"{self.residual_std:.3g}"))
-        return [*rows, ("iterations", f"{self.cycles}, {'not ' * (not self.converged)}converged")]
+        return [*rows, ("iterations", f"{self.cycles}, {state}")]
 
     def __repr__(self) -> str:
         return f"<SeveralInputsFit of {', '.join(self.inputs)}>"

@@ -72,8 +72,9 @@ class Performance:
             f"{name} {'stays' if error == float('inf') else in_time(error)}" for name, error in both
         )
         over = "unknown" if np.isnan(self.overshoot) else f"{100 * self.overshoot:.3g} %"
-        ends = f"settled after {in_time(self.settling_time)}"
-        ends = ends if np.isfinite(self.settling_time) else "does not settle"
+        ends = "does not settle"
+        if np.isfinite(self.settling_time):
+            ends = f"settled after {in_time(self.settling_time)}"
         return f"<Performance: {', '.join(errors)}, overshoot {over}, {ends}>"
 
 

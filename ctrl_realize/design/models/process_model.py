@@ -82,8 +82,7 @@ class ProcessModel(Result):
         den = np.polymul([self.lag, 1.0], [self.second_lag, 1.0])
         if self.integrating:
             den = np.append(den, 0.0)
-        den = np.trim_zeros(den, "f")
-        return ct.tf([self.gain], den, inputs=["u"], outputs=["y"])
+        return ct.tf([self.gain], np.trim_zeros(den, "f"), inputs=["u"], outputs=["y"])
 
     def system(self, dt: float) -> DelayedStateSpace:
         """Sample the model with a zero-order hold, dead time exact."""

@@ -263,8 +263,7 @@ def right_zeros(fit: OutputErrorEstimate) -> ComplexArray:
         # They delay the onset, as dispersion does.
         return np.empty(0, dtype=np.complex128)
     zeros = np.roots(fit.numerator[::-1]).astype(np.complex128)
-    near = np.abs(zeros) <= 3 * np.abs(fit.poles).max()
-    return np.asarray(zeros[(zeros.real > 0) & near])
+    return np.asarray(zeros[(zeros.real > 0) & (np.abs(zeros) <= 3 * np.abs(fit.poles).max())])
 
 
 def _before_the_step(data: StepData, fit: OutputErrorEstimate) -> Iterator[Flag]:

@@ -34,10 +34,10 @@ than a percent, at which no two of them have the same."""
 
 def distinct(names: Iterable[str]) -> tuple[str, ...]:
     """Names of records, with numbers where they are missing or the same."""
-    given = [name or f"record {i}" for i, name in enumerate(names)]
-    return tuple(
-        name if given.count(name) == 1 else f"{name} ({i})" for i, name in enumerate(given)
-    )
+    found = [name or f"record {i}" for i, name in enumerate(names)]
+    while len(set(found)) < len(found):  # a number may give a name that there is already
+        found = [one if found.count(one) == 1 else f"{one} ({i})" for i, one in enumerate(found)]
+    return tuple(found)
 
 
 @dataclass(frozen=True, eq=False)

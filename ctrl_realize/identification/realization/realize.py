@@ -139,8 +139,7 @@ def realize(
         impulse=data,
         flags=(*filter_flags(data), *_model_flags(model, order, samples)),
     )
-    core = ct.ss(model.A, model.B, model.C, D, data.dt)
-    return DelayedStateSpace(core, delay, fit=fit)
+    return DelayedStateSpace(ct.ss(model.A, model.B, model.C, D, data.dt), delay, fit=fit)
 
 
 def uses_feedthrough(impulse: ImpulseResponse, delay: int, feedthrough: bool | None) -> bool:

@@ -178,8 +178,7 @@ def strange_modes(table: Table, index: int) -> set[str]:
 
 def mode_word(cell: object) -> str:
     """Mode in a cell, as it is compared: ``1.0 -> "1"``."""
-    word = str(cell).strip().casefold()
-    return word.removesuffix(".0")
+    return str(cell).strip().casefold().removesuffix(".0")
 
 
 def _tagged(table: Table, tags: Iterable[str], taken: Iterable[int]) -> list[int]:

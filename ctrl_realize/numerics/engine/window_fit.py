@@ -357,8 +357,7 @@ def _residual(
 def extended(fit: WindowFit, structures: Sequence[Structure]) -> WindowFit:
     """Add structures to a fit; noise and data remain those of the previous structures."""
     candidates = search(fit.problem, structures, fit.scales, fit.candidates)
-    candidates = converged(fit.problem, candidates, fit.scales, fit.variance, fit.independent)
-    return fit.of(candidates)
+    return fit.of(converged(fit.problem, candidates, fit.scales, fit.variance, fit.independent))
 
 
 def among(fit: WindowFit, structures: Sequence[Structure]) -> WindowFit:

@@ -224,7 +224,9 @@ def residual_variance(data: FRFData, fit: Candidate, freedom: int, noise_known: 
     Correlated residuals count for fewer points. Known noise is never scaled down: a lucky fit is
     not more reliable.
     """
-    scale = max(2 * fit.cost / max(freedom, 1), float(noise_known))
+    scale = 2 * fit.cost / max(freedom, 1)
+    if noise_known:
+        scale = max(scale, 1.0)
     return scale * correlation_cost(data, fit)
 
 

@@ -133,6 +133,7 @@ def test_records_of_equal_names_have_a_column_each():
     table = cr.validation.cross_validate(TWO_STATES, records)
     fits = [cr.validation.analyse_residuals(TWO_STATES, one).fit_percent[0] for one in records]
     assert_allclose(table.to_numpy(), [fits])
+    assert table.columns.is_unique
 
 
 @pytest.mark.parametrize(
