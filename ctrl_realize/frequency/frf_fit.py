@@ -63,8 +63,8 @@ class FRFFit(FractionalDelayFit):
         95 % interval of the dead time in s.
     frequency_hz : ndarray, shape (K,)
     measured : ndarray of complex, shape (K,)
-        Points that were fitted. The hold of a sampled FRF was divided out; aliases, which the fit
-        has in its model, are left, so that they differ from `response` near the Nyquist frequency.
+        Points that were fitted. The hold of a sampled FRF was divided out, and the aliases were
+        taken out that a held input has in the model.
     sigma : ndarray, shape (K,)
         Standard deviation used as weight of each point; if the FRF had none a relative one, with a
         floor where the residuals have one.

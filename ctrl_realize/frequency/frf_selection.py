@@ -126,6 +126,9 @@ def chosen_model(
         flags=tuple(flags),
         stated=stated,
     )  # fmt: skip
+    if held is not None:
+        own = result.response(2 * np.pi * frequency) + data.misfit(chosen) / data.weight * size
+        result = replace(result, measured=locked(own))
     return delayed_ss(result.core, dead_time=used, dt=dt, fit=result, name=name)
 
 

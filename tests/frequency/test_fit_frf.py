@@ -454,6 +454,9 @@ def test_aliases_of_a_held_input_are_part_of_the_model(dead_time, level):
     assert fit.weighted_rms == pytest.approx(1, abs=0.1)
     assert fit.interval[0] <= dead_time <= fit.interval[1] < fit.interval[0] + 0.4
     right = cr.fit_frf(frf, 1).fit
+    continuous = 2 * np.exp(-2j * np.pi * f * dead_time) / (24j * np.pi * f + 1)
+    # what is left are noise and the error of the model, without aliases of up to its own size
+    np.testing.assert_allclose(right.measured, continuous, rtol=6 * level)
     assert right.dead_time == pytest.approx(dead_time, abs=max(4 * right.std_given_structure, 1e-4))
     assert right.gain == pytest.approx(2, rel=level)
 

@@ -107,8 +107,7 @@ class WindowFit:
     def estimated(self) -> tuple[int, int]:
         """Parameters that were estimated, and samples from which they were."""
         window = self.window
-        parameters = _estimated(window, self.best.structure)
-        return parameters, window.output.size - window.start
+        return _estimated(window, self.best.structure), window.output.size - window.start
 
     @cached_property
     def best(self) -> Candidate:

@@ -54,8 +54,7 @@ class Choice:
         """Number of free parameters besides gain and dead time."""
         if self.flow is not None:
             return self.flow.parameters
-        own = self.model.structure
-        return FREE_IN_A_CHAIN if self.chain is not None else own.free
+        return FREE_IN_A_CHAIN if self.chain is not None else self.model.structure.free
 
 
 def chains_of(fits: WindowFit) -> list[LagChain]:

@@ -147,8 +147,7 @@ class StepData:
         and its noise is that about the motion if it is a free response.
         """
         if self.bend:
-            free = replace(self, relaxing=True, hum=[], sigma=self.bend, colour=1.0)
-            return [free, self]
+            return [replace(self, relaxing=True, hum=[], sigma=self.bend, colour=1.0), self]
         if not self.drift:
             return [self]
         still = replace(self, drift=0.0)

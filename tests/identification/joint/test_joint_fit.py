@@ -22,6 +22,24 @@ NOISE = 0.03  # of the record
 STD = 0.05  # of the points
 
 
+def held_response(seed):
+    """Spectrum of a record of the plant whose input is held for five samples of 0.05 s."""
+    dt = 0.05
+    plant = cr.delayed_ss(ct.tf([GAIN], [LAG, 1]), dead_time=DEAD_TIME, dt=dt)
+    rng = np.random.default_rng(seed)
+    u = np.repeat(rng.choice([-1.0, 1.0], 800), 5)
+    y = plant.simulate(u) + NOISE * rng.standard_normal(u.size)
+    return cr.spectral_frf(cr.Record(dt * np.arange(u.size), u, y), delay=2)
+
+
+@pytest.mark.parametrize("seed", [0, 1, 2])
+def test_aliases_of_a_held_input_do_not_move_the_dead_time_of_both_together(seed):
+    fit = fit_joint(step(seed), held_response(seed)).fit
+    assert fit.interval[0] <= DEAD_TIME <= fit.interval[1] < fit.interval[0] + 0.05
+    assert fit.dead_time == pytest.approx(DEAD_TIME, abs=0.01)
+    assert "inverse_response" not in [flag.code for flag in fit.flags]
+
+
 def step(seed=0, dead_time=DEAD_TIME, gain=GAIN, noise=NOISE):
     """A step at sample 100, held between samples."""
     since = TIME - TIME[EDGE] - dead_time
