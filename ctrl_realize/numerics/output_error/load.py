@@ -79,7 +79,7 @@ _FOLLOWED = Structure(2, 2), Structure(3, 2), Structure(3, 3)
 16 of 16 simulated loads. Without two lags alone, a zero took up part of a load in 3 of 30, and
 gains were off by 15 %."""
 _TURNS = 2  # of scan and fit, before both are fitted together: 38 of 40 loads as with twelve
-_STEPS = 6  # of Gauss and Newton: twenty lower the cost by thousandths of it more
+_SETTLED = 1e-3  # part of the cost: steps of Gauss and Newton that lower it by less are the last
 _FLOOR = 0.1  # of the noise, below which a residual is rounding
 _NOTHING = 1e-10  # part of the largest singular value that is rounding
 
@@ -297,22 +297,22 @@ def _together(
     """
     structure, scale = candidate.structure, 1.0
     candidate = _fitted(fits, structure, candidate.parameters[None], load.columns(clock)[:, :1])
-    for _ in range(_STEPS):
-        columns = load.columns(clock)
-        near = _fitted(fits, structure, candidate.parameters[None], columns)
-        weights = evaluate(_beside(fits, columns), structure, near.parameters[None]).regression
-        size, later, longer = weights[0, -3:]
-        step = -np.array([later, longer]) / (size or SMALLEST)
+    while scale > 0.1:  # two shorter ones that fail are the last
+        if scale == 1.0:
+            columns = load.columns(clock)
+            near = _fitted(fits, structure, candidate.parameters[None], columns)
+            weights = evaluate(_beside(fits, columns), structure, near.parameters[None]).regression
+            step = -weights[0, -2:] / (weights[0, -3] or SMALLEST)  # of time and lag, by the size
         later, longer = scale * step / max(np.abs(step).max(), 1.0)
         time = np.clip(load.time + load.lag * later, times[0], times[-1])
         shape = load if load.poles.size == 1 else _through_the_plant(fits, near, load, clock)
         trial = replace(shape, time=float(time), lag=float(load.lag * np.exp(longer)))
         starts = np.stack([candidate.parameters, near.parameters])
         found = _fitted(fits, structure, starts, trial.columns(clock)[:, :1])
-        if found.cost < candidate.cost:
-            load, candidate, scale = trial, found, 1.0
-        else:
-            scale /= 4
+        gained = 1 - found.cost / max(candidate.cost, SMALLEST)
+        if gained > 0:
+            load, candidate = trial, found
+        scale = 1.0 if gained >= _SETTLED else scale / 4 if gained <= 0 else 0.0
     return load, candidate
 
 
