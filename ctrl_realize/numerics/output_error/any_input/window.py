@@ -29,7 +29,7 @@ from ...engine.plausible_models import PlausibleModel
 from ...engine.poles import poles_from_parameters
 from ...engine.problem import Problem, Structure
 from ...engine.static_gain import StaticGain
-from ...engine.structures import Candidate, Scales, search
+from ...engine.structures import Candidate, Scales, pattern_starts, search
 from ...engine.window import Window, window_of_rows
 from ...engine.window_fit import WindowFit, fit_window
 from ...signals.noise import correlation_time, quantisation_step, winsorised_sigma
@@ -242,7 +242,8 @@ def _first_order(
         for rise in _RISES
         for onset in (*(usual * onset for onset in _ONSETS), *(dt * lag for lag in seen))
     ]
-    tries = [search(problem, [Structure(1, 1)], each)[Structure(1, 1)] for each in scales]
-    best = min(tries, key=lambda candidate: candidate.cost)
+    first = Structure(1, 1)
+    starts = [start for each in scales for start in pattern_starts(first, each)]
+    best = search(problem, [first], scales[0], starts={first: starts})[first]
     # It has converged, because its dead time determines the samples that are used.
     return settled(problem, replace(best, ends=None), scales[0])
