@@ -66,8 +66,7 @@ def structured_text(program: Program, real: str = "LREAL") -> str:
     lines += declared("VAR_INPUT", program.inputs)
     lines += declared("VAR_OUTPUT", program.outputs)
     lines += declared("VAR CONSTANT", program.constants, values=True)
-    lines += declared("VAR", program.states)
-    lines += declared("VAR", program.scratch)
+    lines += declared("VAR", program.states + program.scratch)
     lines += ["", *syntax.lines(program.body)]
     return "\n".join([*lines, "END_FUNCTION_BLOCK", ""])
 
@@ -82,9 +81,11 @@ def c_header(program: Program) -> str:
         lines.append(f"    {C_TYPES[each.kind]} {each.name}{size}; /* {plain(each.words)} */")
     if not program.states:
         lines.append("    int unused; /* C has no empty structures */")
-    lines += [f"}} {program.name}_state;", ""]
+    # the sketch of an Arduino is C++
+    begin, end = (["", "#ifdef __cplusplus", to, "#endif"] for to in ('extern "C" {', "}"))
+    lines += [f"}} {program.name}_state;", *begin]
     lines += [f"void {program.name}_init({program.name}_state *s);", f"{_c_signature(program)};"]
-    return "\n".join([*lines, "", "#endif", ""])
+    return "\n".join([*lines, *end, "", "#endif", ""])
 
 
 def c_source(program: Program, header: str) -> str:

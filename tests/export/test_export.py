@@ -272,6 +272,22 @@ def test_a_second_parser_accepts_the_text(write, grammar, tmp_path):
         assert parser.parse(text + b"\nx = (1 + ;\n").root_node.has_error
 
 
+@pytest.mark.skipif(shutil.which("g++") is None, reason="g++ compiles the sketch")
+def test_a_sketch_in_c_plus_plus_links_with_the_exported_c(tmp_path):
+    # As an Arduino is programmed: the sketch is C++, a file beside it that ends in .c is C.
+    source = export.to_c(ALGORITHMS["P"], tmp_path / "unit.c", name="unit")
+    sketch = tmp_path / "sketch.cpp"
+    sketch.write_text(
+        '#include <stdio.h>\n#include "unit.h"\nint main() { unit_state s; unit_init(&s); '
+        'printf("%.6f", unit_step(&s, 3.0, 1.0, 0, 0.0)); }\n'
+    )
+    subprocess.run(["gcc", "-c", str(source), "-o", str(tmp_path / "unit.o")], check=True)
+    program = str(tmp_path / "program")
+    subprocess.run(["g++", str(sketch), str(tmp_path / "unit.o"), "-o", program], check=True)
+    answer = subprocess.run([program], check=True, capture_output=True, text=True).stdout
+    assert float(answer) == pytest.approx(1.4 * 2.0)  # kp (3 - 1)
+
+
 def read_script(path):
     """Variables of a script of MATLAB: matrices as arrays, calls as (name, arguments)."""
     found = {}
