@@ -117,8 +117,8 @@ class Bound:
         moving = poles[poles != 0]
         if poles.size - moving.size > 1 or np.any(moving.real >= 0):
             raise UnsuitableSystemError(
-                "the plant is unstable, or has more than one integrator; expected one whose "
-                "response to a planned input stays in range"
+                "the plant is unstable, or has more than one integrator; expected a structure of "
+                "fewer lags, with one integrator at most"
             )
         theta = np.concatenate([[self.model.dead_time], parameters_from_poles(moving)])
         slow = np.full(poles.size - moving.size, -SLOWEST / (samples * self.dt), dtype=complex)
