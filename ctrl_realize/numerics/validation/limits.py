@@ -187,8 +187,12 @@ def _fitted(columns: list[FloatArray], values: FloatArray) -> tuple[FloatArray, 
     return weights, np.asarray(values - regressors @ weights)
 
 
-def clips(output: FloatArray, linear: FloatArray, beyond: FloatArray, held: BoolArray) -> bool:
-    """Whether a plant and a limit explain an output clearly better than a plant alone.
+def clips(
+    output: FloatArray, linear: FloatArray, beyond: FloatArray, held: BoolArray, *, loaded: bool
+) -> bool:
+    """Whether a plant and a limit explain an output better than a linear model.
+
+    Clearly better than a plant alone; beside a plant and a load, by the criterion of both.
 
     Parameters
     ----------
@@ -198,6 +202,8 @@ def clips(output: FloatArray, linear: FloatArray, beyond: FloatArray, held: Bool
         Model that was fitted to the samples that are not `held`.
     held : ndarray of bool, shape (N,)
         Samples on a plateau, at the upper or lower end.
+    loaded : bool
+        A step of a load is part of the linear model.
     """
     limited, away = beyond.copy(), 0.0
     for part, sign, level in ends(output, held):
@@ -213,7 +219,9 @@ def clips(output: FloatArray, linear: FloatArray, beyond: FloatArray, held: Bool
     else:
         noise = rounding_error(output) ** 2
         better, other = (output.size * np.log(np.mean(e**2) + noise) for e in errors)
-    return bool(other - better > VERY_STRONG)
+    # A load has a time and a lag besides; none is taken but with very strong evidence.
+    least = -2 * np.log(output.size) if loaded else VERY_STRONG
+    return bool(other - better > least)
 
 
 def passed(output: FloatArray, model: FloatArray, held: BoolArray) -> BoolArray:

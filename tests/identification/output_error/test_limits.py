@@ -48,12 +48,13 @@ def test_gain_and_dead_time_of_a_step_hold_beyond_a_limit(limit, sign, where):
     assert float(told[1]) == pytest.approx(sign * limit, abs=0.002)
 
 
-def test_a_limit_in_noise_that_looks_like_an_early_load_leaves_the_gain_open():
+def test_a_limit_in_noise_that_looks_like_a_load_is_told():
     u = np.where(TIME < 6, 0.0, 1.0)
     fit = fitted(u, clipped(u, 1.8, "before", seed=3, noise=0.03))
     # it was the limit, 1.805, known to 0.5 %
-    assert {"load_disturbance", "may_be_at_limit"} <= codes(fit)
-    assert fit.gain_interval == (-np.inf, np.inf)
+    assert "output_at_limit" in codes(fit)
+    assert "load_disturbance" not in codes(fit)
+    assert holds(fit)
 
 
 def test_an_output_that_reaches_its_limit_by_the_second_of_two_steps():

@@ -75,6 +75,9 @@ def test_an_output_clips_if_a_limit_explains_it_and_a_model_passes_that():
     held = RISE >= 0.8
     limited = np.minimum(RISE, 0.8) + NOISE
     poor = np.where(held, 0.8, RISE + 0.02)
-    assert clips(limited, poor, RISE, held)
-    assert not clips(limited, np.minimum(RISE, 0.8), RISE, held)  # as good without a limit
-    assert not clips(limited, poor, np.minimum(RISE, 0.805), held)  # hardly passed
+    assert clips(limited, poor, RISE, held, loaded=False)
+    same = np.minimum(RISE, 0.8)  # as good without a limit
+    assert not clips(limited, same, RISE, held, loaded=False)
+    assert not clips(limited, poor, np.minimum(RISE, 0.805), held, loaded=False)  # hardly passed
+    # a load that does the same has two parameters more
+    assert clips(limited, same, RISE, held, loaded=True)

@@ -109,7 +109,9 @@ def _without_plateaus(record: Record, linear: OutputErrorFit, fit: Fit) -> Outpu
             beyond = _simulated(found)
     except (DataError, UnsuitableSystemError):
         return linear
-    if not clips(output[rows], linear.fitted, beyond[rows], held[rows]):
+    load = linear.estimate.load
+    loaded = load is not None and not load.early
+    if not clips(output[rows], linear.fitted, beyond[rows], held[rows], loaded=loaded):
         return linear
     count, levels = np.count_nonzero(held), _levels(output, held)
     flag = flagged("output_at_limit.plateau", count=count, limits=levels)
