@@ -439,6 +439,7 @@ CLOCKS = {  # how the column of time is written, and what its sample time is in 
     "us since 1970": (lambda k: f"{1_770_000_000_000_000 + 100_000 * k}", "us", 0.1, "time_us"),
     "ns since 1970": (lambda k: f"{1_770_000_000 * 10**9 + 10**8 * k}", "ns", 0.1, "time_ns"),
     "Excel": (lambda k: f"{46085.5 + k / 86400:.9f}", "day", 1.0, "time [days]"),
+    "Excel, every hour": (lambda k: f"{46085.5 + k / 24:.9f}", "day", 3600.0, "time [days]"),
     "datenum": (lambda k: f"{739000.25 + k / 86400:.9f}", "day", 1.0, "time [days]"),
 }
 

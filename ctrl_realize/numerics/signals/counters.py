@@ -29,7 +29,6 @@ _AN_HOUR = 3600.0  # in s; ticks since the start of a device may have the number
 _NO_SECONDS = 1e11  # in s, the year 5138
 _DAY_COUNTS = ((36526.0, 58440.0), (730486.0, 752400.0))
 """Years 2000 to 2060 in days, as counted by Excel and by MATLAB's datenum."""
-_HALF_AN_HOUR = 1 / 48  # in days
 _ROUND = 1e-5  # relative difference of a step from its first three digits
 _EARLY = np.timedelta64(4, "h")  # after midnight
 _REGULAR = 1 / 3  # of a step
@@ -156,5 +155,5 @@ def clock_unit(values: FloatArray) -> str | None:
         return None
     if not any(low <= first < high for low, high in _DAY_COUNTS):
         return ""
-    coarse = 0 < step < _HALF_AN_HOUR and abs(float(f"{step:.3g}") / step - 1) >= _ROUND
+    coarse = 0 < 86400 * step < 1.5 * _AN_HOUR and abs(float(f"{step:.3g}") / step - 1) >= _ROUND
     return "day" if coarse else ""
