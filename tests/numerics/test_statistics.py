@@ -1,5 +1,6 @@
 """Trimmed statistics, and threads of the BLAS."""
 
+import sys
 import threading
 
 import control as ct
@@ -112,3 +113,32 @@ def test_an_error_leaves_the_setting_as_it_was(two_threads):
     with pytest.raises(DataError):
         cr.impulse_from_io(cr.Record(np.arange(50.0), np.zeros(50), np.arange(50.0)))
     assert threads() == {2}
+
+
+def test_an_interruption_at_any_call_leaves_the_setting_as_it_was(two_threads):
+    # An interpreter handles signals where functions are entered, among other places.
+    tracer, left = sys.gettrace(), 0
+
+    def interrupt(*_: object) -> None:
+        nonlocal left
+        left -= 1
+        if left == 0:
+            sys.settrace(None)
+            raise KeyboardInterrupt
+
+    for place in range(1, 200):
+        left = place
+        try:
+            sys.settrace(interrupt)
+            with one_blas_thread():
+                pass
+        except KeyboardInterrupt:
+            pass
+        finally:
+            sys.settrace(tracer)
+        assert threads() == {2}, place
+        with one_blas_thread():
+            assert threads() == {1}, place
+        if left > 0:
+            break
+    assert 10 < place < 199
