@@ -27,8 +27,8 @@ __all__ = [
     "UnsuitableSystemError",
 ]
 
-_INSIDE = ("ctrl_realize", "control")
-"""Packages whose frames are skipped when a warning is attributed to a line of the caller."""
+_INSIDE = ("ctrl_realize", "control", "contextlib")
+"""Modules whose frames are skipped when a warning is attributed to a line of the caller."""
 
 
 class CtrlRealizeError(Exception):
