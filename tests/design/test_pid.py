@@ -73,6 +73,31 @@ def test_rules_give_their_published_parameters(model, rule, kind, expected):
     assert found.name == f"{kind}_{rule}"
 
 
+@pytest.mark.parametrize("dead_time", [0.15, 5.0])
+def test_lags_beside_an_integrator_are_dead_time_for_rules_that_have_none(dead_time):
+    # Skogestad's half rule: half of the largest lag beside the integrator, all of the others.
+    model = cr.design.ProcessModel(0.2, lag=5.0, dead_time=dead_time, integrating=True)
+    theta = dead_time + 2.5
+    pi = cr.design.pid(model, "simc", reduction="half_rule")
+    assert [pi.kp, pi.ti] == pytest.approx([1 / (0.2 * 2 * theta), 8 * theta])
+    # Without sampling: the plant whose samples are many times as fast.
+    sampled = model.system(dead_time / 60)
+    for rule in ("simc", "lambda", "amigo"):
+        pi, expected = (cr.design.pid(plant, rule) for plant in (model, sampled))
+        assert [pi.kp, pi.ti] == pytest.approx([expected.kp, expected.ti], rel=0.01), rule
+        assert pi.check.margins.ms < 1.7, rule
+
+
+def test_a_second_lag_beside_an_integrator_and_a_lag_is_no_derivative():
+    lags = {"lag": 5.0, "second_lag": 2.0, "dead_time": 5.0}
+    model = cr.design.ProcessModel(0.2, **lags, integrating=True)
+    pid = cr.design.pid(model, "simc", "PID", reduction="half_rule")
+    # Half rule: lag 5 + 2/2, dead time 5 + 2/2; in series form ti = 8 theta, td = the lag.
+    series, theta = 6.0 / 48.0, 6.0
+    expected = [(1 + series) / (0.2 * 2 * theta), 48.0 * (1 + series), 6.0 / (1 + series)]
+    assert [pid.kp, pid.ti, pid.td] == pytest.approx(expected)
+
+
 @pytest.mark.filterwarnings("ignore:Ms is:ctrl_realize.errors.ModelWarning")  # on purpose
 def test_a_system_is_tuned_half_a_sample_later_than_its_model():
     plant = FOPDT.system(0.5)

@@ -59,12 +59,11 @@ def reduced(
 ) -> ProcessModel:
     """Reduce the plant to the model that a rule needs, with the dead time of the hold."""
     second = rule == "simc" and "D" in kind
-    if isinstance(system, ProcessModel):
+    model = isinstance(system, ProcessModel)
+    if model and bool(system.lag) + bool(system.second_lag) + system.integrating <= 1 + second:
         found = system
-        if system.second_lag and not second:
-            found = reduce_fopdt(system, method=reduction)
     else:
-        given = system if is_continuous(system) else plant
+        given = system if model or is_continuous(system) else plant
         found = (reduce_sopdt if second else reduce_fopdt)(given, method=reduction)
     # A held controller output is half a sample old on average.
     return replace(found, dead_time=found.dead_time + step / 2)
