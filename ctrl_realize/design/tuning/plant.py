@@ -61,7 +61,7 @@ def reduced(
     second = rule == "simc" and "D" in kind
     model = isinstance(system, ProcessModel)
     if model and bool(system.lag) + bool(system.second_lag) + system.integrating <= 1 + second:
-        found = system
+        found: ProcessModel = system
     else:
         given = system if model or is_continuous(system) else plant
         found = (reduce_sopdt if second else reduce_fopdt)(given, method=reduction)
