@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, is_dataclass
 from typing import Any
 
 import numpy as np
@@ -14,6 +14,7 @@ from .._wording import times_in
 from ..actuators.plain import Plain, to_plain
 from ..errors import FileFormatError
 from ..identification.output_error.actuated.result import ActuatorFit
+from ..identification.verdicts import Verdict
 from ..results import INTERVAL_LABELS, Flag, IntervalKind, ModelFit
 from .json_content import field, of_kind
 
@@ -24,10 +25,10 @@ _KEPT: dict[str, Any] = {
     "gain_interval": Ends, "gain_std_given_structure": float, "onset": float,
     "interval_kind": IntervalKind, "residual_std": float, "sampling": str, "integrators": int,
     "input_unit": str, "output_unit": str, "parameters": tuple[Parameter, ...],
-    "actuator": ActuatorFit,
+    "actuator": ActuatorFit, "verdicts": tuple[Verdict, ...],
 }  # fmt: skip
 """Attributes of a `ModelFit` that are stored -> their kinds; also the keys in the file."""
-_ABSENT = {"integrators": 0, "input_unit": "", "output_unit": "", "parameters": ()}
+_ABSENT = {"integrators": 0, "input_unit": "", "output_unit": "", "parameters": (), "verdicts": ()}
 _TIMES = ("delay", "dead_time", "dead_time_interval", "residual_std")
 _OPEN_TIMES = ("interval", "delay_interval")
 """Never negative, and intervals of them that may have no upper end."""
@@ -136,15 +137,12 @@ def summary_of(fit: ModelFit | None) -> FitSummary | None:
     """Reduce any fit to plain numbers and text."""
     if fit is None or isinstance(fit, FitSummary):
         return fit
-    values = {
-        key: _plain(getattr(fit, key)) for key in _KEPT if key not in ("parameters", "actuator")
-    }
+    values = {key: _plain(getattr(fit, key)) for key in _KEPT if key != "actuator"}
     for key in ("std_given_structure", "fit_percent"):  # of some fits
         values[key] = _plain(getattr(fit, key, None))
     values["time_unit"], values["method"] = fit._record_unit, fit._method
     if fit.parameters:
         values["formula"] = fit.formula
-        values["parameters"] = _parameter_rows(fit.parameters)
     if fit.actuator is not None:
         values["actuator"] = _actuator_row(fit.actuator)
     with times_in(fit.time_unit):
@@ -154,20 +152,15 @@ def summary_of(fit: ModelFit | None) -> FitSummary | None:
         kind=type(fit).__name__,
         title=title,
         rows=rows,
-        values=tuple(pair for pair in values.items() if pair[1] is not None),
+        values=tuple(pair for pair in values.items() if pair[1] not in (None, ())),
         flags=fit.flags,
         choices=fit.choices,
     )
 
 
-def _parameter_rows(parameters: Iterable[Parameter]) -> Plain:
-    return _plain([tuple(vars(one).values()) for one in parameters])
-
-
 def _actuator_row(fit: ActuatorFit) -> Plain:
     """Return the fields of an actuator in their order, without what the records cannot tell."""
-    model, rows = to_plain(fit.model), _parameter_rows(fit.parameters)
-    return _plain((model, fit.actuator_at, rows, fit.starts, fit.evidence))
+    return _plain((to_plain(fit.model), fit.actuator_at, fit.parameters, fit.starts, fit.evidence))
 
 
 def summary_to_json(summary: FitSummary | None) -> dict[str, Any] | None:
@@ -216,7 +209,9 @@ def _texts(content: Mapping[str, Any], key: str, kind: Any) -> Any:
 
 
 def _plain(value: Any) -> Plain:
-    """Numbers and text as Python's own; None for anything else."""
+    """Numbers and text as Python's own, fields of a dataclass in order; None for anything else."""
+    if is_dataclass(value):
+        value = tuple(vars(value).values())
     if isinstance(value, np.generic):
         value = value.item()
     if isinstance(value, np.ndarray) and value.size <= 100:

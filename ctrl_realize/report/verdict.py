@@ -16,7 +16,6 @@ from ..frequency.comparison import FRFComparison
 from ..frequency.disagreement import CLOSE, FAR
 from ..identification.campaign.campaign import Campaign
 from ..identification.output_error.words import gain_scatter, sign_is_told
-from ..identification.realization.delay_scan_result import DelayScan
 from ..identification.verdicts import in_doubt
 from ..plots.delays import estimate_of, interval_of
 from .facts import (
@@ -162,9 +161,10 @@ def _sign_is_told(system: DelayedStateSpace) -> bool:
 
 
 def _flags_of(system: DelayedStateSpace) -> tuple[Flag | str, ...]:
-    flags = () if system.fit is None else system.fit.flags
-    scanned = [JUDGEMENTS["model"]["scanned"]] * isinstance(system.fit, DelayScan)
-    return (*flags, *scanned)
+    if system.fit is None:
+        return ()
+    scanned = [JUDGEMENTS["model"]["scanned"]] * (system.fit.interval_kind == "flatness")
+    return (*system.fit.flags, *scanned)
 
 
 def _reasons(flags: Sequence[Flag | str]) -> tuple[str, ...]:

@@ -243,6 +243,18 @@ def test_a_model_that_was_loaded_is_saved_as_it_was_and_keeps_its_interval(tmp_p
     assert (tmp_path / "a.json").read_bytes() == (tmp_path / "b.json").read_bytes()
 
 
+@pytest.mark.parametrize("options", [{"structures": "P1D"}, {"method": "scan"}])
+def test_a_model_that_was_loaded_is_judged_as_it_was(tmp_path, options):
+    record = cr.bench.heater().step_record(rng=1)
+    system = cr.identify(record, **options)
+    save_model(tmp_path / "a.json", system)
+    again = load_model(tmp_path / "a.json")
+    assert again.fit.verdicts == system.fit.verdicts
+    assert len(again.fit.verdicts) == (3 if "structures" in options else 0)
+    assert cr.report.verdict_of(again) == cr.report.verdict_of(system)
+    assert cr.report.summary(again, record) == cr.report.summary(system, record)
+
+
 def test_a_plain_continuous_model_is_stored_without_delay(tmp_path):
     tank = ct.ss([[-0.5]], [[1.0]], [[2.0]], [[0.0]], name="tank", inputs="valve", outputs="level")
     for system in (tank, ct.ss([], [], [], [[3.0]], inputs="valve", outputs="level")):
