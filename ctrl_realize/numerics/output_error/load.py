@@ -135,7 +135,7 @@ def load_of(
     also = refit(loaded, data.output.size, tuple(fits.candidates))
     white = also.correlation == 1.0
     left = (also.normalized_rms / fits.normalized_rms) ** 2
-    evidence = _evidence(fits, also.residual(also.best), also.best.structure)
+    evidence = max(evidence, _evidence(fits, also.residual(also.best), also.best.structure))
     told = evidence > (VERY_STRONG if white else _IN_SLOW_NOISE)
     if not told or not is_noise(loaded, also, also.best):
         return None
