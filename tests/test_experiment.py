@@ -181,6 +181,22 @@ def test_plan_from_a_record_has_rivals_noise_and_todays_error():
     assert one.together < min(one.std, error)
 
 
+def test_the_output_keeps_its_limit_on_every_plausible_model():
+    rng = np.random.default_rng(3)
+    command = ((np.arange(240) >= 20) * 1.0) - (np.arange(240) >= 140)
+    plant = cr.design.ProcessModel(gain=2.0, lag=10.0, second_lag=3.0, dead_time=3.03)
+    output = plant.system(0.5).simulate(command) + 0.25 * rng.standard_normal(240)
+    system = cr.identify(cr.Record(0.5 * np.arange(240), command, output), structures=[(2, 2)])
+    plan = cr.experiment.plan(system, output_limit=0.5)
+    moved = [
+        np.abs(Bound(model, 0.5).response(plan.chosen.input)).max()
+        for model in system.fit.plausible_models.models
+    ]
+    assert len(moved) > 30
+    assert max(moved) == pytest.approx(plan.chosen.excursion)
+    assert max(moved) <= 0.5 * (1 + 1e-9)
+
+
 PLAN = planned(Case("first order", 0.0, best=False, way="given"))
 
 

@@ -21,8 +21,6 @@ from ..numerics.engine.plausible_models import PlausibleModel
 from ..numerics.engine.static_gain import INTEGRATOR
 from ..numerics.signals.noise import correlation_time, winsorised_sigma
 
-_OTHERS = 4  # of the plausible models every fourth stands for all: time
-
 
 @dataclass(frozen=True, eq=False)
 class Known:
@@ -74,7 +72,7 @@ def known_from_fit(fit: OutputErrorFit) -> Known:
     """Take model, plausible models, records and their noise from a fit; the last noise is next."""
     length = min(record.time[-1] - record.time[0] for record in fit.records)
     drawn = () if fit.plausible_models is None else fit.plausible_models.models
-    others = [_integrating(one, length) for one in drawn[::_OTHERS]]
+    others = [_integrating(one, length) for one in drawn]
     model = PlausibleModel(fit.dead_time, fit.poles, fit.estimate.numerator)
     held = [np.ravel(record.input) for record in fit.records]
     inputs = [signal - signal[0] for signal in held]

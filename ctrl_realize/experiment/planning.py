@@ -34,6 +34,7 @@ of a test at most."""
 _CLOSE = 1.05
 """Errors that count as one: of these the slowest signal of a kind is taken, since further lags,
 which no model has, hide what is fast, and the kind that moves the output least."""
+_OTHERS = 4  # every fourth plausible model stands for all in the errors: time
 _HYSTERESIS = 3.0  # standard deviations of the noise, by which a relay does not switch
 _MOST_SAMPLES = 20_000
 _LENGTHS = (0.25, 0.5, 1.0, 2.0, 4.0)  # of tests on the curve, in the one that is planned
@@ -41,7 +42,7 @@ _LENGTHS = (0.25, 0.5, 1.0, 2.0, 4.0)  # of tests on the curve, in the one that 
 
 @dataclass(frozen=True, eq=False)
 class _Setting:
-    """What all candidates share: models with gradients, noise, limits."""
+    """What all candidates share: models, gradients of the first ones, noise, limits."""
 
     bounds: list[Bound]
     gradients: list[FloatArray]
@@ -89,7 +90,8 @@ def plan(
         integrates), the phase in degrees at the crossover, or the largest sensitivity Ms. Both are
         those of a loop with the PI of the rule SIMC for the model.
     output_limit : float, optional
-        Largest deviation of the output, on any of the models; signals are made smaller to keep it.
+        Largest deviation of the output, on any plausible model; signals are made smaller to keep
+        it.
     level : float, optional
         Input at rest. Default: that of the first record, or 0.
     noise : float, optional
@@ -156,11 +158,12 @@ def plan(
             f"{4 * _FEWEST} to {_MOST_SAMPLES}"
         )
     heard = _noise(known, noise, noise_pole, resolution, dt)
-    bounds = [Bound(model, dt) for model in (known.model, *known.others)]
+    judged = [Bound(model, dt) for model in (known.model, *known.others[::_OTHERS])]
+    limited = () if output_limit is None else [Bound(model, dt) for model in known.others]
     # A record at another rate has its own information, but not in samples of this one.
     records = known.tests if known.dt and abs(dt / known.dt - 1) < 1e-6 else ()
     setting = _Setting(
-        bounds, [bound.gradient([wanted]) for bound in bounds], heard,
+        [*judged, *limited], [bound.gradient([wanted]) for bound in judged], heard,
         _limits(move, bool(np.any(known.model.poles == 0))),
         np.inf if output_limit is None else positive(output_limit, "output_limit", "deviation"),
         records, dt,
@@ -181,7 +184,7 @@ def plan(
         tests=records,
         kind=best.kind,
         choices=(
-            f"errors by the Cramer-Rao bound of the model, ranked over it and {len(bounds) - 1} "
+            f"errors by the Cramer-Rao bound of the model, ranked over it and {len(judged) - 1} "
             "that are plausible",
             f"noise {plainly(heard.sigma, 3)}, {colour}",
         ),
@@ -271,7 +274,7 @@ def _predicted(setting: _Setting, kind: str, number: int, signal: FloatArray) ->
     moved = max(float(np.abs(bound.response(signal)).max()) for bound in setting.bounds)
     scale = min(1.0, setting.output_limit / max(moved, 1e-300))
     test = Experiment(scale * signal, setting.noise)
-    pairs = zip(setting.bounds, setting.gradients, strict=True)
+    pairs = zip(setting.bounds, setting.gradients, strict=False)
     errors = np.array([float(bound.errors([test], gradient)[0]) for bound, gradient in pairs])
     together = setting.bounds[0].errors([*setting.records, test], setting.gradients[0])[0]
     name = KINDS[kind if kind in KINDS else "steps"][1]
@@ -306,8 +309,7 @@ def _curve(setting: _Setting, count: int, kind: str) -> ErrorCurve:
     first = None
     if setting.records:
         today = setting.bounds[0].errors(setting.records, setting.gradients[0])[0]
-        total = sum(one.input.size for one in setting.records) * setting.dt
-        first = total, float(today)
+        first = sum(one.input.size for one in setting.records) * setting.dt, float(today)
     step = "up and down" if setting.returns else "one step"
     return ErrorCurve(
         setting.dt * np.array(lengths, dtype=np.float64),
