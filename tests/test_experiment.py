@@ -226,6 +226,25 @@ def test_achieved_beside_predicted():
     assert more.by_noise == pytest.approx(np.sqrt(5), rel=0.15)
 
 
+def test_missing_samples_tell_nothing():
+    # Of white noise every fourth sample has a quarter of the information of all.
+    command = np.tile(np.repeat([0.0, 1.0], 60), 4)
+    plant = cr.design.ProcessModel(gain=2.0, lag=10.0, dead_time=3.03)
+    output = plant.system(0.5).simulate(command)
+    output += 0.03 * np.random.default_rng(1).standard_normal(480)
+    few = np.where(np.arange(480) % 4 == 0, output, np.nan)
+    plan = cr.experiment.plan(plant, time=240.0, amplitude=1.0, rate=2.0, noise=0.03)
+    whole, quarter = (
+        cr.Record(0.5 * np.arange(480), command, values, missing="keep") for values in (output, few)
+    )
+    found = [cr.experiment.achieved(plan, one, structures=[(1, 1)]) for one in (whole, quarter)]
+    assert found[1].std / found[0].std == pytest.approx(2.0, rel=0.15)
+    assert found[1].std == pytest.approx(found[1].fit.std_given_structure, rel=0.25)
+    assert found[1].by_noise == pytest.approx(1.0, rel=0.2)
+    again = cr.experiment.plan(quarter, structures=[(1, 1)])
+    assert again.curve.first[1] == pytest.approx(found[1].std)
+
+
 def test_estimates_of_the_benchmark_are_those_of_identify():
     case = Case("first order", 0.0, best=True, way="given")
     record = simulated(case, planned(case), 3)

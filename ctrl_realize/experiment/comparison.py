@@ -10,7 +10,7 @@ from .._wording import interval_in_time, plainly
 from ..data import Record
 from ..data.given import as_record
 from ..identification import OutputErrorFit
-from ..identification.bound import Bound
+from ..identification.bound import Bound, Experiment
 from ..numerics.constants import Z_95
 from ..results import Result
 from .first import fitted, known_from_fit
@@ -78,7 +78,7 @@ class Achieved(Result):
             ("predicted standard error", amount(want, self.predicted)),
             ("achieved, structure given", f"{amount(want, self.std)}, {self.ratio:.2f} times"),
             ("due to the noise", f"{self.by_noise:.2f} times"),
-            ("due to model and input", f"{self.ratio / self.by_noise:.2f} times"),
+            ("due to model, input and missing samples", f"{self.ratio / self.by_noise:.2f} times"),
         ]
         if every is not None:
             rows.append(("structures not ruled out included", amount(want, every)))
@@ -129,6 +129,6 @@ def achieved(plan: ExperimentPlan, record: Record, **options: Any) -> Achieved:
     known = known_from_fit(fit)
     own, before = Bound(known.model, fit.dt), Bound(plan.model, plan.dt)
     std = own.errors(known.tests, own.gradient([plan.want]))[0]
-    as_planned = [test._replace(input=plan.chosen.input) for test in known.tests]
+    as_planned = [Experiment(plan.chosen.input, test.noise) for test in known.tests]
     noisy = before.errors(as_planned, before.gradient([plan.want]))[0]
     return Achieved(plan, fit, float(std), float(noisy) / plan.std)

@@ -82,8 +82,8 @@ def known_from_fit(fit: OutputErrorFit) -> Known:
         followed = [Bound(model, fit.dt).response(signal) for signal in inputs]
         residuals = [_left(*each) for each in zip(fit.records, followed, strict=True)]
     tests = [
-        Experiment(signal, _noise_of(residual, fit.dt))
-        for signal, residual in zip(inputs, residuals, strict=True)
+        Experiment(signal, _noise_of(residual, fit.dt), 1.0 * np.isfinite(np.ravel(record.output)))
+        for signal, residual, record in zip(inputs, residuals, fit.records, strict=True)
     ]
     plausible = tuple(one for one in others if np.sum(one.poles == 0) <= 1)
     return Known(model, plausible, fit.dt, tests[-1].noise, tuple(tests), float(held[0][0]))
@@ -98,10 +98,10 @@ def _noise_of(residual: FloatArray, dt: float) -> NoiseModel:
 
 def _left(record: Record, followed: FloatArray) -> FloatArray:
     """What a model leaves of a record, beside its level and a drift."""
-    output = np.ravel(record.output)
-    seen = np.isfinite(output)
-    left, time = (output - followed)[seen], record.time[seen]
-    return np.asarray(left - np.polyval(np.polyfit(time - time[0], left, 1), time - time[0]))
+    left = np.ravel(record.output) - followed
+    seen = np.isfinite(left)
+    left, time = left[seen], record.time[seen] - record.time[0]
+    return np.asarray(left - np.polyval(np.polyfit(time, left, 1), time))
 
 
 def largest_move(records: Sequence[Experiment]) -> float | None:

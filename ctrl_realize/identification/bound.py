@@ -42,10 +42,14 @@ WANTED: tuple[Wanted, ...] = ("dead_time", "gain", "phase", "Ms")
 
 
 class Experiment(NamedTuple):
-    """Input (N,), from rest, and the noise that its record will have."""
+    """Input (N,), from rest, the noise that its record will have, and 0 where a sample is missing.
+
+    In coloured noise, what is seen counts as if nothing before were missing.
+    """
 
     input: FloatArray
     noise: NoiseModel
+    seen: FloatArray = np.ones(1)
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,10 +69,8 @@ class Bound:
 
     def errors(self, tests: Sequence[Experiment], gradient: FloatArray) -> FloatArray:
         """Standard errors (k,) of quantities with gradients (k, p) after all tests together."""
-        slopes, own = zip(
-            *([_white(part, noise) for part in self.slopes(signal)] for signal, noise in tests),
-            strict=True,
-        )
+        white = [[_white(part, test) for part in self.slopes(test.input)] for test in tests]
+        slopes, own = zip(*white, strict=True)
         together = LocalErrors(np.concatenate(slopes), block_diag(*own))
         # The parameters themselves are asked for as well: all of them are unknown.
         every = np.concatenate([gradient, np.eye(gradient.shape[1])])
@@ -125,10 +127,10 @@ class Bound:
         return theta, self.model.numerator, KnownFactor(slow)
 
 
-def _white(columns: FloatArray, noise: NoiseModel) -> FloatArray:
+def _white(columns: FloatArray, test: Experiment) -> FloatArray:
     """Columns (N, k) in units of the noise, without those that its filter does not reach."""
-    left = lfilter([1.0, *-noise.coefficients], [1.0], columns, axis=0)
-    return np.asarray(left[noise.coefficients.size :] / noise.std)
+    left = lfilter([1.0, *-test.noise.coefficients], [1.0], columns, axis=0) * test.seen[:, None]
+    return np.asarray(left[test.noise.coefficients.size :] / test.noise.std)
 
 
 def quantities(
