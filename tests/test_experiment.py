@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.linalg import toeplitz
 
 import ctrl_realize as cr
 from benchmarks.experiment.cases import CASES, Case, dead_time, planned, simulated
@@ -258,6 +259,20 @@ def test_rounding_is_noise_of_a_twelfth_of_its_square():
     rounded = cr.experiment.plan(FLOW, resolution=0.1 * np.sqrt(12), **asked)
     plain = cr.experiment.plan(FLOW, **ASKED)
     assert rounded.std == pytest.approx(plain.std)
+
+
+@pytest.mark.parametrize("pole", [0.9, -0.5])
+def test_rounding_of_coloured_noise_is_white(pole):
+    asked = {**ASKED, "noise": 0.02, "noise_pole": pole}
+    plan = cr.experiment.plan(FLOW, resolution=0.1, **asked)
+    assert plan.noise.sigma == pytest.approx(np.hypot(0.02, 0.1 / np.sqrt(12)), rel=0.01)
+    # Generalised least squares with the covariance of the sum.
+    covariance = toeplitz(0.02**2 * pole ** np.arange(300.0)) + 0.1**2 / 12 * np.eye(300)
+    for one in plan.candidates:
+        slopes = np.concatenate(Bound(plan.model, plan.dt).slopes(one.input), axis=1)
+        information = slopes.T @ np.linalg.solve(covariance, slopes)
+        expected = np.sqrt(np.linalg.inv(information)[0, 0])
+        assert one.std == pytest.approx(expected, rel=0.05), one.kind
 
 
 def test_code_of_a_plan_gives_its_input(tmp_path):

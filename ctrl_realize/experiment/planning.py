@@ -8,6 +8,7 @@ from numbers import Real
 from typing import Any
 
 import numpy as np
+from scipy.linalg import toeplitz
 
 from .._checks import band, not_negative, one_of, positive, real
 from .._wording import in_time, plainly
@@ -36,6 +37,7 @@ _CLOSE = 1.05
 which no model has, hide what is fast, and the kind that moves the output least."""
 _OTHERS = 4  # every fourth plausible model stands for all in the errors: time
 _HYSTERESIS = 3.0  # standard deviations of the noise, by which a relay does not switch
+_LONG = 8  # order of an autoregression in place of an ARMA(1, 1)
 _MOST_SAMPLES = 20_000
 _LENGTHS = (0.25, 0.5, 1.0, 2.0, 4.0)  # of tests on the curve, in the one that is planned
 
@@ -233,9 +235,11 @@ def _noise(
         raise OptionError(
             f"noise={sigma:g}, noise_pole={turn:g}; expected noise, and a pole between -1 and 1"
         )
-    # The filter passes the rounding, too.
-    left = (1 - turn**2) * sigma**2 + (1 + turn**2) * rounding
-    return NoiseModel(np.array([turn] if turn else []), float(np.sqrt(left)), dt)
+    # With white rounding AR(1) noise is none: a longer autoregression, by Yule and Walker.
+    covariance = sigma**2 * turn ** np.arange(1.0 + bool(turn) * (_LONG if rounding else 1))
+    covariance[0] += rounding
+    past = np.asarray(np.linalg.solve(toeplitz(covariance[:-1]), covariance[1:]), np.float64)
+    return NoiseModel(past, float(np.sqrt(covariance[0] - past @ covariance[1:])), dt)
 
 
 def _candidates(setting: _Setting, count: int) -> list[PlannedTest]:
