@@ -296,6 +296,14 @@ def test_what_is_refused():
     for change in refused:
         with pytest.raises(OptionError, match=r"expected|choose"):
             cr.experiment.plan(FLOW, **{**ASKED, **change})
+    late = cr.design.ProcessModel(gain=1.2, lag=3.0, dead_time=50.0)  # after 20 % of rest
+    with pytest.raises(
+        OptionError, match="are 300 samples; expected 314 to 20000, for a rest, the"
+    ):
+        cr.experiment.plan(late, **ASKED)
+    longer = cr.experiment.plan(late, **{**ASKED, "time": 314 / 5})
+    assert longer.curve.time.min() == pytest.approx(314 / 5)
+    assert longer.step.excursion > 0
     with pytest.raises(DataError, match="expected a Record"):
         cr.experiment.plan("heater.csv", **ASKED)
     twice = PlausibleModel(1.0, np.zeros(2, dtype=complex), np.ones(1))

@@ -154,10 +154,11 @@ def plan(
     if move is None:
         raise OptionError("amplitude=None; expected the largest move of the input")
     count = round(length / dt)
-    if not 4 * _FEWEST <= count <= _MOST_SAMPLES:
+    least = _least(known.model, dt)
+    if not least <= count <= _MOST_SAMPLES:
         raise OptionError(
-            f"time={length:g} s at rate={1 / dt:g} are {count} samples; expected "
-            f"{4 * _FEWEST} to {_MOST_SAMPLES}"
+            f"time={length:g} s at rate={1 / dt:g} are {count} samples; expected {least} to "
+            f"{_MOST_SAMPLES}, for a rest, the dead time and a response"
         )
     heard = _noise(known, noise, noise_pole, resolution, dt)
     judged = [Bound(model, dt) for model in (known.model, *known.others[::_OTHERS])]
@@ -191,6 +192,11 @@ def plan(
             f"noise {plainly(heard.sigma, 3)}, {colour}",
         ),
     )
+
+
+def _least(model: PlausibleModel, dt: float) -> int:
+    """Samples of the shortest test whose output responds."""
+    return max(4 * _FEWEST, int(model.dead_time / dt / (1 - _MOST_REST)) + 2)
 
 
 def _given(value: float | None, known: float | None, name: str, what: str) -> float:
@@ -308,7 +314,7 @@ def _curve(setting: _Setting, count: int, kind: str) -> ErrorCurve:
     """Errors of tests of several lengths, and today's."""
     own = replace(setting, bounds=setting.bounds[:1], gradients=setting.gradients[:1], records=())
     lengths = [n for n in (round(part * count) for part in _LENGTHS)
-               if 4 * _FEWEST <= n <= _MOST_SAMPLES]  # fmt: skip
+               if _least(setting.bounds[0].model, setting.dt) <= n <= _MOST_SAMPLES]  # fmt: skip
     found = [{one.kind: one.std for one in _candidates(own, n)} for n in lengths]
     first = None
     if setting.records:
