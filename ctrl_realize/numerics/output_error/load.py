@@ -60,8 +60,8 @@ a pole at 0.9 reached 20 in 1 of 60 simulated records, and friction 22 in 1 of 4
 white noise stayed below -3. Loads of 10 to 80 % mostly reached 30 to 900."""
 _SOONEST, _TOLD_APART = 0.5, 1.5
 """Time between step and load, over the time to 63 % of the response, from which on one is looked
-for, and from which on they are told apart: the gain of 60 of 64 simulated records, some of which
-clip, was within 5 % or its interval, and one of the others called good; below 1.5, of 4 of 5. An
+for, and from which on they are told apart: the gain of 49 of 53 simulated records, some of which
+clip, was within 5 % or its interval, and one of the others called good; below 1.5, of 3 of 4. An
 earlier load, as too few poles look, leaves the model as it is, and the gain open."""
 _FIRST, _LAST = 0.25, 0.02  # of the rise, and of the record, in which a load is not looked for
 _TIMES, _LAGS = 60, np.geomspace(0.05, 10.0, 8)
