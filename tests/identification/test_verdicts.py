@@ -1,5 +1,6 @@
 """Verdicts on dead time, gain and tuning: right where the truth is known, and said everywhere."""
 
+import control as ct
 import numpy as np
 import pytest
 
@@ -53,6 +54,15 @@ def test_what_two_lags_leave_open_is_no_matter_for_a_controller():
     assert levels(fit)["tuning"] == "good"
 
 
+def test_a_controller_for_a_record_with_a_load_is_stable_on_models_that_fit_as_well():
+    # a structure of which the data leave the slowest pole open fits as well: with a pole far slower
+    # than the record its gain would be any number of either sign
+    fit = cr.fit_output_error(case("load", 222).record).fit
+    assert levels(fit)["tuning"] == "good"
+    gains = np.array([np.real(ct.dcgain(sys)) for sys in fit.plausible_models.systems])
+    assert gains == pytest.approx(-3.24, rel=0.2)  # of the plant
+
+
 def test_flags_that_do_not_go_with_wrong_answers_are_notes():
     rng = np.random.default_rng(4)
     t = 0.02 * np.arange(900)
@@ -66,7 +76,7 @@ def test_flags_that_do_not_go_with_wrong_answers_are_notes():
 
 def test_models_that_fit_as_well_decide_on_tuning():
     # the PI is robust on the model itself, and not on one of the models in twenty
-    fit = cr.fit_output_error(case("rising at its end", 101).record).fit
+    fit = cr.fit_output_error(case("rising at its end", 122).record).fit
     tuning = fit.verdicts[2]
     assert tuning.level != "good"
     assert tuning.number > 2

@@ -67,13 +67,13 @@ class PlausibleDraw:
     fits : WindowFit
     evidence : mapping of Structure to float
         Of the structures that are not ruled out, on any scale.
-    best : mapping of Structure to Candidate
-        The fit of each.
+    best : callable
+        The fit of each: best(structure) -> Candidate.
     """
 
     fits: WindowFit
     evidence: Mapping[Structure, float]
-    best: Mapping[Structure, Candidate]
+    best: Callable[[Structure], Candidate]
 
     def __getstate__(self) -> dict[str, tuple[PlausibleModel, ...]]:
         """What is stored or sent: the models, which are far smaller than the fits."""
@@ -90,7 +90,7 @@ class PlausibleDraw:
         with one_blas_thread():
             for structure, count in zip(self.evidence, counts, strict=True):
                 if count:
-                    models += _about(self.fits, self.best[structure], int(count), rng)
+                    models += _about(self.fits, self.best(structure), int(count), rng)
         return tuple(models)
 
 

@@ -36,6 +36,7 @@ from ..families.physical import ProcessParameter, fitted_parameters
 from ..families.process_form import ProcessForm
 from ..signals.correlation import fit_percent
 from ..signals.load_step import LoadStep
+from .extrapolation import least_extrapolating
 from .margins import CloseDecision
 from .profiles import Profile
 
@@ -409,6 +410,10 @@ def assembled(
         if s != chosen.structure
         and np.abs(fits.candidates[s].poles.real).max() * fits.scales.dt < _OVER
     ]
+
+    def drawn_about(one: Structure) -> Candidate:
+        return chosen if one == family else least_extrapolating(fits, fits.candidates[one])[0]
+
     return OutputErrorEstimate(
         dead_time=chosen.dead_time,
         low=interval.low,
@@ -430,5 +435,5 @@ def assembled(
         static=static,
         alike=tuple((other, weight) for other, weight in alike if other.resolved),
         process=process,
-        drawn=PlausibleDraw(fits, evidence, fits.candidates | {chosen.structure: chosen}),
+        drawn=PlausibleDraw(fits, evidence, drawn_about),
     )

@@ -156,7 +156,7 @@ def fit_lags(data: SampledData, requested: Requested) -> tuple[SampledWindow, Ou
     }
     others = OtherStructures(better)
     found = replace(found, process=process, points=points, others=others, averaged=True)
-    return part, replace(found, drawn=PlausibleDraw(plainly, evidence, plain))
+    return part, replace(found, drawn=PlausibleDraw(plainly, evidence, plain.__getitem__))
 
 
 def _fitted(
