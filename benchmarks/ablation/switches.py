@@ -307,7 +307,7 @@ SWITCHES = (
         "least extrapolation",
         {
             f"{FITS}.{module}:least_extrapolating": _best_fit
-            for module in ("interval", "step_fit", "flat_likelihood")
+            for module in ("interval", "step_fit", "flat_likelihood", "result")
         },
     ),
     Switch(
