@@ -53,10 +53,12 @@ def valve_report(
     records : Record or sequence of Record
         Command (input) and position of the stem (output), or a process variable instead of the
         position. Records of the same valve.
-    command_range, travel_range : (float, float), optional
-        Values of the closed and of the open valve, in the units of the records; default 0 to 100
-        for %, 4 to 20 for a command in mA. For other units it is the range of the command, and a
-        travel with which the gain of the larger steps is one.
+    command_range : (float, float), optional
+        Command of the closed and of the open valve, in the unit of the records; default 0 to 100
+        for %, 4 to 20 for mA. For other units it is the range of the command.
+    travel_range : (float, float), optional
+        Output at the closed and at the open valve, in the unit of the records; default 0 to 100
+        for %. For other units it is a travel with which the gain of the larger steps is one.
     limits : mapping, optional
         Largest permitted value, or (smallest, largest), of metrics by their key in `DEFINITIONS`;
         in s, % and %/s. Of a metric that depends on the step also a mapping from step size in % to

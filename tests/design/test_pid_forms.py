@@ -142,6 +142,8 @@ def test_minutes_and_hours_are_chosen_for_forms_without_a_unit():
     assert minutes.values[1].unit == "repeats/min"
     weighted = pid.as_form("siemens_pid_compact", setpoint_weight=0.6)
     assert (weighted["PWeighting"], weighted["DWeighting"], weighted.notes) == (0.6, 0.0, ())
+    derivative = pid.as_form("siemens_pid_compact", derivative_weight=0.2)
+    assert (derivative["PWeighting"], derivative["DWeighting"]) == (1.0, 0.2)
     assert PID.from_form("siemens_pid_compact", values_of(weighted)).ideal == pytest.approx(FULL)
     assert pid.as_form("parallel", time_unit="h")["ki"] == pytest.approx(1.7 / 40 * 3600)
 

@@ -54,13 +54,17 @@ class Delivered:
         form : str
             ``"ideal"``, ``"series"``, ``"parallel"``, ``"proportional_band"``, or the block of a
             manufacturer; `design.pid_forms` lists them with their documents.
-        measured_range, output_range : tuple of float, optional
-            Lower and upper end of the range of measured value and output, for forms whose gain
-            refers to percent of these. Default: (0, 100).
+        measured_range : tuple of float, optional
+            Lower and upper end of the range of the measured value, for forms whose gain refers to
+            percent of it; default: 0 and 100.
+        output_range : tuple of float, optional
+            The same of the controller output; default: 0 and 100.
         time_unit : {"s", "ms", "min", "h", "day"}, optional
             For forms without a unit of their own. Default: that of the controller.
-        setpoint_weight, derivative_weight : float, optional
-            Weights of the set-point, as for `algorithm`, for blocks that have them.
+        setpoint_weight : float, optional
+            Weight of the set-point in the proportional action, for blocks that have one.
+        derivative_weight : float, optional
+            Weight of the set-point in the derivative action, for blocks that have one.
 
         Returns
         -------
@@ -83,11 +87,11 @@ class Delivered:
           - source: Honeywell, HC900 Hybrid Control Designer Function Block Reference Guide,
             revision 11 (2007), page 281
         """
-        layout = LAYOUTS.get(form)
-        if time_unit is None and layout is not None and layout.unit is None:
+        if time_unit is None and form in LAYOUTS and LAYOUTS[form].unit is None:
             time_unit = self.time_unit
         scaling = Scaling(measured_range, output_range, time_unit)
-        weights = None if setpoint_weight is None else (setpoint_weight, derivative_weight)
+        proportional = 1.0 if setpoint_weight is None and derivative_weight else setpoint_weight
+        weights = None if proportional is None else (proportional, derivative_weight)
         return to_form(self.ideal, form, scaling, gain_unit=self.gain_unit, weights=weights)
 
     def forms(self, **ranges: Any) -> pd.DataFrame:
