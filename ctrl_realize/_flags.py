@@ -73,3 +73,18 @@ def marked(mark: str) -> frozenset[str]:
     ['delay_at_bound', 'no_delay_resolved', 'order_in_noise']
     """
     return frozenset(code for code, row in _table().items() if mark in row.get("marks", ()))
+
+
+def in_doubt(flag: Flag) -> bool:
+    """Whether a flag goes with wrong answers to a question of a verdict; otherwise it is a note.
+
+    Examples
+    --------
+    >>> from ctrl_realize._flags import flagged, in_doubt
+    >>> in_doubt(flagged("few_cycles", count=5.0, fewest=8))
+    False
+    """
+    marks = (
+        f"{how}_{what}" for how in ("doubts", "no") for what in ("dead_time", "gain", "tuning")
+    )
+    return any(flag.code in marked(mark) for mark in marks)

@@ -10,7 +10,7 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, Literal
 
-from ._flags import Flag
+from ._flags import Flag, in_doubt
 from ._parameters import Parameter, checked_time_unit, formula, parameter_table
 from ._shown import html_card, text_card
 from ._wording import ASSUMED, chosen, in_time, shown_unit, times_in
@@ -284,6 +284,11 @@ class ModelFit(Result):
         return ()
 
     @property
+    def _judged(self) -> bool:
+        """Whether fits of the kind have verdicts: flags without a mark for these are notes."""
+        return False
+
+    @property
     def integrators(self) -> int:
         """Number of poles at zero."""
         return 0
@@ -313,11 +318,19 @@ class ModelFit(Result):
         """Unit of the output; empty if it is not known, or there are several outputs."""
         return _common(self.records[0].output_units) if self.records else ""
 
-    def _choices(self) -> list[str]:
+    def _of_clock(self) -> list[str]:
+        """What was chosen about the time axis of the records."""
         said = [_SAID] * (self._record_unit == ASSUMED)
         if self.records and self.records[0].irregular:
             said.append(chosen("sample_time.irregular", usual=in_time(self.records[0].sample_time)))
-        return [*self.choices, *said]
+        return said
+
+    def _choices(self) -> list[str]:
+        notes = [f"note: {flag}" for flag in self.flags if self._judged and not in_doubt(flag)]
+        return [*self.choices, *self._of_clock(), *notes]
+
+    def _notes(self) -> list[str]:
+        return [str(flag) for flag in self.flags if not self._judged or in_doubt(flag)]
 
     def report(self, *, time_unit: str | None = None) -> str:
         """Return the result as plain text, choices and flags included.

@@ -75,7 +75,8 @@ def result_files(folder: Path) -> list[Path]:
 
 def write_manifest(folder: Path, run: Run) -> None:
     """Write the manifest of a folder: which run made its files."""
-    files = sorted(path.relative_to(folder).as_posix() for path in _files_below(folder))
+    below = [path for path in folder.rglob("*") if path.is_file()]
+    files = sorted(path.relative_to(folder).as_posix() for path in below)
     content = {
         "format": FORMAT,
         "schema": SCHEMA,
@@ -86,10 +87,6 @@ def write_manifest(folder: Path, run: Run) -> None:
         "files": files,
     }
     write_text(folder / NAME, json.dumps(content, indent=1) + "\n")
-
-
-def _files_below(folder: Path) -> list[Path]:
-    return [path for path in folder.rglob("*") if path.is_file()]
 
 
 def _checksum(path: Path) -> str | None:

@@ -37,8 +37,6 @@ _CLOSE, _ROUGH = 0.05, 0.25
 _ROBUST, _TOO_MUCH = 2.0, 4.0
 """Ms up to which a loop is robust (gain margin 2, phase margin 29 deg), and up to which it works
 at all (1.3 and 14 deg)."""
-_MARKS = ("dead_time", "gain", "tuning")
-"""Questions in the marks of flags."""
 _SELDOM = 1
 """Of the 39 models, those that may be worse: one of twenty (2 / 40) is at least as bad."""
 
@@ -92,11 +90,6 @@ def verdicts(
         Models that the data do not rule out.
     """
     return _dead_time(fit), _gain(fit), _tuning(fit, model, others)
-
-
-def in_doubt(flag: Flag) -> bool:
-    """Whether a flag goes with wrong answers to any of the questions; otherwise it is a note."""
-    return any(flag.code in marked(f"{how}_{what}") for how in ("doubts", "no") for what in _MARKS)
 
 
 def _level(flags: Iterable[Flag], question: str, good: bool, some: bool) -> tuple[Level, str]:

@@ -15,7 +15,7 @@ from ..actuators.plain import Plain, to_plain
 from ..errors import FileFormatError
 from ..identification.output_error.actuated.result import ActuatorFit
 from ..identification.verdicts import Verdict
-from ..results import INTERVAL_LABELS, Flag, IntervalKind, ModelFit
+from ..results import Flag, IntervalKind, ModelFit
 from .json_content import field, of_kind
 
 Ends = tuple[float, float]
@@ -80,11 +80,8 @@ class FitSummary(ModelFit):
         return str(self._value("time_unit") or "s")
 
     @property
-    def interval_label(self) -> str:
-        """Kind of `interval`, in words."""
-        if self.interval_kind is None and self.kind == "DelayScan":  # of an older file
-            return INTERVAL_LABELS["flatness"]
-        return super().interval_label
+    def _judged(self) -> bool:
+        return self.kind == "OutputErrorFit"
 
     def _value(self, key: str) -> Plain:
         return dict(self.values).get(key)
@@ -98,6 +95,9 @@ class FitSummary(ModelFit):
 
     def _title(self) -> str:
         return self.title
+
+    def _of_clock(self) -> list[str]:
+        return []  # among the choices that are stored
 
     def _rows(self) -> list[tuple[str, str]]:
         return list(self.rows)
@@ -154,7 +154,7 @@ def summary_of(fit: ModelFit | None) -> FitSummary | None:
         rows=rows,
         values=tuple(pair for pair in values.items() if pair[1] not in (None, ())),
         flags=fit.flags,
-        choices=fit.choices,
+        choices=(*fit.choices, *fit._of_clock()),
     )
 
 

@@ -12,13 +12,13 @@ import numpy as np
 
 from .._checks import check_type
 from .._facts import version_of
+from .._flags import in_doubt
 from .._wording import ASSUMED
 from ..data import Record
 from ..delayed import DelayedStateSpace
 from ..design.tuning.controller import PIDController
 from ..design.tuning.forms import PIDForm
 from ..errors import UnsuitableSystemError
-from ..identification.verdicts import in_doubt
 from ..results import ModelFit
 
 FORMAT = "ctrl_realize identification"

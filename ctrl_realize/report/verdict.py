@@ -9,14 +9,13 @@ from typing import Literal
 import numpy as np
 
 from .._facts import facts
-from .._flags import Flag, marked
+from .._flags import Flag, in_doubt, marked
 from .._wording import in_time, interval_in_time, number_within, time_within, times_in
 from ..delayed import DelayedStateSpace
 from ..frequency.comparison import FRFComparison
 from ..frequency.disagreement import CLOSE, FAR
 from ..identification.campaign.campaign import Campaign
 from ..identification.output_error.words import gain_scatter, sign_is_told
-from ..identification.verdicts import in_doubt
 from ..plots.delays import estimate_of, interval_of
 from .facts import (
     INTEGRATING,

@@ -184,12 +184,8 @@ def _fitted_dead_time(steps: list[StepMetrics], records: Sequence[Record]) -> In
     if better and (better.order, better.relative_degree) in STRUCTURES_OF_MORE_LAGS:
         found = linear_fit(cut, STRUCTURES_OF_MORE_LAGS)
     # no linear model fits a response at a limited rate: it has no dead time to report
-    return found[1] if found is not None and _is_right(found[0]) else Interval()
-
-
-def _is_right(fit: OutputErrorFit) -> bool:
-    """Whether the data do not rule out the structures that were given."""
-    return fit.at_noise_level and fit.better is None
+    right = found is not None and found[0].at_noise_level and found[0].better is None
+    return found[1] if found is not None and right else Interval()
 
 
 def linear_fit(

@@ -243,6 +243,18 @@ def test_a_model_that_was_loaded_is_saved_as_it_was_and_keeps_its_interval(tmp_p
     assert (tmp_path / "a.json").read_bytes() == (tmp_path / "b.json").read_bytes()
 
 
+def test_notes_and_what_was_chosen_about_the_clock_are_read_as_they_were_written(tmp_path):
+    rng = np.random.default_rng(4)
+    t = np.sort(0.02 * (np.arange(900) + 0.2 * rng.uniform(-1, 1, 900)))
+    y = np.where(t < 6.4, 0.0, -np.expm1(-(t - 6.4) / 0.8)) + 0.004 * rng.standard_normal(t.size)
+    y[[120, 500, 730]] += 0.4  # outliers, which are a note
+    system = cr.identify(cr.Record.from_samples(t, (t >= 6.0) * 1.0, y), structures="P1D")
+    save_model(tmp_path / "a.json", system)
+    assert load_model(tmp_path / "a.json").fit.report() == system.fit.report()
+    assert "  - note: " in system.fit.report()
+    assert "irregular" in system.fit.report()
+
+
 @pytest.mark.parametrize("options", [{"structures": "P1D"}, {"method": "scan"}])
 def test_a_model_that_was_loaded_is_judged_as_it_was(tmp_path, options):
     record = cr.bench.heater().step_record(rng=1)

@@ -280,10 +280,11 @@ def measured(
     final = float(setpoint[-1])
     # The transform has an error of 1e-5; a steady-state error is far larger.
     kept = (abs(1 - final) > 1e-3, abs(load[-1]) > 1e-3 * np.abs(load).max())
+    over = float((setpoint / final).max()) - 1 if final else float("nan")
     return Performance(
         setpoint_error=float("inf") if kept[0] else float(np.sum(np.abs(1 - setpoint) * weights)),
         load_error=float("inf") if kept[1] else float(np.sum(np.abs(load) * weights)),
-        overshoot=_overshoot(float((setpoint / final).max())) if final else float("nan"),
+        overshoot=0.0 if over <= ROUNDING else over,
         settling_time=float(times[settling(setpoint, final)]),
     )
 
@@ -302,8 +303,3 @@ def settling(response: FloatArray, size: float) -> int:
     """First sample from which on a response stays within 2 % of a size about its final value."""
     outside = np.flatnonzero(np.abs(response - response[-1]) > SETTLING_BAND * abs(size))
     return int(outside[-1]) + 1 if outside.size else 0
-
-
-def _overshoot(peak: float) -> float:
-    """Overshoot of a peak relative to the final value; 0 within the error of a simulation."""
-    return peak - 1 if peak - 1 > ROUNDING else 0.0

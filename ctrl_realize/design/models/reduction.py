@@ -126,7 +126,8 @@ def _reduce(system: Any, method: str, dead_time: float | None, order: int) -> Pr
     method = one_of(method, "method", METHODS)
     if isinstance(system, ProcessModel):
         core = ct.ss(system.transfer_function())
-        system = ContinuousModel(core, (system.dead_time,), (0.0,), _resolution(system))
+        resolution = max(system.lag + system.second_lag, system.dead_time) / 500
+        system = ContinuousModel(core, (system.dead_time,), (0.0,), resolution)
     continuous, plant = both_forms(system, dead_time)
     time, step, integrating, gain = _step_record(plant)
     if method == "half_rule":
@@ -138,10 +139,6 @@ def _reduce(system: Any, method: str, dead_time: float | None, order: int) -> Pr
     square = np.trapezoid((model.step(time) - step) ** 2, time) / total
     scale = total if integrating else 1.0
     return replace(model, error=float(np.sqrt(square) / abs(gain) / scale))
-
-
-def _resolution(model: ProcessModel) -> float:
-    return max(model.lag + model.second_lag, model.dead_time) / 500
 
 
 def both_forms(

@@ -30,11 +30,11 @@ def structured(ideal: Ideal, layout: Layout) -> Ideal:
     else:
         inside = total**2 - 4 * ti * product
         if inside < 0:
+            longest = ti * (1 - ratio) / 4 if fixed else (ti + tf) ** 2 / (4 * ti) - tf
             raise OptionError(
                 f"this controller has no series form, since its zeros are complex: ti={ti:g} s, "
-                f"td={td:g} s; expected td of at most {_longest(ti, tf, ratio, fixed):.4g} s. "
-                f"Choose an ideal form, or a rule for the series form: design.pid(sys, 'simc', "
-                f"'PID')"
+                f"td={td:g} s; expected td of at most {longest:.4g} s. Choose an ideal form, or a "
+                f"rule for the series form: design.pid(sys, 'simc', 'PID')"
             )
         # The smaller root without cancellation.
         lead = 2 * ti * product / (total + float(np.sqrt(inside)))
@@ -43,10 +43,6 @@ def structured(ideal: Ideal, layout: Layout) -> Ideal:
     first = ti + tf - lead
     gain = kp if ti == INF else kp * first / ti
     return gain, first, lead - tf if layout.added else lead, tf
-
-
-def _longest(ti: float, tf: float, ratio: float, fixed: bool) -> float:
-    return ti * (1 - ratio) / 4 if fixed else (ti + tf) ** 2 / (4 * ti) - tf
 
 
 def ideal_of_series(kc: float, first: float, lead: float, tf: float) -> Ideal:

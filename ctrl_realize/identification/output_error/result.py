@@ -27,7 +27,7 @@ from ...numerics.signals.correlation import fit_percent
 from ...results import Flag, FractionalDelayFit, IntervalKind
 from ..plausible import PlausibleModels
 from ..process_parameters import jump, not_seen_in_words, told, with_intervals
-from ..verdicts import Verdict, in_doubt, verdicts
+from ..verdicts import Verdict, verdicts
 from .actuated.result import ActuatorFit
 from .record_gains import RecordGains
 from .repeat_flags import BY_CHANCE
@@ -361,12 +361,9 @@ class OutputErrorFit(FractionalDelayFit):
         """Order and relative degree."""
         return self.order, self.relative_degree
 
-    def _choices(self) -> list[str]:
-        notes = [f"note: {flag}" for flag in self.flags if not in_doubt(flag)]
-        return [*super()._choices(), *notes]
-
-    def _notes(self) -> list[str]:
-        return [str(flag) for flag in self.flags if in_doubt(flag)]
+    @property
+    def _judged(self) -> bool:
+        return True
 
     @property
     def plausible_models(self) -> PlausibleModels | None:

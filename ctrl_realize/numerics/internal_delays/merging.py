@@ -148,7 +148,9 @@ def ends_apart(
                 C[p + i], D[p + i] = 0.0, 0.0
                 keep.remove(i)
     rest = DelayForm(form.A, B, C, D, form.delays).channels(keep)
-    if len(rest.delays) == rest.inputs == rest.outputs == 1 and _passes_once(rest):
+    one = len(rest.delays) == rest.inputs == rest.outputs == 1
+    # All of a single input goes through the single delay, and never twice.
+    if one and not _reaches(rest, 0, 0) and not _reaches(rest, 1, 1):
         before[0] += rest.delays[0]
         rest = without_zero_delays(DelayForm(rest.A, rest.B, rest.C, rest.D, (0.0,)))
     return tuple(before), tuple(behind), rest
@@ -198,11 +200,6 @@ def paths_apart(
         np.hstack([np.eye(p), rest.D[:p, late]]),
         np.vstack([np.eye(m), rest.D[[p + i for i, _ in heads], :m]]),
     )
-
-
-def _passes_once(form: DelayForm) -> bool:
-    """Whether all of a single input goes through the single delay, and never twice."""
-    return not (_reaches(form, 0, 0) or _reaches(form, 1, 1))
 
 
 def _reaches(form: DelayForm, column: int, row: int) -> bool:
