@@ -91,7 +91,7 @@ class FitSummary(ModelFit):
         return str(self._value("method") or "model with dead time")
 
     def __repr__(self) -> str:
-        return f"<FitSummary of a {self.kind}>"
+        return f"<FitSummary of {self.kind}>"
 
     def _title(self) -> str:
         return self.title

@@ -29,7 +29,7 @@ from ..design.tuning.controller import PIDController
 from ..design.tuning.simulated import simulate_loop
 from ..numerics.arrays import FloatArray
 from . import style
-from .names import plain
+from .names import plain, with_unit
 from .shared_docs import documented
 from .style import HERTZ, axis_time_unit, decibel
 
@@ -236,8 +236,10 @@ def closed_loop_plot(
                 each.axhline(limit, color=style.TRUTH, linestyle=style.DASHES[1], linewidth=1)
         if ax is None:
             axes[1].set_title("Load step", loc="left")
-        axes[0].set_ylabel("measured value")
-        axes[2].set(ylabel="controller output", xlabel=f"time [{unit}]")
+        known = None if plant.fit is None or not plant.fit.records else plant.fit.records[0]
+        measured, driven = (known.output_units[0], known.input_units[0]) if known else ("", "")
+        axes[0].set_ylabel(with_unit("measured value", measured))
+        axes[2].set(ylabel=with_unit("controller output", driven), xlabel=f"time [{unit}]")
         axes[3].set_xlabel(f"time [{unit}]")
         # The corner below the end of the set-point response is free; a given figure may be small.
         where, loc = (0, "lower right") if ax is None else (1, "above")
@@ -263,11 +265,7 @@ def _draw_others(
             for where, signal in zip(
                 axes, _simulated(one, controller, time.size, steps, {}), strict=True
             ):
-                looks: dict[str, Any] = {
-                    "color": style.TRUTH,
-                    "linewidth": 0.8,
-                    "scaley": not inside,
-                }
+                looks: dict[str, Any] = {"color": style.TRUTH, "lw": 0.8, "scaley": not inside}
                 where.plot(time, signal, **looks)
     if inside:
         for where, signals in zip(axes, zip(*inside, strict=True), strict=True):

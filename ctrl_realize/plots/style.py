@@ -175,7 +175,7 @@ def finished(
     """
     for position in legends:
         if axes[position].get_legend_handles_labels()[1]:
-            _legend(axes[position], loc)
+            _legend(axes[position], loc, 3 // columns)
     shape = (len(axes) // columns, columns)
     return ct.ControlPlot(
         _objects([list(drawn) for drawn in lines]).reshape(shape),
@@ -197,9 +197,9 @@ def _objects(things: Sequence[Any]) -> np.ndarray[Any, np.dtype[np.object_]]:
     return array
 
 
-def _legend(axes: Axes, loc: Any) -> None:
+def _legend(axes: Axes, loc: Any, columns: int) -> None:
     if loc == "above":
-        axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=3)
+        axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=columns)
     elif loc == "over":
         _legend_over(axes)
     else:

@@ -131,5 +131,5 @@ def loop_sketch(system: DelayedStateSpace, pid: PIDController) -> Sketch:
     plants = () if models is None else models.systems
     key = "closed_loop" if plants else "closed_loop.alone"
     return sketch(
-        key, plots.closed_loop_plot, system, {"model": pid}, plants=plants, size=(6.2, 4.6)
+        key, plots.closed_loop_plot, system, {"model": pid}, plants=plants, size=(7.6, 6.0)
     )

@@ -111,7 +111,7 @@ def test_the_main_numbers_of_a_fit_its_report_and_its_flags_stay(tmp_path, model
     # JSON has no infinity
     assert summary["interval"] == (0.0287, "inf")
     assert summary.interval == (0.0287, np.inf)
-    assert repr(summary) == "<FitSummary of a Fit>"
+    assert repr(summary) == "<FitSummary of Fit>"
     assert pickle.loads(pickle.dumps(summary)).report() == fit.report()
     with pytest.raises(KeyError):
         summary["onset"]

@@ -149,7 +149,7 @@ def diagnose_loop(
     verdict, reason = judge(state, data.op.size, found, flags)
     return LoopDiagnosis(
         verdict, reason, state, found, kind, data, cycles, correlation, halves_op, halves_pv,
-        ellipse, fit, flags, (f"process: {kind}, as given or by default",),
+        ellipse, fit, flags, (f"process: {kind}; process= states another",),
     )  # fmt: skip
 
 
