@@ -28,7 +28,6 @@ from ...numerics.validation.white_step import WhiteStep, white_step
 from .result import OutputErrorFit
 
 _WIDE = 0.5  # width of an interval, in dead times, from which a set point moved too little
-_HALVED = 2.0  # move over that of the record: errors are in proportion to its inverse
 _LEVELS = 10  # of an input: a relay has two, or three
 _STRETCH = 20  # samples of a stretch in manual that is worth a word
 _OFF = 0.2  # relative difference of gains or total delays that is worth a flag: presentation
@@ -72,7 +71,7 @@ def _spans(record: Record, where: BoolArray) -> str:
 
 
 def set_point_flags(fit: OutputErrorFit) -> Iterator[Flag]:
-    """Report a set point that moves too little, and the move that would do."""
+    """Report a set point that moves too little."""
     low, high = fit.interval
     if not fit.estimate.averaged or high - low <= max(_WIDE * fit.dead_time, fit.dt):
         return
@@ -85,8 +84,6 @@ def set_point_flags(fit: OutputErrorFit) -> Iterator[Flag]:
         total=in_time(fit.total_delay),
         interval=interval_in_time(low, high),
         moved=moved,
-        enough=_HALVED * moved,
-        times=_HALVED**2,
     )
 
 

@@ -52,7 +52,7 @@ def test_it_is_said_what_was_used_and_that_noise_hides_the_lags(slow):
     assert "its set point moved" in flag(slow, "closed_loop")
     hidden = flag(slow, "small_set_point")
     assert f"total delay, {slow.total_delay:.3g} s" in hidden
-    assert "Moves of 2, or 4 times as many" in hidden
+    assert "moved by 1. Moves that are several times larger narrow" in hidden
 
 
 def test_lags_that_are_stated_are_fitted_in_the_same_noise(stated, slow):
