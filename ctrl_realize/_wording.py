@@ -62,13 +62,13 @@ def time_unit(largest: float) -> tuple[float, str]:
     Examples
     --------
     >>> from ctrl_realize._wording import time_unit
-    >>> time_unit(3.0), time_unit(0.029)
-    ((1.0, 's'), (1000.0, 'ms'))
+    >>> time_unit(3.0), time_unit(0.029), time_unit(0.0)
+    ((1.0, 's'), (1000.0, 'ms'), (1.0, 's'))
     """
     shown = _SHOWN.get()
     if shown != "s":
         return UNITS[shown], shown
-    name = "s" if largest >= 0.5 else "ms" if largest >= 0.5e-3 else "µs"
+    name = "s" if largest >= 0.5 or largest == 0 else "ms" if largest >= 0.5e-3 else "µs"
     return UNITS[name], name
 
 
