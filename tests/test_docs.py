@@ -82,6 +82,11 @@ def test_tests_that_a_page_names_exist(page: Path):
             assert f"def {name}(" in (ROOT / file).read_text(), f"{file}::{name}"
 
 
+def test_names_of_stored_numbers_stand_outside_of_code_where_they_are_filled_in():
+    quoted = [page.name for page in PAGES if "`{{" in page.read_text()]
+    assert quoted == ["contributing.md"]  # which says how they are written
+
+
 def test_files_that_the_architecture_names_exist():
     named = re.findall(r"`(ctrl_realize/[\w/]+\.py)`", (DOCS / "architecture.md").read_text())
     assert len(named) >= 10

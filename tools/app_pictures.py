@@ -47,7 +47,7 @@ def main() -> None:
         closing(Host(session)) as host,
         AppServer(host) as server,
         tempfile.TemporaryDirectory() as folder,
-        Browser(Path(folder), 1180, 900) as window,
+        Browser(Path(folder), 1180, 560) as window,
     ):
         threading.Thread(target=server.serve_forever, daemon=True).start()
         window.open(server.address)
