@@ -190,8 +190,6 @@ def valve_plot(
     >>> import ctrl_realize as cr
     >>> records = cr.bench.valve().step_campaign(1, amplitudes=(16.0, 4.0), repeats=3)
     >>> report = cr.valves.valve_report(records, command_range=(4, 20), fit=False)
-    >>> report.plot().axes.shape
-    (2, 2)
     >>> [text.get_text() for text in report.plot(panel="steps").figure.axes[0].get_legend().texts]
     ['25 %', '100 %']
     >>> report.plot(panel="sizes", metric="gain").figure.axes[0].get_ylabel()
@@ -200,6 +198,8 @@ def valve_plot(
     'command [% of span]'
     >>> report.plot(panel="signature").figure.axes[0].get_ylabel()
     'position - command [%]'
+    >>> report.plot().axes.shape
+    (2, 2)
     """
     sized = partial(_draw_sizes, metric=one_of(metric, "metric", STEP_METRICS))
     panels = _PANELS | {"sizes": _PANELS["sizes"]._replace(draw=sized)}
@@ -243,5 +243,5 @@ def valve_plan_plot(
                 rotation=90 if narrow else 0,
             )  # fmt: skip
         axes[0].set(xlabel=f"time [{name}]", ylabel="command")
-        axes[0].set_xlim(0, plan.duration * unit)
+        axes[0].set_xlim(-0.012 * plan.duration * unit, plan.duration * unit)
         return style.finished(axes, [lines])
