@@ -39,7 +39,8 @@ def judged(one: Case) -> dict[str, object]:
     fit = cr.fit_output_error(one.record).fit
     said = {verdict.question: verdict for verdict in fit.verdicts}
     plant, low, high = one.plant, *fit.interval
-    reach = max(0.2 * fit.onset, 2 * fit.dt, 0.1 * fit.total_delay)
+    latest = min(fit.onset, high)
+    reach = max(0.2 * latest, 2 * fit.dt, 0.1 * fit.total_delay)
     row: dict[str, object] = {
         "kind": one.kind,
         "seed": one.seed,
@@ -47,7 +48,7 @@ def judged(one: Case) -> dict[str, object]:
         "flags": [flag.code for flag in fit.flags],
         "held": bool(low - 1e-9 <= plant.dead_time <= high + 1e-9),
         "near": bool(abs(fit.dead_time - plant.dead_time) <= reach),
-        "narrow": bool(high - low <= max(0.4 * fit.onset, reach)),
+        "narrow": bool(high - low <= max(0.4 * latest, reach)),
         "gain held": bool(fit.gain_interval[0] <= plant.gain <= fit.gain_interval[1]),
         "gain error": float(abs(fit.gain / plant.gain - 1)),
         "worst Ms": said["tuning"].number,

@@ -30,8 +30,9 @@ Question: TypeAlias = Literal["dead time", "gain", "tuning"]
 LEVELS: tuple[Level, ...] = ("good", "with care", "no")
 
 _NARROW, _FEW, _OF_TOTAL = 0.4, 2.0, 0.1
-"""Width of the interval of a dead time that is well known: parts of the visible onset, samples, or
-parts of the total delay, beside which it does not matter."""
+"""Width of the interval of a dead time that is well known: parts of the visible onset, or of its
+upper end where that is earlier, as in loud noise; samples; or parts of the total delay, beside
+which it does not matter."""
 _CLOSE, _ROUGH = 0.05, 0.25
 """Half width of the interval of a gain that is well known, and of one that is, in parts of it."""
 _ROBUST, _TOO_MUCH = 2.0, 4.0
@@ -107,7 +108,7 @@ def _dead_time(fit: FractionalDelayFit) -> Verdict:
     low, high = fit.interval
     width, least = high - low, _FEW * fit.dt
     if fit.onset is not None and np.isfinite(fit.onset):
-        least = max(least, _NARROW * fit.onset)
+        least = max(least, _NARROW * min(fit.onset, high))
     if fit.total_delay is not None and np.isfinite(fit.total_delay_interval or np.inf).all():
         least = max(least, _OF_TOTAL * fit.total_delay)
     level, why = _level(fit.flags, "dead_time", width <= least, some=True)
