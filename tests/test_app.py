@@ -260,6 +260,15 @@ def test_columns_that_are_not_told_by_their_names_are_asked_for():
     assert not answer["view"]["data"]["records"][0]["bad"]
 
 
+def test_what_was_guessed_is_told_on_the_page_and_nowhere_else(recwarn):
+    lines = ["time,heater,room"] + [
+        f"{k},{int(k > 5)},{20 + 0.1 * max(k - 7, 0)}" for k in range(40)
+    ]
+    view = Session().apply(opened("log.csv", "\n".join(lines).encode()))["view"]
+    assert "'heater' is taken as input" in json.dumps(view["data"])
+    assert list(recwarn) == []
+
+
 def test_undo_takes_back_one_change_after_the_other():
     session = Session()
     session.add_record(step_record())

@@ -102,7 +102,8 @@ def preview(content: bytes, row: Mapping[str, Any]) -> JSON:
         return {"columns": [], "taken": {}}
     asked: Any = [options.get(key) for key in (*_ARRAYS, "dt")]
     taken = asked[:3]
-    with suppress(CtrlRealizeError):
+    # What is guessed is told by `read`.
+    with suppress(CtrlRealizeError), warnings.catch_warnings(action="ignore"):
         parts = choose_columns(table, *asked)
         taken = [parts.time, parts.inputs[0], parts.outputs[0]]
     columns = [
