@@ -213,11 +213,17 @@ def pairs(
 
 
 def headed(key: str, rows: Iterable[Row], **words: Any) -> Table:
-    """Make a table with the title, the columns and the note of a row of `tables.toml`."""
-    told = _TABLES[key]
-    columns = tuple(Column(name.format(**words), kind) for name, kind in told["columns"].items())
+    """Make a table with the title, the columns and the note of a row of `tables.toml`.
+
+    Columns without a single value are left out.
+    """
+    told, every = _TABLES[key], tuple(rows)
+    columns = [Column(name.format(**words), kind) for name, kind in told["columns"].items()]
+    kept = [k for k in range(len(columns)) if any(row.cells[k] for row in every)]
     note = told.get("note", "").format(**words)
-    return Table(told["title"], tuple(rows), columns, note=note, folded=told.get("folded", False))
+    filled = tuple(Row(tuple(row.cells[k] for k in kept), row.kind) for row in every)
+    shown = tuple(columns[k] for k in kept)
+    return Table(told["title"], filled, shown, note=note, folded=told.get("folded", False))
 
 
 def render(page: Page) -> str:
