@@ -112,9 +112,10 @@ def on_common_axis(records: tuple[Record, ...]) -> tuple[Record, ...]:
     )
 
 
-def step_data_of(record: Record) -> StepData | None:
-    """Data of a step record; None for any other input."""
+def step_data_of(record: Record, first: int = 0) -> StepData | None:
+    """Data of a step record from output `first` on; None for any other input."""
     signal, output = np.ravel(record.input), np.ravel(record.output)
+    output = np.where(np.arange(output.size) < first, np.nan, output)
     edges = edges_of(record)
     if not edges:
         return None

@@ -18,7 +18,7 @@ from ...delayed import DelayedStateSpace
 from ...errors import OptionError
 from ...numerics.arrays import FloatArray
 from ...numerics.blas_threads import single_threaded
-from ...numerics.output_error.any_input.data import MOST_SAMPLES
+from ...numerics.output_error.any_input.data import BEYOND, MOST_SAMPLES
 from ...numerics.output_error.other_structures import Requested
 from ...numerics.output_error.result import OutputErrorEstimate
 from ...numerics.output_error.step_data import StepData
@@ -174,7 +174,9 @@ def fit_output_error(
     it cannot be told from the response: the model is left as it is, and the gain is open.
 
     A slope before the step is modelled as a drift, the free response of the plant, or not at all,
-    as chosen by the information criterion.
+    as chosen by the information criterion. A free response begins a dead time after the last move
+    of the input, which may have come just before the record: if the samples from one and a half
+    dead times on contradict the dead time of all, they alone are fitted.
 
     An output may clip. Behind its noise, samples at the highest or lowest value show it; before the
     noise, a plateau that is reached with a kink and never passed, if the model of the other samples
@@ -287,18 +289,16 @@ def model_alone(
 ) -> DelayedStateSpace:
     """Fit a record without checks, and without structures that were not requested."""
     tried = replace(_requested((record,), structures, max_delay, noise), compared=False)
-    result = _linear((record,), tried, own_gains=False, may_clip=True, refuses=False)
-    return fitted_model(result)
+    return fitted_model(_linear((record,), tried, own_gains=False, may_clip=True, refuses=False))
 
 
 def _requested(
     records: tuple[Record, ...], structures: Structures | None, max_delay: float | None, noise: str
 ) -> Requested:
     noise = one_of(noise, "noise", ("auto", "white"))
-    tried = requested(structures)
     limit = None if max_delay is None else positive(max_delay, "max_delay", "number of samples")
     latest = None if limit is None else limit * records[0].sample_time
-    return replace(tried, latest=latest, whiten=noise == "auto")
+    return replace(requested(structures), latest=latest, whiten=noise == "auto")
 
 
 def _linear(
@@ -312,11 +312,8 @@ def _linear(
     """Fit linear models. One that hardly follows the output is refused, or not."""
     any_input = partial(fit_any_input, refuses=refuses)
     if len(several) == 1:
-        return fit_within_limits(
-            several[0],
-            lambda record: _fit_one(record, requested, any_input),
-            may_clip=may_clip,
-        )
+        fit_one = partial(_fit_one, requested=requested, any_input=any_input)
+        return fit_within_limits(several[0], fit_one, may_clip=may_clip)
     several, at_limits = _without_cut_noise(several)
     # Complete records of one step each can be averaged. Of more steps the mean would end at the
     # second one: a relay test of 40 samples a half period left 40 samples of a record of 600.
@@ -347,11 +344,18 @@ def _fit_one(
     record: Record,
     requested: Requested,
     any_input: Callable[..., OutputErrorFit],
+    first: int = 0,
 ) -> OutputErrorFit:
-    data = None if requested.loop else step_data_of(record)
+    data = None if requested.loop else step_data_of(record, first)
     if data is None:
         return any_input((record,), requested)
     data, fit = fit_step_record(data, requested)
+    unknown = int(np.ceil(BEYOND * fit.high / data.dt))
+    if data.relaxing and first < unknown < data.edges[0][0] // 2:
+        # The input may have moved just before the record: the response to that is not yet free.
+        later = _fit_one(record, requested, any_input, unknown)
+        if later.data.relaxing and not fit.low <= later.dead_time <= fit.high:
+            return later
     flags = tuple(fit_flags(data, fit, requested.latest, float(record.time[0])))
     time = record.time[data.rows]
     return OutputErrorFit(fit, data, time, (record,), choices=tuple(choices_of(fit)), flags=flags)
@@ -381,6 +385,4 @@ def _fit_mean(
         fit = replace(fit, high=min(fit.high, max(last, fit.latest)))
     flags = fit_flags(data, fit, requested.latest, float(time[0]))
     every = (*flags, *repeat_flags(repeats, fit.dead_time, data.dt))
-    return OutputErrorFit(
-        fit, data, time, records, repeats, choices=tuple(choices_of(fit)), flags=every
-    )
+    return OutputErrorFit(fit, data, time, records, repeats, None, tuple(choices_of(fit)), every)

@@ -38,6 +38,22 @@ def test_a_free_response_holds_at_every_sample_and_not_at_the_means_alone():
     assert fit.fit_percent > 98
 
 
+def test_an_input_that_moves_just_before_the_record_leaves_a_dead_time_that_is_not_free():
+    # All samples, as a free response from the first one on, say 6.15 s (5.88 to 6.41).
+    t, gain, dead_time, lags = np.arange(300.0), -1.9, 7.03, (20.0, 4.2)
+
+    def moved(at):
+        since = np.maximum(t - at - dead_time, 0.0)
+        parts = [lag * np.exp(-since / lag) for lag in lags]
+        return gain * (1 - (parts[0] - parts[1]) / (lags[0] - lags[1]))
+
+    record = cr.Record(t, 11.0 + (t >= 100), moved(-2) + moved(100))
+    fit = cr.identify(record, structures="P2D").fit
+    assert "not_at_rest" in codes(fit)
+    assert covers(fit, dead_time)
+    assert abs(fit.dead_time - dead_time) < 0.05
+
+
 def test_an_arm_that_still_swings_is_fitted_with_its_free_response():
     dt, frequency = 0.01, 9.0
     plant = ct.tf([2 * frequency**2], [1, 0.04 * frequency, frequency**2])
