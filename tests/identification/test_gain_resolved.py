@@ -214,6 +214,21 @@ def test_a_gain_that_changes_is_no_integrator():
     assert system.fit.interval[0] <= 8.0 <= system.fit.interval[1]
 
 
+def test_the_slope_of_a_structure_that_integrates_is_no_gain_of_others():
+    # two steps, of which a third structure makes lags and a slope of 7e-5 per second
+    rng, t = np.random.default_rng(22), np.arange(400.0)
+    long, short = rng.uniform(8, 20), rng.uniform(3, 7)
+    y = np.zeros(t.size)
+    for start in (50.0, 200.0):
+        x = np.maximum(t - start - 8.3, 0.0)
+        lags = long * np.exp(-x / long) - short * np.exp(-x / short)
+        y += 1.9 * (1 - lags / (long - short))
+    u = (t >= 50) * 1.0 + (t >= 200) * 1.0
+    record = cr.Record(t, u, y + 0.019 * rng.standard_normal(t.size))
+    fit = cr.identify(record, structures=[(1, 1), (2, 2), (2, 1), (3, 3), (3, 2)]).fit
+    assert fit.gain_interval == pytest.approx((1.9, 1.9), rel=0.005)
+
+
 def test_structures_that_differ_in_gain_are_named_under_a_coloured_residual():
     # the noise model, which settles it, is not used for structures that are given
     system = cr.identify(losing_its_gain(), structures=[(1, 1), (2, 1)])

@@ -52,9 +52,8 @@ def least_extrapolating(
     poles = candidate.poles
     slow = int(np.argmin(np.abs(poles)))
     static = fits.static(candidate)
-    alone = problem.segments is None and structure.order > 1
-    alone = alone and not isinstance(structure, Family)
-    if static.significant or poles[slow].imag or not alone:
+    plain = structure.order > 1 and not isinstance(structure, Family)
+    if static.significant or poles[slow].imag or not plain or problem.segments is not None:
         return candidate, static
     rest = Structure(structure.order - 1, structure.relative_degree - 1)
     bounds = parameter_bounds(rest, scales)
@@ -73,6 +72,8 @@ def least_extrapolating(
             parameters = np.append(x[0], parameters_from_poles(np.append(free, -rate)))
             found = Candidate(structure, parameters, cost)
             own = fits.static(found)
-            return found, replace(static, gain=own.gain, total=own.total)
+            # The errors of an integrator are those of a slope.
+            errors = own if static.integrates else static
+            return found, replace(errors, gain=own.gain, total=own.total)
         rate /= _RATIO
     return candidate, static

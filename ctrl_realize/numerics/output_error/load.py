@@ -129,7 +129,9 @@ def load_of(
     since, apart = load.time - float(edges[edges <= load.time].max()), _TOLD_APART * rise
     # Several poles are those of the plant, through which a load may come however slow it is.
     slowest = load.lag / abs(load.poles[0]) if load.poles.size == 1 else 0.0
-    small = loaded.motion is None or abs(load.size) < _LEAST_LOAD * loaded.motion.span
+    # A jump of one step of a coarse converter is rounding.
+    motion, least = loaded.motion, 2 * data.quantum if data.coarse else 0.0
+    small = motion is None or abs(load.size) < max(_LEAST_LOAD * motion.span, least)
     if small or since < _SOONEST * rise or slowest > _MOST_LAG * (data.clock[-1] - load.time):
         return None
     also = refit(loaded, data.output.size, tuple(fits.candidates))

@@ -405,10 +405,11 @@ def assembled(
         s: float(np.exp(-max(value - least, 0.0) / 2)) ** _TEMPERED for s, value in charged.items()
     }
     alike = [
-        (fits.static(fits.candidates[s]), weight)
+        (one, weight)
         for s, weight in evidence.items()
         if s != chosen.structure
         and np.abs(fits.candidates[s].poles.real).max() * fits.scales.dt < _OVER
+        and (one := fits.static(fits.candidates[s])).resolved
     ]
 
     def drawn_about(one: Structure) -> Candidate:
@@ -433,7 +434,8 @@ def assembled(
         profile=profile,
         latest=fits.scales.latest,
         static=static,
-        alike=tuple((other, weight) for other, weight in alike if other.resolved),
+        # The slope of an integrator is no gain.
+        alike=tuple(one for one in alike if one[0].integrates == static.integrates),
         process=process,
         drawn=PlausibleDraw(fits, evidence, drawn_about),
     )
