@@ -92,18 +92,19 @@ def _only(wanted: Callable[[Any], bool]) -> Change:
     return lambda ways: lambda data: [way for way in ways(data) if wanted(way)] or [data]
 
 
-def _without_view(key: str) -> Change:
-    return lambda views: lambda *args: tuple(view for view in views(*args) if view[0] != key)
+def _view_amid(key: str) -> Change:
+    """Put a view at the median of the others, where it decides nothing."""
 
+    def change(views: Any) -> Any:
+        def made(*args: Any) -> Any:
+            found = views(*args)
+            others = [at for name, at in found[:-1] if name != key]
+            amid = float(np.median(others))
+            return tuple((name, amid if name == key else at) for name, at in found)
 
-def _third_lag_amid(views: Any) -> Any:
-    """Put the sixth view, which only widens, where it does not."""
+        return made
 
-    def made(*args: Any) -> Any:
-        *others, (key, _) = views(*args)
-        return (*others, (key, sorted(at for _, at in others)[2]))
-
-    return made
+    return change
 
 
 def _constant_rest(noise: Any) -> Any:
@@ -262,10 +263,10 @@ SWITCHES = (
     Switch("views (the likelihood always)", {f"{STEP}:_is_noise": giving(True)}),
     Switch("likelihood (the views always)", {f"{STEP}:_is_noise": giving(False)}),
     *(
-        Switch(f"view: {key.replace('_', ' ')}", {f"{STEP}:_views": _without_view(key)})
+        Switch(f"view: {key.replace('_', ' ')}", {f"{STEP}:_views": _view_amid(key)})
         for key in VIEWS
     ),
-    Switch("view: three lags early", {f"{STEP}:_views": _third_lag_amid}),
+    Switch("view: three lags early", {f"{STEP}:_views": _view_amid("three_lags_early")}),
     Switch(
         "louder noise after the step",
         {f"{STEP}:_LOUDER": value(1.0)},
