@@ -285,8 +285,11 @@ class ModelFit(Result):
 
     @property
     def _judged(self) -> bool:
-        """Whether fits of the kind have verdicts: flags without a mark for these are notes."""
-        return False
+        """Whether fits of its kind, or of that which a file names, have verdicts.
+
+        Flags without a mark for these are notes.
+        """
+        return str(getattr(self, "kind", type(self).__name__)) == "OutputErrorFit"
 
     @property
     def integrators(self) -> int:

@@ -15,7 +15,7 @@ from ..actuators.plain import Plain, to_plain
 from ..errors import FileFormatError
 from ..identification.output_error.actuated.result import ActuatorFit
 from ..identification.verdicts import Verdict
-from ..results import Flag, IntervalKind, ModelFit
+from ..results import INTERVAL_LABELS, Flag, IntervalKind, ModelFit
 from .json_content import field, of_kind
 
 Ends = tuple[float, float]
@@ -80,8 +80,10 @@ class FitSummary(ModelFit):
         return str(self._value("time_unit") or "s")
 
     @property
-    def _judged(self) -> bool:
-        return self.kind == "OutputErrorFit"
+    def interval_label(self) -> str:
+        """Kind of `interval`, in words."""
+        older = self.interval_kind is None and self.kind == "DelayScan"
+        return INTERVAL_LABELS["flatness"] if older else super().interval_label
 
     def _value(self, key: str) -> Plain:
         return dict(self.values).get(key)
@@ -97,7 +99,7 @@ class FitSummary(ModelFit):
         return self.title
 
     def _of_clock(self) -> list[str]:
-        return []  # among the choices that are stored
+        return list(self._value("clock") or ())  # type: ignore[arg-type]
 
     def _rows(self) -> list[tuple[str, str]]:
         return list(self.rows)
@@ -141,6 +143,7 @@ def summary_of(fit: ModelFit | None) -> FitSummary | None:
     for key in ("std_given_structure", "fit_percent"):  # of some fits
         values[key] = _plain(getattr(fit, key, None))
     values["time_unit"], values["method"] = fit._record_unit, fit._method
+    values["clock"] = tuple(fit._of_clock())
     if fit.parameters:
         values["formula"] = fit.formula
     if fit.actuator is not None:
@@ -154,7 +157,7 @@ def summary_of(fit: ModelFit | None) -> FitSummary | None:
         rows=rows,
         values=tuple(pair for pair in values.items() if pair[1] not in (None, ())),
         flags=fit.flags,
-        choices=(*fit.choices, *fit._of_clock()),
+        choices=fit.choices,
     )
 
 

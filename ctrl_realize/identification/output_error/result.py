@@ -362,10 +362,6 @@ class OutputErrorFit(FractionalDelayFit):
         return self.order, self.relative_degree
 
     @property
-    def _judged(self) -> bool:
-        return True
-
-    @property
     def plausible_models(self) -> PlausibleModels | None:
         """Models that the data do not rule out; None beside an actuator."""
         models = self.estimate.plausible
