@@ -289,7 +289,7 @@ class ModelFit(Result):
 
         Flags without a mark for these are notes.
         """
-        return str(getattr(self, "kind", type(self).__name__)) == "OutputErrorFit"
+        return getattr(self, "kind", type(self).__name__) in ("OutputErrorFit", "JointFit")
 
     @property
     def integrators(self) -> int:
