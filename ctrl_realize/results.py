@@ -285,11 +285,8 @@ class ModelFit(Result):
 
     @property
     def _judged(self) -> bool:
-        """Whether fits of its kind, or of that which a file names, have verdicts.
-
-        Flags without a mark for these are notes.
-        """
-        return getattr(self, "kind", type(self).__name__) in ("OutputErrorFit", "JointFit")
+        """Whether there are verdicts, or would be but for an actuator: other flags are notes."""
+        return bool(self.verdicts) or self.actuator is not None
 
     @property
     def integrators(self) -> int:

@@ -229,6 +229,14 @@ def test_the_slope_of_a_structure_that_integrates_is_no_gain_of_others():
     assert fit.gain_interval == pytest.approx((1.9, 1.9), rel=0.005)
 
 
+def test_a_lag_in_place_of_an_integrator_has_the_error_of_a_gain():
+    # that of the slope is 1.6e-6, of a gain that is off by 0.012
+    plant = cr.bench.heater()
+    fit = cr.fit_output_error(plant.step_record(20, rng=0)).fit
+    low, high = fit.gain_interval
+    assert low <= 0.9 <= high
+
+
 def test_structures_that_differ_in_gain_are_named_under_a_coloured_residual():
     # the noise model, which settles it, is not used for structures that are given
     system = cr.identify(losing_its_gain(), structures=[(1, 1), (2, 1)])

@@ -54,13 +54,15 @@ def test_what_two_lags_leave_open_is_no_matter_for_a_controller():
     assert levels(fit)["tuning"] == "good"
 
 
-def test_a_controller_for_a_record_with_a_load_is_stable_on_models_that_fit_as_well():
+def test_models_that_fit_a_record_with_a_load_as_well_have_gains_near_that_of_the_plant():
     # a structure of which the data leave the slowest pole open fits as well: with a pole far slower
     # than the record its gain would be any number of either sign
-    fit = cr.fit_output_error(case("load", 222).record).fit
+    one = case("load", 222)
+    fit = cr.fit_output_error(one.record).fit
     assert levels(fit)["tuning"] == "good"
     gains = np.array([np.real(ct.dcgain(sys)) for sys in fit.plausible_models.systems])
-    assert gains == pytest.approx(-3.24, rel=0.2)  # of the plant
+    # their standard deviation is 1.5 %; about a pole at its bound two were 2364 and 2634
+    assert gains == pytest.approx(one.plant.gain, rel=0.1)
 
 
 def test_flags_that_do_not_go_with_wrong_answers_are_notes():

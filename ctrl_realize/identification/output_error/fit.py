@@ -385,4 +385,5 @@ def _fit_mean(
         fit = replace(fit, high=min(fit.high, max(last, fit.latest)))
     flags = fit_flags(data, fit, requested.latest, float(time[0]))
     every = (*flags, *repeat_flags(repeats, fit.dead_time, data.dt))
-    return OutputErrorFit(fit, data, time, records, repeats, None, tuple(choices_of(fit)), every)
+    choices = tuple(choices_of(fit))
+    return OutputErrorFit(fit, data, time, records, repeats, choices=choices, flags=every)

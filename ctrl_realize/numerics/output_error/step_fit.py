@@ -84,7 +84,7 @@ from .extrapolation import least_extrapolating
 from .flat_likelihood import closer, later, moved, pinned, with_close_decision
 from .interval import likelihood_fit
 from .load import load_of
-from .margins import close_to
+from .margins import CloseDecision, close_to
 from .other_structures import Compared, Requested, other_structures
 from .process_models import fit_without_fast_lags, process_fit
 from .profiles import profile_of
@@ -156,8 +156,7 @@ def _given_structures(
     requested: Requested,
 ) -> OutputErrorEstimate:
     """Estimate the dead time by the likelihood of the best of given structures, adequate or not."""
-    near = close_to("adequate", fits.normalized_rms, ADEQUATE * data.colour)
-    noisy = _at_noise_level(data, fits)
+    near, noisy = _close_to_noise(data, fits), _at_noise_level(data, fits)
     adequate, fits = noisy is not None, noisy or fits
     compared = requested.fastest is None and requested.compared
     others = other_structures(fits, free) if compared else Compared()
@@ -184,7 +183,7 @@ def _free_choice(
 ) -> OutputErrorEstimate:
     """Estimate the dead time if no structures are given (points 1 to 5 of the rule)."""
     assert data.motion is not None
-    near = close_to("adequate", plain.normalized_rms, ADEQUATE * data.colour)
+    near = _close_to_noise(data, plain)
     likely: OutputErrorEstimate | None = None
     noisy = _at_noise_level(data, plain)
     if noisy is not None:
@@ -229,6 +228,10 @@ def _simple_ones_suffice(fits: WindowFit) -> bool:
     least = min(c.cost for c in fits.candidates.values())
     simple = min(fits.candidates[s].cost for s in SIMPLE_STRUCTURES)
     return simple <= _FAR_POORER**2 * least
+
+
+def _close_to_noise(data: StepData, fits: WindowFit) -> tuple[CloseDecision, ...]:
+    return close_to("adequate", fits.normalized_rms, ADEQUATE * data.colour)
 
 
 def _at_noise_level(data: StepData, fits: WindowFit) -> WindowFit | None:

@@ -55,6 +55,13 @@ def test_a_late_load_is_told_and_taken_out_of_the_gain(seed, size, lags):
     assert fit.interval[0] <= DEAD_TIME <= fit.interval[1]
 
 
+def test_a_step_of_a_coarse_converter_is_no_load():
+    # 1.8 degC, rounded to 0.1: a load of 0.088 took the gain away
+    fit = cr.fit_output_error(cr.bench.heater().step_record(2, rng=3)).fit
+    assert "load_disturbance" not in [flag.code for flag in fit.flags]
+    assert np.isfinite(fit.gain_interval).all()
+
+
 def test_a_load_whose_response_has_only_begun_at_the_end_is_told():
     # the time to 63 % of its response is longer than what is left: it was a gain of 746000
     fit = cr.identify(record(11, TIME[-1] - 0.5 * RISE, 0.8, LAGS)).fit
