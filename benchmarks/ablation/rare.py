@@ -55,6 +55,14 @@ def friction_behind_lags(rng: Rng) -> Case:
     return plant.case(record(u, noisy(rng, sampled(y), part)), dead_time=plant.dead_time + loose)
 
 
+def step_behind_a_filter(rng: Rng) -> Case:
+    """A step behind a lag of 3 to 30 samples without noise; 1e-6 to 1e-4 of it in the output."""
+    plant = drawn(rng)
+    since = np.maximum(np.arange(800) - 99.0, 0.0)
+    u = 1.0 - np.exp(-since / rng.uniform(3.0, 30.0))
+    return plant.case(record(u, noisy(rng, stepped(rng, plant, u), 10 ** rng.uniform(-6, -4))))
+
+
 def settling_in_a_long_rest(rng: Rng) -> Case:
     """The input had moved 0.3 to 1 s before the record; the step comes 1 to 3 s after its start."""
     plant = drawn(rng, ((0.1, 0.25), (0.4, 1.0)))
@@ -312,6 +320,7 @@ MADE_FOR = {
     "start from the correlation": far_away,
     "start at the ringing": wandering_output,
     "records weighted by their noise": unequal_sensors,
+    "curves are no steps": step_behind_a_filter,
     "noise of a rest that is constant": padded_rest,
     "louder noise after the step": louder_from_the_step_on,
     "friction behind lags": friction_behind_lags,

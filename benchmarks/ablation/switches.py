@@ -407,6 +407,7 @@ SWITCHES = (
         {f"{PUBLIC}.arguments:_MOVES": value(np.inf)},
         asked=(f"{PUBLIC}.arguments:_holds_between",),
     ),
+    Switch("curves are no steps", {f"{PUBLIC}.arguments:_curved": giving(False)}),
     Switch(
         "loop without its set point",
         {f"{PUBLIC}.fit:answers_the_output": giving(False)},

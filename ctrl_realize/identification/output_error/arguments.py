@@ -18,6 +18,7 @@ from ...numerics.engine.problem import KnownFactor
 from ...numerics.output_error.step_data import StepData, step_data
 from ...numerics.signals.edges import despike, difference_noise
 from ...numerics.signals.noise import mad_sigma
+from ...numerics.signals.step_sequence import MOST_MOVES
 from ..step.steps import found_step
 
 _APART = 1e-3  # relative distance by which coincident poles are separated
@@ -29,6 +30,9 @@ _HOLDS = 0.2  # part of the step by which an input may stray between its edges
 _MOVES, _MEAN, _UNLIKELY = 0.05, 10, 5.0
 """Part of the step by which the mean of ten samples may, or standard deviations of such means."""
 _STRAY = 0.01  # part of the first step by which a clean input may stray before it
+_ONE_WAY = (
+    0.9  # of the moves of a curve: noise turns at two of three. Ablation: curves are no steps
+)
 _SPIKE = 3  # samples of a spike of the input that do not move a plant
 _DWELL = 3  # times the visible onset: the onsets of faster steps overlap
 
@@ -146,8 +150,16 @@ def edges_of(record: Record) -> tuple[StepEdge, ...]:
             # It moves only at the very end: there is no response to fit.
             raise
         return ()
-    steps = len(edges) <= _MOST_EDGES and not _moves_before(signal, edges)
-    return edges if steps and _holds_between(signal, edges) else ()
+    if len(edges) > _MOST_EDGES or _moves_before(signal, edges):
+        return ()
+    bounds = [0, *(edge.index for edge in edges), signal.size]
+    ramps = [0, *(edge.samples for edge in edges)]
+    held = [
+        signal[min(start + max(ramp - 1, 0), stop) : stop]
+        for start, stop, ramp in zip(bounds[:-1], bounds[1:], ramps, strict=True)
+    ]
+    largest = max(abs(edge.amplitude) for edge in edges)
+    return edges if _holds_between(held, largest) and not _curved(held) else ()
 
 
 def _moves_before(signal: FloatArray, edges: Sequence[StepEdge]) -> bool:
@@ -161,7 +173,17 @@ def _moves_before(signal: FloatArray, edges: Sequence[StepEdge]) -> bool:
     return float(np.ptp(despike(before, _SPIKE))) > _STRAY * abs(edges[0].amplitude)
 
 
-def _holds_between(signal: FloatArray, edges: Sequence[StepEdge]) -> bool:
+def _curved(held: list[FloatArray]) -> bool:
+    """Whether a clean input follows a curve after its edges, as behind a filter.
+
+    No few steps describe it: poles and zeros would make up for them, up to five lags for one.
+    """
+    way = np.concatenate([np.sign(np.diff(part)) for part in held])
+    way = way[way != 0]
+    return bool(way.size > MOST_MOVES and np.mean(way[1:] == way[:-1]) > _ONE_WAY)
+
+
+def _holds_between(held: list[FloatArray], largest: float) -> bool:
     """Whether an input is nearly constant between edges, for nine samples of ten, and in the mean.
 
     A sweep or noise may move like an edge, but is not constant afterwards. On measured steps the
@@ -170,16 +192,9 @@ def _holds_between(signal: FloatArray, edges: Sequence[StepEdge]) -> bool:
     level by 10 to 100 % of the largest edge in simulated loops, by 1.4 % in measured steps. Slow
     noise that a controller feeds back moves it everywhere, where edges tell more than noise.
     """
-    bounds = [0, *(edge.index for edge in edges), signal.size]
-    ramps = [0, *(edge.samples for edge in edges)]
-    held = [
-        signal[min(start + max(ramp - 1, 0), stop) : stop]
-        for start, stop, ramp in zip(bounds[:-1], bounds[1:], ramps, strict=True)
-    ]
     away = [part - np.median(part) for part in held if part.size]
     whole = (despike(part, _SPIKE)[: part.size // _MEAN * _MEAN] for part in away)
     means = np.concatenate([part.reshape(-1, _MEAN).mean(axis=1) for part in whole])
-    largest = max(abs(edge.amplitude) for edge in edges)
     noise = _UNLIKELY * mad_sigma(means) if means.size else 0.0
     return bool(
         np.quantile(np.abs(np.concatenate(away)), 0.9) <= _HOLDS * largest

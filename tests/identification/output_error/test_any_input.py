@@ -300,6 +300,22 @@ def test_steps_and_random_inputs_go_together():
     assert fit.repeatability.amplitudes.tolist() == [2.0, 2.0]
 
 
+@pytest.mark.parametrize("lag_of_input", [3, 10, 30])
+def test_a_clean_step_behind_a_filter_is_no_step(lag_of_input):
+    # Taken for steps, its last 2 % were means of eight samples and more: five lags for one.
+    delay, samples = 7.3, 900
+    u = 1 - np.exp(-np.maximum(np.arange(samples) - 199, 0) / lag_of_input)
+    # The response to each held move is known: 2 (1 - exp(-t / T)) behind the dead time.
+    since = np.arange(samples)[:, None] - np.arange(samples) - delay
+    response = np.where(since > 0, 2 * -np.expm1(-np.maximum(since, 0) / 40), 0.0)
+    y = response @ np.diff(u, prepend=0.0)
+    fit = cr.identify(cr.Record(DT * np.arange(samples), u, y)).fit
+    assert fit.structure == (1, 1)
+    assert abs(fit.delay - delay) < 1e-4
+    assert abs(fit.gain - 2) < 1e-5
+    assert not fit.flags
+
+
 def test_a_small_move_before_the_first_step_is_not_taken_for_its_response():
     # a twelfth of the step, too small for an edge; the output moves 20 samples before it
     t, rng = np.arange(600.0), np.random.default_rng(1)
