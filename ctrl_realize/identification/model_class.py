@@ -30,6 +30,7 @@ from .output_error.checks import Shown, against_one_model, nonlinear_flags
 from .output_error.loop_flags import answers_the_output, in_automatic
 from .output_error.own_gains import at_model_gain
 from .output_error.result import OutputErrorFit
+from .output_error.words import FAR_APART
 from .state_space_fit.starts import Outcome, from_starts
 from .validation.residuals import analyse_residuals
 from .validation.residuals_result import ResidualAnalysis
@@ -40,7 +41,6 @@ MOST_STARTS = 3
 """Largest number of impulse-response estimates from which the state-space fit starts."""
 HOPELESS = 2.0
 """Largest ratio of residuals, lags to state space, for which the lags' interval is included."""
-_FAR_APART = 0.5  # width of an interval, in dead times, from which models disagree
 _NOTHING = 0.5  # samples
 _ROUNDING = 1e-12
 
@@ -170,7 +170,7 @@ def _chosen(
         flags += changes
         if total is not None and all(flag.code != "not_linear" for flag in flags):
             flags += nonlinear_flags(shown, _delay(system), total / dt)
-    wide = high - low > max(_FAR_APART * max(dead_time, dt), 2 * dt * (own[1] - own[0]))
+    wide = high - low > max(FAR_APART * max(dead_time, dt), 2 * dt * (own[1] - own[0]))
     if own[0] <= _NOTHING or wide:
         ends = interval_in_time(low, high)
         if own[0] <= _NOTHING:

@@ -27,12 +27,11 @@ from ...numerics.output_error.step_data import StepData
 from ...numerics.signals.filters import moving_mean
 from ...numerics.signals.noise import largest_excess
 from .sensor_flags import outliers
-from .words import gain_in_words, is_firm, order_words, sign_is_told, structure_words
+from .words import FAR_APART, gain_in_words, is_firm, order_words, sign_is_told, structure_words
 
 # Thresholds for flags alone are a matter of presentation.
 _SAMPLES_BESIDE_NOTHING = 0.5  # a dead time below it counts as zero
-_FAR_APART = 0.5  # width of an interval, in dead times, from which structures disagree
-_GAINS_APART = 0.2  # relative difference of gain or total delay between structures
+GAINS_APART = 0.2  # relative difference of gain or total delay between structures
 _AS_GOOD = 4.0  # insignificant difference of the criterion: chi-square, one degree of freedom, 95 %
 _CANCELLED = 0.05  # distance of a pole from a zero that cancels it, relative to its frequency
 _SETTLED = 3.0
@@ -231,7 +230,7 @@ def _unresolved_gain(fit: OutputErrorEstimate, ends: str) -> Iterator[Flag]:
 
 def _apart(values: FloatArray) -> bool:
     """Whether values differ from the first by more than is usual between structures."""
-    return bool(np.any(np.abs(values - values[0]) > _GAINS_APART * np.abs(values[0])))
+    return bool(np.any(np.abs(values - values[0]) > GAINS_APART * np.abs(values[0])))
 
 
 def _cancelled_pair(fit: OutputErrorEstimate) -> Iterator[Flag]:
@@ -254,7 +253,7 @@ def _is_wide(fit: OutputErrorEstimate, dt: float) -> bool:
     """Whether structures, or estimates beside a model at noise level, are far apart."""
     width, (low, high) = fit.high - fit.low, profile_limits(*fit.profile)
     within = 0.0 if fit.delay_estimates else 2 * (high - low)
-    return not fit.robust and width > max(_FAR_APART * max(fit.dead_time, dt), within)
+    return not fit.robust and width > max(FAR_APART * max(fit.dead_time, dt), within)
 
 
 def right_zeros(fit: OutputErrorEstimate) -> ComplexArray:

@@ -25,12 +25,13 @@ from ...numerics.validation.innovations import (
 )
 from ...numerics.validation.instability import unstable_chance
 from ...numerics.validation.white_step import WhiteStep, white_step
+from .flags import GAINS_APART
 from .result import OutputErrorFit
+from .words import FAR_APART
 
-_WIDE = 0.5  # width of an interval, in dead times, from which a set point moved too little
+_LARGER = np.geomspace(1.5, 16, 8).tolist()  # moves of a set point that are tried, over its own
 _LEVELS = 10  # of an input: a relay has two, or three
 _STRETCH = 20  # samples of a stretch in manual that is worth a word
-_OFF = 0.2  # relative difference of gains or total delays that is worth a flag: presentation
 
 
 def in_automatic(record: Record) -> bool:
@@ -71,20 +72,28 @@ def _spans(record: Record, where: BoolArray) -> str:
 
 
 def set_point_flags(fit: OutputErrorFit) -> Iterator[Flag]:
-    """Report a set point that moves too little."""
+    """Report a set point that moves too little, and how far it should."""
     low, high = fit.interval
-    if not fit.estimate.averaged or high - low <= max(_WIDE * fit.dead_time, fit.dt):
+    known = fit.estimate.with_moves
+    if known is None or not _is_wide(fit.dead_time, low, high, fit.dt):
         return
     every = [record.reference for record in fit.records if record.reference is not None]
     if not all(map(in_automatic, fit.records)):
         return
     moved = max(float(np.nanmax(wanted) - np.nanmin(wanted)) for wanted in every)
+    enough = next((s for s in _LARGER if not _is_wide(*known(s), fit.dt)), None)
+    way, times = ("about", enough) if enough else ("more than", _LARGER[-1])
     yield flagged(
         "small_set_point",
         total=in_time(fit.total_delay),
         interval=interval_in_time(low, high),
         moved=moved,
+        enough=f"{way} {times * moved:.2g}",
     )
+
+
+def _is_wide(dead_time: float, low: float, high: float, dt: float) -> bool:
+    return high - low > max(FAR_APART * dead_time, dt)
 
 
 def feedback_flags(records: tuple[Record, ...], delay: float) -> Iterator[Flag]:
@@ -183,7 +192,7 @@ def coloured_flags(
     gain_error, total_error = Z_95 * step.gain_error, Z_95 * step.total_error
     gains = abs(step.gain - fit.gain) + gain_error
     totals = abs(step.total - fit.total_delay) + total_error
-    if not (gains <= _OFF * abs(fit.gain) and totals <= _OFF * abs(fit.total_delay)):
+    if not (gains <= GAINS_APART * abs(fit.gain) and totals <= GAINS_APART * abs(fit.total_delay)):
         yield flagged(
             "gain_not_resolved.coloured",
             gain=step.gain,

@@ -26,6 +26,7 @@ ESTIMATE_WORDS: dict[RobustKey, str] = {
     "model_of_record": "best model of the whole record",
 }
 
+FAR_APART = 0.5  # width of an interval, in dead times, from which it is wide
 _FIRM = 0.1  # relative half width of the interval of a total delay that is called well determined
 
 

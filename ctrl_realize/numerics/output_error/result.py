@@ -251,8 +251,9 @@ class OutputErrorEstimate:
     `close` are decisions that rounding errors may reverse. `unweighted` is the model of
     plain least squares, if the residual was whitened. `load` is a step of a load; it is part
     of the model unless it is early. `drawn` has the structures of which plausible models are drawn.
-    `points` are the profiles of structures that are not ruled out. `averaged`: the dead time is the
-    mean over them, and the interval holds 95 % of their weight.
+    `points` are the profiles of structures that are not ruled out. If the dead time is
+    `averaged`, it is the mean over them, and the interval holds 95 % of their weight: `with_moves`
+    tells both for an input that moves so many times further.
     """
 
     dead_time: float
@@ -281,7 +282,12 @@ class OutputErrorEstimate:
     load: LoadStep | None = None
     drawn: PlausibleDraw | None = None
     points: Mapping[Structure, Points] = field(default_factory=dict)
-    averaged: bool = False
+    with_moves: Callable[[float], tuple[float, float, float]] | None = None
+
+    @property
+    def averaged(self) -> bool:
+        """Whether the dead time is a mean over structures that are not ruled out."""
+        return self.with_moves is not None
 
     @property
     def plausible(self) -> tuple[PlausibleModel, ...]:

@@ -39,13 +39,7 @@ from ...constants import CHI2_95, SMALLEST
 from ...engine.eliminate import eliminate, evaluate
 from ...engine.plausible_models import CALIBRATED, PlausibleDraw
 from ...engine.problem import Structure
-from ...engine.profile import (
-    Points,
-    profile_curve,
-    profile_grid,
-    profile_limits,
-    profile_points,
-)
+from ...engine.profile import Points, profile_curve, profile_grid, profile_limits, profile_points
 from ...engine.structures import Candidate
 from ...engine.window_fit import RAMP, WindowFit, clipped, has_outliers
 from ...families.form_fit import fit_form
@@ -125,8 +119,7 @@ def fit_lags(data: SampledData, requested: Requested) -> tuple[SampledWindow, Ou
     profiles = _profiles(fits, [*fitted, *equal])
     dead_times, shares = _weighted(fits, profiles)
     weights = shares.sum(axis=0)
-    mean = float(np.sum(weights * dead_times))
-    first, last = np.interp([_TAIL, 1.0 - _TAIL], np.cumsum(weights), dead_times).tolist()
+    mean, first, last = _known(fits, profiles)
     if not requested.forms and shares[len(LAGS) - 1 :].sum() > 0.5:
         # Three lags may stand for more: one more than chosen is never ruled out.
         further = fit_form(problem, FURTHER, scales, fitted)
@@ -155,7 +148,10 @@ def fit_lags(data: SampledData, requested: Requested) -> tuple[SampledWindow, Ou
         for one, own in zip(fitted, profiles, strict=False)
     }
     others = OtherStructures(better)
-    found = replace(found, process=process, points=points, others=others, averaged=True)
+    found = replace(
+        found, process=process, points=points, others=others,
+        with_moves=partial(_known, fits, profiles),
+    )  # fmt: skip
     return part, replace(found, drawn=PlausibleDraw(plainly, evidence, plain.__getitem__))
 
 
@@ -275,10 +271,18 @@ def _profiles(fits: WindowFit, fitted: Sequence[Candidate]) -> list[Points]:
     return found
 
 
-def _weighted(fits: WindowFit, profiles: Sequence[Points]) -> tuple[FloatArray, FloatArray]:
-    """Dead times (G,), and the weights (S, G) of every number of lags; they sum to 1."""
+def _weighted(
+    fits: WindowFit, profiles: Sequence[Points], larger: float = 1.0
+) -> tuple[FloatArray, FloatArray]:
+    """Dead times (G,), and the weights (S, G) of every number of lags; they sum to 1.
+
+    Of an input that moves so many times further; what a model misses, beside the best, then grows
+    with the square of that.
+    """
     every = np.array(sorted(profiles[0]))
     values = np.array([[_value(fits, own[float(at)]) for at in every] for own in profiles])
+    cost = np.array([[own[float(at)].cost for at in every] for own in profiles])
+    values += (larger**2 - 1.0) * (cost - cost.min()) / (CALIBRATED * fits.variance)
     part = np.arange(_BETWEEN) / _BETWEEN
     fine = np.append((every[:-1, None] + np.diff(every)[:, None] * part).ravel(), every[-1])
     between = PchipInterpolator(every, values, axis=1)(fine)
@@ -287,6 +291,16 @@ def _weighted(fits: WindowFit, profiles: Sequence[Points]) -> tuple[FloatArray, 
     weights = np.exp(-0.5 * (least - least.min()))
     share = weights / weights.sum() / np.maximum(density.sum(axis=1, keepdims=True), SMALLEST)
     return fine, share * density
+
+
+def _known(
+    fits: WindowFit, profiles: Sequence[Points], larger: float = 1.0
+) -> tuple[float, float, float]:
+    """Mean dead time and the ends of its interval, had the input moved so many times further."""
+    dead_times, shares = _weighted(fits, profiles, larger)
+    weights = shares.sum(axis=0)
+    ends = np.interp([_TAIL, 1.0 - _TAIL], np.cumsum(weights), dead_times).tolist()
+    return float(weights @ dead_times), ends[0], ends[1]
 
 
 def _plain(lags: Candidate) -> Candidate:
