@@ -27,6 +27,9 @@ LEAST_FREEDOM = 40
 """Degrees of freedom left by a regression that is tested: Student's point of 1e-4 is then within
 11 % of the normal one, so that a residual that is not quite normal does little."""
 
+PIECE = 2**16
+"""Samples that are looked at together, which bounds the memory."""
+
 LARGEST = 1e70
 """Numbers beyond this are no measurement: the square of a quotient of two inside is a double."""
 

@@ -25,13 +25,7 @@ from .averaging import common_sample_time
 from .flags import sampled_flags
 from .loop_flags import late_input, loop_choices, unstable_flags
 from .repeat_flags import repeat_flags
-from .repeatability import (
-    Repeatability,
-    delay_outliers,
-    fit_alike,
-    gain_outliers,
-    unlike_records,
-)
+from .repeatability import Repeatability, delay_outliers, fit_alike, gain_outliers, unlike_records
 from .result import OutputErrorFit
 from .sensor_flags import missing_code
 from .summary import choices_of

@@ -341,10 +341,7 @@ def _without_cut_noise(records: tuple[Record, ...]) -> tuple[tuple[Record, ...],
 
 
 def _fit_one(
-    record: Record,
-    requested: Requested,
-    any_input: Callable[..., OutputErrorFit],
-    first: int = 0,
+    record: Record, requested: Requested, any_input: Callable[..., OutputErrorFit], first: int = 0
 ) -> OutputErrorFit:
     data = None if requested.loop else step_data_of(record, first)
     if data is None:

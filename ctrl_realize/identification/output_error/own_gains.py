@@ -30,11 +30,7 @@ from ...numerics.arrays import FloatArray
 from ...numerics.constants import Z_95
 from ...numerics.validation.own_response import homogeneity
 from .averaging import middle_gain
-from .record_gains import (
-    ONE_POINT,
-    RecordGains,
-    operating_point,
-)
+from .record_gains import ONE_POINT, RecordGains, operating_point
 from .repeatability import RESPONDS, Repeatability
 from .result import OutputErrorFit
 
@@ -120,10 +116,7 @@ def at_model_gain(fit: OutputErrorFit) -> tuple[Record, ...]:
 
 
 def _gains(
-    records: tuple[Record, ...],
-    result: OutputErrorFit,
-    found: Repeatability,
-    ratios: FloatArray,
+    records: tuple[Record, ...], result: OutputErrorFit, found: Repeatability, ratios: FloatArray
 ) -> RecordGains:
     """Gains and their errors, from the common gain and the ratios.
 

@@ -33,13 +33,13 @@ import numpy as np
 from scipy.signal import lfilter
 
 from ..arrays import ComplexArray, FloatArray, IntArray
+from ..constants import PIECE
 
 Modes: TypeAlias = tuple[FloatArray, Any, Any]
 """H (B, m), E (B, m, J) and T (B, m, J), the latter real where they are for all of B."""
 
 TOGETHER = 1e-9  # samples by which a move and a sample may be apart and be at one time
 _DISTANT = 20.0  # widths of a bin from an arrival, from which on two samples stand for it
-_PIECE = 2**16  # samples of a response that are found at a time, which bounds the memory
 
 
 class HeldInput(Protocol):
@@ -93,7 +93,7 @@ class StepSequence:
 
     def pieces(self) -> list[StepSequence]:
         """Divide the bins into short sequences, to limit the memory."""
-        stops = range(_PIECE, self.first.size, _PIECE)
+        stops = range(PIECE, self.first.size, PIECE)
         parts = zip(np.split(self.first, stops), np.split(self.width, stops), strict=True)
         pieces = [replace(self, first=first, width=width) for first, width in parts]
         if self.samples is None:

@@ -19,7 +19,7 @@ import numpy as np
 from scipy.special import ndtr, ndtri
 
 from ..arrays import BoolArray, ComplexArray, FloatArray, unit_columns
-from ..constants import SMALLEST, Z_95
+from ..constants import PIECE, SMALLEST, Z_95
 from .eliminate import eliminate
 from .modal import partial_fractions, responses
 from .poles import lag_sum, poles_from_parameters
@@ -34,7 +34,6 @@ SIGNIFICANT = Z_95  # standard errors: a gain of less may as well be none, or ha
 
 _STEP = 1e-4  # of logarithms, and part of a numerator: for slopes by differences
 _CLEAR = 0.01  # relative distance of poles, twice that below which they are set apart
-_TOGETHER = 2**16  # samples of responses that are found at a time
 _HALVINGS = 60  # of an interval, until a double has no more digits
 _ROUNDED = 1e-7  # part of a derivative that differences leave of nothing
 _NOTHING = 1e-13  # part of the largest singular value that is rounding
@@ -192,7 +191,7 @@ def local_errors(
     inside = np.concatenate([[max(theta[0], moves[0, 0])], theta[1:], numerator])
     there = np.concatenate([inside + moves, inside - moves])
     # Models of long records one by one, which bounds the memory.
-    parts = np.array_split(there, min(len(there), 1 + len(there) * problem.data.size // _TOGETHER))
+    parts = np.array_split(there, min(len(there), 1 + len(there) * problem.data.size // PIECE))
     setting = problem.drive, problem.known
     every = [responses(*setting, x[:, theta.size :], x[:, : theta.size]) for x in parts]
     ahead, behind = np.split(np.concatenate(every), 2)

@@ -37,21 +37,8 @@ from ..families.flow import DispersedFlow
 from .extrapolation import least_extrapolating
 from .friction import latest_slip
 from .margins import CloseDecision, close_choices, close_exclusions
-from .profiles import (
-    Profile,
-    curves,
-    laid_profiles,
-    lower_minima,
-    profile_of,
-    solved_profiles,
-)
-from .result import (
-    DelayInterval,
-    DistributedLags,
-    OtherModel,
-    OutputErrorEstimate,
-    assembled,
-)
+from .profiles import Profile, curves, laid_profiles, lower_minima, profile_of, solved_profiles
+from .result import DelayInterval, DistributedLags, OtherModel, OutputErrorEstimate, assembled
 from .selection import Choice, choose_model
 
 _UNSEEN = 3.0
@@ -103,16 +90,7 @@ def likelihood_fit(
     static = None
     if choice.chain is None and choice.flow is None:
         chosen, static = least_extrapolating(fits, chosen)
-    found = assembled(
-        fits,
-        chosen,
-        adequate,
-        (),
-        kept.profiles,
-        interval,
-        own,
-        static=static,
-    )
+    found = assembled(fits, chosen, adequate, (), kept.profiles, interval, own, static=static)
     close: tuple[CloseDecision, ...] = near
     if choice.chain is None and choice.flow is None:
         own_structure = chosen.structure
@@ -186,11 +164,7 @@ def _compared(
             break
         fits = fits.of(fits.candidates | lower)
         points = {s: own for s, own in points.items() if s not in lower}
-    return (
-        fits,
-        choice,
-        _not_ruled_out(fits, choice, chains, flows, kept),
-    )
+    return fits, choice, _not_ruled_out(fits, choice, chains, flows, kept)
 
 
 def _not_ruled_out(

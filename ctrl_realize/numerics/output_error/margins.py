@@ -53,14 +53,7 @@ def close_exclusions(fits: WindowFit, level: float, chosen: Structure) -> tuple[
     """List structures that are just ruled out, or just not; `level` includes penalties."""
     values = charged(fits.criterion, fits.penalty)
     most, least = (
-        plausible(
-            fits.candidates,
-            values,
-            fits.variance,
-            fits.candidates[chosen],
-            level,
-            slack,
-        )
+        plausible(fits.candidates, values, fits.variance, fits.candidates[chosen], level, slack)
         for slack in (CLOSE * VERY_STRONG, -CLOSE * VERY_STRONG)
     )
     return tuple(CloseDecision("ruled_out", s) for s in most if s not in least)

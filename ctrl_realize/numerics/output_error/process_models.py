@@ -94,11 +94,7 @@ def process_fit(
 
 
 def fit_without_fast_lags(
-    fits: WindowFit,
-    fastest: float,
-    *,
-    is_noise: IsNoise,
-    near: tuple[CloseDecision, ...] = (),
+    fits: WindowFit, fastest: float, *, is_noise: IsNoise, near: tuple[CloseDecision, ...] = ()
 ) -> OutputErrorEstimate:
     """Determine model, dead time and interval among structures without lags that are faster, in s.
 

@@ -267,12 +267,7 @@ def window(data: StepData, stop: int, known: KnownFactor) -> Window:
     if data.coarse:  # means of samples without dither keep the rounding error
         weights = weights / (1 + weights) * 2
     problem = Problem(
-        bins.average(data.output[:stop]),
-        np.sqrt(weights),
-        drive,
-        means,
-        known,
-        on_bins,
+        bins.average(data.output[:stop]), np.sqrt(weights), drive, means, known, on_bins
     )
     single = np.broadcast_to(np.int64(1), stop)  # no memory for ones
     drive = StepSequence(times, single, data.dt, moves, size)

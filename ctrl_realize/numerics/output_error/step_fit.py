@@ -67,13 +67,7 @@ from ..engine.compared_fits import at_dead_time
 from ..engine.eliminate import evaluate
 from ..engine.modal import respond
 from ..engine.problem import Structure
-from ..engine.structures import (
-    ALL_STRUCTURES,
-    SIMPLE_STRUCTURES,
-    Candidate,
-    Scales,
-    choose,
-)
+from ..engine.structures import ALL_STRUCTURES, SIMPLE_STRUCTURES, Candidate, Scales, choose
 from ..engine.window_fit import WindowFit, among, fit_window, with_noise_of_residual
 from ..families.equal_lags import LagChain
 from ..families.flow import DispersedFlow
@@ -88,12 +82,7 @@ from .margins import CloseDecision, close_to
 from .other_structures import Compared, Requested, other_structures
 from .process_models import fit_without_fast_lags, process_fit
 from .profiles import profile_of
-from .result import (
-    DelayInterval,
-    OutputErrorEstimate,
-    RobustKey,
-    assembled,
-)
+from .result import DelayInterval, OutputErrorEstimate, RobustKey, assembled
 from .rounded import in_rounded_data
 from .selection import chains_of, flows_of
 from .step_data import StepData, settled_at, step_scales, stop_at, window
@@ -150,10 +139,7 @@ def fit_step_record(
 
 
 def _given_structures(
-    data: StepData,
-    fits: WindowFit,
-    free: Callable[[], WindowFit],
-    requested: Requested,
+    data: StepData, fits: WindowFit, free: Callable[[], WindowFit], requested: Requested
 ) -> OutputErrorEstimate:
     """Estimate the dead time by the likelihood of the best of given structures, adequate or not."""
     near, noisy = _close_to_noise(data, fits), _at_noise_level(data, fits)
@@ -280,9 +266,7 @@ def _flows(data: StepData, fits: WindowFit, chains: Sequence[LagChain]) -> Seque
 
 
 def _robust_fit(
-    fits: WindowFit,
-    chosen: Candidate,
-    estimates: tuple[tuple[RobustKey, float], ...],
+    fits: WindowFit, chosen: Candidate, estimates: tuple[tuple[RobustKey, float], ...]
 ) -> OutputErrorEstimate:
     """Determine dead time and interval from the delay estimates (points 3 and 4 of the rule)."""
     dead_time = float(np.median([at for _, at in estimates[:-1]]))
@@ -315,10 +299,7 @@ def _unseen(fits: WindowFit, model: Candidate) -> float:
 
 
 def _fit_until(
-    data: StepData,
-    stop: int,
-    structures: Sequence[Structure],
-    requested: Requested,
+    data: StepData, stop: int, structures: Sequence[Structure], requested: Requested
 ) -> WindowFit:
     return fit_window(
         window(data, stop, requested.known),

@@ -16,12 +16,18 @@ from scipy.ndimage import median_filter
 
 from ..arrays import FloatArray, IntArray
 from .edges import difference_noise
-from .noise import correlation_time, is_drift, mad_sigma, rounding_error, winsorised_sigma
+from .noise import (
+    DRIFT_ERRORS,
+    LONG_REST,
+    correlation_time,
+    is_drift,
+    mad_sigma,
+    rounding_error,
+    winsorised_sigma,
+)
 
 FEW = 5
 """With fewer samples before the step, those after it that are still at the baseline are added."""
-
-MIN_DRIFT_SAMPLES = 50  # least number of samples for a slope, as in `noise`
 
 
 def rest_line(
@@ -44,7 +50,7 @@ def rest_line(
     if before.size < FEW:
         return _level_from_start(np.concatenate([before, after])), 0.0
     index = np.arange(-before.size, 0, dtype=np.float64)
-    if remove_drift or (remove_drift is None and before.size >= MIN_DRIFT_SAMPLES):
+    if remove_drift or (remove_drift is None and before.size >= LONG_REST):
         slope, level = np.polyfit(index, before, 1)
         residual = before - level - slope * index
         if remove_drift or is_drift(float(slope), float(residual.std()), residual):
@@ -68,7 +74,6 @@ FEWEST = 24
 """Samples before the step from which a curve can be distinguished from a line: four for every
 parameter, after a median of five."""
 _SIGNIFICANT = 30.0  # chi-square to beat the line; ablation: exponential before the step
-_BEND_ERRORS = 5.0  # standard errors, as of a drift; ablation: bend before the step
 _SMOOTH = 20.0
 """Deviation over that of the noise in fourth differences, from which on a baseline that no
 polynomial describes is a motion. AR(1) noise with a pole of 0.99 has 13, a motor with hum 12, an
@@ -151,7 +156,7 @@ def noise_about_a_motion(before: FloatArray, quantum: float, rows: IntArray | No
     left = before - powers @ weights
     sigma = max(winsorised_sigma(left, quantum, lost=5), quantum / np.sqrt(12))
     error = sigma * np.sqrt(correlation_time(left))
-    if np.abs(weights[2:]).max() > _BEND_ERRORS * error:
+    if np.abs(weights[2:]).max() > DRIFT_ERRORS * error:
         return float(sigma)
     if rows is not None:
         return 0.0

@@ -19,11 +19,10 @@ import numpy as np
 from scipy.ndimage import median_filter, rank_filter
 
 from ..arrays import FloatArray
+from ..constants import PIECE
 
 REST_TOLERANCE = 0.02
 """The input has left its level if the difference is this fraction of the step (or 5 sigma)."""
-
-_PIECE = 2**18  # samples that are looked at together, to save memory
 
 
 @dataclass(frozen=True)
@@ -137,8 +136,8 @@ def median_jumps(values: FloatArray, width: int) -> FloatArray:
     """Median of the `width` samples from each sample on, minus that of those before it."""
     jump = np.empty(values.size)
     # in pieces, because intermediate arrays would take several times the memory of a long record
-    for start in range(0, values.size, _PIECE):
-        stop = min(start + _PIECE, values.size)
+    for start in range(0, values.size, PIECE):
+        stop = min(start + PIECE, values.size)
         part = values[max(start - width, 0) : stop + width]
         lacking = max(width - start, 0), max(stop + width - values.size, 0)
         padded = np.pad(part, lacking, mode="edge")
@@ -158,9 +157,9 @@ def _side_medians(padded: FloatArray, width: int) -> tuple[FloatArray, FloatArra
 
 def _peaks(jump: FloatArray, threshold: float) -> Iterator[int]:
     """Positions of the largest jump in each run of jumps of one sign."""
-    for start in range(0, jump.size, _PIECE):
-        sign = np.sign(jump[start : start + _PIECE])
-        sign[np.abs(jump[start : start + _PIECE]) < threshold] = 0.0
+    for start in range(0, jump.size, PIECE):
+        sign = np.sign(jump[start : start + PIECE])
+        sign[np.abs(jump[start : start + PIECE]) < threshold] = 0.0
         bounds = np.flatnonzero(np.diff(sign, prepend=0.0)) + start
         for first in bounds.tolist():
             own = np.sign(jump[first])

@@ -28,22 +28,23 @@ import numpy as np
 from scipy.optimize import fminbound
 
 from ..arrays import FloatArray, IntArray
-from ..constants import VERY_STRONG
+from ..constants import PIECE, VERY_STRONG
 from ..hankel.matrix import fft_length
 
 _DITHER = 0.6
 """Noise, rounding included, in quantisation steps, from which means are unbiased: half a step of
 its own. The mean of rounded Gaussian values is off by exp(-2 (pi sigma)^2) / pi steps at most [4]_,
 chapter on dither: 0.002 of a step at sigma = 0.5, 0.05 at 0.3."""
-_MANY = 50  # samples at rest that are enough to tell the noise: to a tenth
+LONG_REST = 50  # samples that are enough to tell the noise, to a tenth, and a slope
 _TURNS = 3  # of the line, and of the limits about it
 _MOST_OF_A_LINE = 45.0
 """Bound of the energy of a line, in its power in a spectrum behind Hann's window over its samples:
 8 at a frequency of the spectrum, 11 between two of them, and leakage of what is beside it."""
 _BLOCK = 4096  # samples over which a phase is turned on at a time
-_TOGETHER = 2**18  # samples that are looked at together
 _FIRST_LAGS = 2**12  # that are looked at first, to save time
-_DRIFT_ERRORS = 5.0  # a drift that is lost in the noise does no harm; ablation: drift
+DRIFT_ERRORS = 5.0
+"""Standard errors from which on there is a drift, or a bend: one that is lost in the noise does no
+harm. Ablation: drift, bend before the step."""
 _FEW = 8  # samples at rest below which the whole record must tell the noise: six are left of a line
 
 
@@ -69,7 +70,7 @@ def quantisation_step(values: FloatArray) -> float:
         return 0.0
     step = float(gaps.min())
     multiples = np.divide(gaps, step, out=gaps)
-    pieces = np.array_split(multiples, -(-multiples.size // _TOGETHER))
+    pieces = np.array_split(multiples, -(-multiples.size // PIECE))
     whole = sum(int(np.sum(np.abs(part - np.round(part)) < 0.05)) for part in pieces)
     few = float(np.median(multiples, overwrite_input=True)) < 50
     return step if whole > 0.9 * multiples.size and few else 0.0
@@ -136,7 +137,7 @@ def rest_noise(
     index = np.arange(before.size) if rows is None else rows
     slope, left = _robust_line(before, index.astype(np.float64), quantum)
     sigma = max(winsorised_sigma(left, quantum, lost=2), floor)
-    if before.size < _MANY:
+    if before.size < LONG_REST:
         # A dozen samples determine sigma to a factor of two: the settled half of the record helps.
         settled = np.diff(record[(before.size + record.size) // 2 :], 3) / np.sqrt(20)
         if settled.size:
@@ -156,7 +157,7 @@ def is_drift(slope: float, sigma: float, residual: FloatArray) -> bool:
         Residual of the line, for its correlation.
     """
     error = sigma * np.sqrt(12 * correlation_time(residual) / residual.size**3)
-    return bool(abs(slope) > _DRIFT_ERRORS * error)
+    return bool(abs(slope) > DRIFT_ERRORS * error)
 
 
 def _robust_line(values: FloatArray, index: FloatArray, quantum: float) -> tuple[float, FloatArray]:
@@ -234,7 +235,7 @@ def _correlation(residual: FloatArray) -> FloatArray:
 def _lagged_products(values: FloatArray, lags: int) -> FloatArray:
     """Sums of ``values[k] values[k + i]`` for i = 0...lags - 1, piece by piece."""
     total = np.zeros(lags)
-    size = max(8 * lags, _TOGETHER)
+    size = max(8 * lags, PIECE)
     for start in range(0, values.size, size):
         late = values[start : start + size + lags]
         points = fft_length(late.size + lags)

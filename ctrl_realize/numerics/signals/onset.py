@@ -24,6 +24,7 @@ from scipy.signal import lfilter
 from scipy.special import ndtri
 
 from ..arrays import FloatArray, IntArray
+from ..constants import PIECE
 from .correlation import autoregression, correlation
 from .filters import moving_mean
 
@@ -99,7 +100,6 @@ def phase_slope(omega: FloatArray, phase: FloatArray, share: float) -> tuple[flo
     return -slope, float(np.sqrt(variance))
 
 
-_PIECE = 2**18  # samples that are looked at together, to save memory
 _SMOOTHINGS = (1, 8, 64)
 """Samples; a small step in much noise shows only in means. Ablation: first motion in means."""
 
@@ -207,8 +207,8 @@ def _lasting_excursion(moved: FloatArray, threshold: float, smoothing: int) -> i
     outside = np.cumsum(size > 0.6 * threshold, dtype=np.int32)
     del size
     upward = np.cumsum(np.sign(moved).astype(np.int8), dtype=np.int32)
-    for start in range(0, moved.size, _PIECE):
-        beyond = start + np.flatnonzero(over[start : start + _PIECE])
+    for start in range(0, moved.size, PIECE):
+        beyond = start + np.flatnonzero(over[start : start + PIECE])
         last = np.minimum(beyond + _lasting(beyond, smoothing), moved.size) - 1
         count = last + 1 - beyond
         # The first of them is outside, and the sign is not zero there.

@@ -20,7 +20,7 @@ _FAST = 0.2
 """Part of the steepest slope of a model from which its output counts as moving: of one lag, until
 it has made 80 % of its way."""
 _FEWEST = 8  # moving samples of which a part can be judged
-_SELDOM = 0.2
+SELDOM = 0.2
 """Part of equal neighbours up to which an output is said to have noise."""
 _LONG = 20  # samples: with a fifth of equal neighbours noise stands for so long by 0.2^19
 _PASSED = 0.2
@@ -98,7 +98,7 @@ def stuck_samples(output: FloatArray, fitted: FloatArray) -> tuple[int, int]:
     moves = np.abs(np.diff(fitted))
     quiet = moves < _FAST * moves.max(initial=0.0)
     quiet[first:last] = False
-    if last - first < _LONG or quiet.sum() < _LONG or np.mean(same[quiet]) > _SELDOM:
+    if last - first < _LONG or quiet.sum() < _LONG or np.mean(same[quiet]) > SELDOM:
         return 0, 0
     noise = float(np.median(np.abs(np.diff(output - fitted)[quiet])))
     passed = float(np.ptp(fitted[first : last + 1])) > _PASSED * np.ptp(fitted)

@@ -29,9 +29,8 @@ from ..signals.noise import (
     rounding_error,
 )
 from ..signals.noise_model import coloured_criterion
+from .held_output import SELDOM
 
-_SELDOM = 0.2
-"""Part of equal neighbours up to which an output is said to have noise."""
 _TURNS = 0.5
 """Part of its third differences that change sign then: 77 % of white noise (arccos of their
 correlation, -3/4), few of a response without noise."""
@@ -96,7 +95,7 @@ def _is_noisy(values: FloatArray, ends: BoolArray) -> bool:
     if third.size < 2 * _FEWEST or is_coarse(_noise(third), quantisation_step(values)):
         return False
     repeated = np.mean(same[~(ends[1:] | ends[:-1])])
-    return bool(repeated <= _SELDOM and np.mean(third[1:] * third[:-1] < 0) >= _TURNS)
+    return bool(repeated <= SELDOM and np.mean(third[1:] * third[:-1] < 0) >= _TURNS)
 
 
 def _noise(third: FloatArray) -> float:

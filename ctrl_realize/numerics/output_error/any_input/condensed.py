@@ -48,7 +48,7 @@ MOST_LAGS = 1000
 """Longest response, in samples, that is condensed: time grows with its square."""
 PER_LAG = 20
 """Least number of samples for each lag: as for the noise in `noise_model`."""
-_PIECE = 2**17  # samples that are looked at together, to save memory
+_PIECE = 2**17  # samples that have a level of their own, and bound the memory
 _EXCITED = 1e-10  # of the strongest direction of the input; rounding is 1e-15 of it
 _RIDGE = 1e-8  # of the mean square of the input: what it does not excite stays small
 _OWN_PAST = (0, 1, 2, 3, 4, 6, 8, 12, 16, 25)  # samples of an output that may tell its noise

@@ -97,10 +97,7 @@ class SampledFit:
 
 
 def fit_sampled(
-    outputs: Sequence[FloatArray],
-    inputs: Sequence[FloatArray],
-    dt: float,
-    requested: Requested,
+    outputs: Sequence[FloatArray], inputs: Sequence[FloatArray], dt: float, requested: Requested
 ) -> SampledFit:
     """Estimate the dead time of one plant from records with any input that moves.
 

@@ -60,10 +60,7 @@ def fit_stretch(
 
 
 def samples_in_a_block(
-    outputs: Sequence[FloatArray],
-    inputs: Sequence[FloatArray],
-    dt: float,
-    requested: Requested,
+    outputs: Sequence[FloatArray], inputs: Sequence[FloatArray], dt: float, requested: Requested
 ) -> tuple[int, SampledWindow | None]:
     """Samples of which the mean is fitted, so that a slow plant is seen for long enough.
 
