@@ -29,7 +29,7 @@ def noisy(seed, *, f=F, level=0.01, plant=second_order):
     return cr.MeasuredFRF(exact + noise, f, std=std)
 
 
-@settings(max_examples=6)
+@settings(max_examples=4)
 @given(
     tau=st.floats(0, 0.5),
     gain=st.floats(0.01, 100),
@@ -244,12 +244,13 @@ def test_hydrophone_answers_before_its_input_and_that_is_said(shared_data):
 def test_what_an_unstable_plant_does_is_left_and_that_is_said():
     s = 2j * np.pi * np.geomspace(1e-3, 0.25, 60)
     frf = cr.MeasuredFRF(2 * np.exp(-3 * s) / (20 * s - 1), s.imag / (2 * np.pi))
-    flags = {flag.code: str(flag) for flag in cr.fit_frf(frf).fit.flags}
+    flags = {flag.code: str(flag) for flag in cr.fit_frf(frf, (1, 2, 3)).fit.flags}
     assert "If the plant is unstable" in flags["structured_misfit"]
     # what a stable plant leaves in loud noise is noise
     loud = 1 + 0.3 * np.random.default_rng(0).standard_normal(60)
     frf = cr.MeasuredFRF(2 * np.exp(-3 * s) / (20 * s + 1) * loud, s.imag / (2 * np.pi))
-    assert "structured_misfit" not in [flag.code for flag in cr.fit_frf(frf).fit.flags]
+    flags = cr.fit_frf(frf, (1, 2, 3)).fit.flags
+    assert "structured_misfit" not in [flag.code for flag in flags]
 
 
 def test_resonances_over_three_decades_are_found_in_noise():
@@ -429,14 +430,14 @@ def test_a_gain_with_dead_time_comes_out_without_a_lag():
     exact = cr.fit_frf(cr.MeasuredFRF(gain(S), F)).fit
     assert exact.order == 0
     assert exact.dead_time == pytest.approx(0.04, abs=1e-9)
-    fits = [cr.fit_frf(noisy(seed, level=0.05, plant=gain)).fit for seed in range(8)]
+    fits = [cr.fit_frf(noisy(seed, level=0.05, plant=gain)).fit for seed in range(4)]
     for fit in fits:
         # the phase 0.04 w has an error of level / (gain sqrt(2)) at every point
         bound = 0.05 / (2 * np.sqrt(2)) / np.linalg.norm(2 * np.pi * F)
         assert abs(fit.dead_time - 0.04) < 3.5 * bound
         assert fit.std_given_structure == pytest.approx(bound, rel=0.35)
-    assert [fit.order for fit in fits] == [0] * 8
-    assert sum(fit.interval[0] <= 0.04 <= fit.interval[1] for fit in fits) >= 7
+    assert [fit.order for fit in fits] == [0] * 4
+    assert sum(fit.interval[0] <= 0.04 <= fit.interval[1] for fit in fits) >= 3
 
 
 @pytest.mark.parametrize("dead_time", [8.3, 8.0])
@@ -463,7 +464,7 @@ def test_aliases_of_a_held_input_are_part_of_the_model(dead_time, level):
 
 def test_a_dead_time_is_found_in_spectra_of_a_held_input():
     plant = cr.delayed_ss(ct.tf([2], [12, 1]), dead_time=8.3, dt=1.0)
-    for seed in range(4):
+    for seed in range(2):
         rng = np.random.default_rng(seed)
         u = np.repeat(rng.choice([-1.0, 1.0], 800), 5)
         y = plant.simulate(u) + 0.02 * rng.standard_normal(u.size)

@@ -43,7 +43,7 @@ def staircase(*moves, hold=120):
 
 
 def test_a_single_large_step_tells_a_slew_rate_and_the_dead_time_behind_it():
-    record = through(SlewRateLimit(12.0), staircase(40.0, hold=100), 1)
+    record = through(SlewRateLimit(12.0), staircase(40.0, hold=60), 1)
     linear_system = cr.fit_output_error(record, structures=[(2, 2)])
     system = cr.fit_output_error(record, actuator="auto", structures=[(2, 2)])
     linear, fit = linear_system.fit, system.fit
@@ -56,7 +56,7 @@ def test_a_single_large_step_tells_a_slew_rate_and_the_dead_time_behind_it():
     assert abs(fit.dead_time - DEAD_TIME) < 0.05
     assert fit.fit_percent > linear.fit_percent
     assert "slew rate" in fit.report()
-    other = through(SlewRateLimit(12.0), staircase(-25.0, hold=100), 3)
+    other = through(SlewRateLimit(12.0), staircase(-25.0, hold=60), 3)
     follows = cr.compare({"linear": linear_system, "actuator": system}, other).fit_percent
     assert follows["actuator"] > 97 > follows["linear"]
 
