@@ -24,10 +24,10 @@ def saved(session):
     return base64.b64decode(session.apply({"do": "write", "what": "work"})["written"]["content"])
 
 
-def finished(session: Session):
-    """Compute all that the view needs, as a page does."""
+def finished(session: Session, until: str = ""):
+    """Compute all that the view needs, as a page does, or what comes before a kind of work."""
     answer = session.apply({"do": "view"})
-    while answer["view"]["pending"]:
+    while answer["view"]["pending"] not in (None, "", until):
         answer = session.apply({"do": "compute"})
         assert "error" not in answer
     return answer["view"]
@@ -94,7 +94,7 @@ def test_a_dragged_model_of_any_input_is_its_simulation():
         records.append(cr.Record(time, signal, output))
         session.add_record(records[-1])
     session.apply(put("model", structure=[1, 1]))
-    view = finished(session)
+    view = finished(session, "tuning")
     values = {one["name"]: one["value"] for one in view["model"]["parameters"]}
     drag = session.apply({"do": "drag", "values": {"gain": 1.5 * values["gain"]}})["drag"]
     at, output = (np.array(drag["lines"]["response"][key]) for key in "xy")
@@ -120,9 +120,9 @@ def test_a_known_parameter_is_that_of_the_fit_and_can_be_freed():
     session = Session()
     session.add_record(step_record())
     session.apply(put("model", structure=[1, 1]))
-    finished(session)
+    finished(session, "tuning")
     session.apply(put("model", known={"dead_time": 1.3}))
-    view = finished(session)
+    view = finished(session, "tuning")
     known = cr.identification.ProcessStructure("P1D", fixed={"dead_time": 1.3})
     expected = cr.identify(step_record(), structures=known).fit
     shown = {one["name"]: one for one in view["model"]["parameters"]}
@@ -181,7 +181,7 @@ def test_the_lines_of_python_give_the_same_numbers(tmp_path, capsys):
         put("model", structure=[1, 1]),
     ):
         assert "error" not in session.apply(command)
-    finished(session)
+    finished(session, "tuning")
     session.apply(put("model", known={"gain": 0.61}))
     session.apply(put("loop", speed=0.7, form="siemens_pid_compact"))
     view = finished(session)
@@ -293,7 +293,7 @@ def test_records_are_layers_and_fitted_together():
     session.add_record(step_record(seed=1))
     session.add_record(step_record(seed=2))
     session.apply(put("model", structure=[1, 1]))
-    view = finished(session)
+    view = finished(session, "tuning")
     drawn = panel(view, "data", "record-output")
     assert sum(one["look"] == "plausible" for one in drawn["layers"]) == 1
     both = cr.identify([step_record(seed=1), step_record(seed=2)], structures=[(1, 1)]).fit
@@ -301,7 +301,7 @@ def test_records_are_layers_and_fitted_together():
     assert shown["dead_time"] == both.dead_time
     session.apply(put("record", 0, used=False))
     alone = cr.identify(step_record(seed=2), structures=[(1, 1)]).fit
-    view = finished(session)
+    view = finished(session, "tuning")
     assert {one["name"]: one["value"] for one in view["model"]["parameters"]}[
         "dead_time"
     ] == alone.dead_time
@@ -329,6 +329,7 @@ def test_plants_that_a_quick_loop_makes_unstable_are_drawn_apart():
     record = step_record(count=120, dt=0.2, noise=1.5, seed=4)
     session = Session()
     session.add_record(record)
+    session.apply(put("model", structure=[1, 1]))
     session.apply(put("loop", speed=1.0))
     view = finished(session)
     unstable = dict(map(tuple, view["loop"]["margins"]))["unstable plants"]
@@ -403,7 +404,7 @@ def test_a_measured_response_is_drawn_beside_the_model():
     other.add_record(step_record())
     other.apply(put("model", structure=[1, 1]))
     assert "error" not in other.apply(opened("sweep.csv", text.encode()))
-    assert finished(other)["data"]["frf"] == "sweep.csv"
+    assert finished(other, "tuning")["data"]["frf"] == "sweep.csv"
     figures = {one["key"]: one["svg"] for one in other.apply({"do": "figures"})["figures"]}
     assert set(figures) == {"residuals", "plausible", "frf"}
     assert all("<svg" in one for one in figures.values())

@@ -1,5 +1,7 @@
 """Planned tests: closed forms of the bound, laws of the plans, predicted and achieved."""
 
+from functools import cache
+
 import numpy as np
 import pytest
 from scipy.linalg import toeplitz
@@ -18,6 +20,16 @@ FIRST_ORDER = PlausibleModel(DEAD_TIME, np.array([-1 / LAG + 0j]), np.array([GAI
 LEVEL = cr.design.ProcessModel(gain=0.2, lag=0.0, dead_time=3.0, integrating=True)
 FLOW = cr.design.ProcessModel(gain=1.2, lag=3.0, dead_time=2.0)
 ASKED = {"time": 60.0, "amplitude": 5.0, "rate": 5.0, "noise": 0.1}
+
+
+ONE_STEP = Case("first order", 0.0, best=False, way="given")
+PLAN = planned(ONE_STEP)
+
+
+@cache
+def of_one_step():
+    """Plan from one record of a step."""
+    return cr.experiment.plan(simulated(ONE_STEP, PLAN, 0), structures=[(1, 1)])
 
 
 def error(signal, dt, wanted="dead_time", noise=WHITE, model=FIRST_ORDER):
@@ -167,11 +179,10 @@ def test_integrating_plant_comes_back():
 
 
 def test_plan_from_a_record_has_rivals_noise_and_todays_error():
-    record = simulated(Case("first order", 0.0, best=False, way="given"), PLAN, 0)
-    plan = cr.experiment.plan(record, structures=[(1, 1)])
-    again = cr.experiment.plan(cr.identify(record, structures=[(1, 1)]))
+    record = simulated(ONE_STEP, PLAN, 0)
+    system = cr.identify(record, structures=[(1, 1)])
+    plan, again, fit = of_one_step(), cr.experiment.plan(system), system.fit
     np.testing.assert_array_equal(plan.command, again.command)
-    fit = cr.identify(record, structures=[(1, 1)]).fit
     length, error = plan.curve.first
     assert length == pytest.approx(120.0)
     assert error == pytest.approx(fit.std_given_structure, rel=0.1)
@@ -198,14 +209,10 @@ def test_the_output_keeps_its_limit_on_every_plausible_model():
     assert max(moved) <= 0.5 * (1 + 1e-9)
 
 
-PLAN = planned(Case("first order", 0.0, best=False, way="given"))
-
 
 def test_two_step_records_have_the_noise_and_the_information_of_both():
-    case = Case("first order", 0.0, best=False, way="given")
-    first, second = (simulated(case, PLAN, seed) for seed in (0, 1))
-    alone = cr.experiment.plan(first, structures=[(1, 1)])
-    both = cr.experiment.plan([first, second], structures=[(1, 1)])
+    first, second = (simulated(ONE_STEP, PLAN, seed) for seed in (0, 1))
+    alone, both = of_one_step(), cr.experiment.plan([first, second], structures=[(1, 1)])
     assert both.noise.sigma == pytest.approx(0.02, rel=0.15)
     assert both.curve.first[0] == pytest.approx(240.0)
     assert both.curve.first[1] == pytest.approx(alone.curve.first[1] / np.sqrt(2), rel=0.2)

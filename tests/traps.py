@@ -172,7 +172,7 @@ TRAPS = [
     Trap("two decimal signs", csv(T, U, Y, form='{:g},{:g},"{:,.3f}"'), yes=ANY),
     Trap("a word among the numbers", lambda path: (CLEAN(path), path.write_text(
         path.read_text().replace("\n60,50,", "\n60,50,x"))), refused="is not a number"),
-    Trap("swapped columns", csv(T, Y, U), flags=("swapped",), not_yes=ANY),
+    Trap("swapped columns", csv(T[:150], Y[:150], U[:150]), flags=("swapped",), not_yes=ANY),
     Trap("swapped columns without names", csv(T, Y, U, "time [s],a,b"), told="moves in steps"),
     Trap("two inputs, one named", two_inputs, flags=("structured_misfit", "load_disturbance"),
          not_yes=("gain", "tuning")),
