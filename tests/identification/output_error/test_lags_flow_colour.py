@@ -197,8 +197,8 @@ def test_the_gain_in_slow_noise_has_its_standard_error_though_the_model_takes_pa
         record = cr.Record(1.0 * k, 1.0 * (k >= edge), model(*true) + noise)
         fit = cr.fit_output_error(record, structures=[(1, 1)]).fit
         stated.append(fit.gain_std_given_structure / exact)
-    # One scatters by 45 %, their median by 20 %, of which 1.4 is twice. Without what the model takes
-    # it is 0.69.
+    # One scatters by 45 %, their median by 20 %, of which 1.4 is twice. Without what the model
+    # takes it is 0.69.
     assert 0.8 < np.median(stated) < 1.4
 
 
