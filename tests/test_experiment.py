@@ -209,7 +209,6 @@ def test_the_output_keeps_its_limit_on_every_plausible_model():
     assert max(moved) <= 0.5 * (1 + 1e-9)
 
 
-
 def test_two_step_records_have_the_noise_and_the_information_of_both():
     first, second = (simulated(ONE_STEP, PLAN, seed) for seed in (0, 1))
     alone, both = of_one_step(), cr.experiment.plan([first, second], structures=[(1, 1)])

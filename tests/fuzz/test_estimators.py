@@ -189,7 +189,7 @@ def check_fit(model: cr.DelayedStateSpace) -> None:
         assert np.isfinite(model.fit.residual)
 
 
-@fuzz(6)
+@fuzz(4)
 def test_any_record_is_fitted_or_refused(rng):
     arrays = any_experiment(rng, random_one_in=12)
     order = rng.choice([None, *[1] * 50, 2, 2, 2, rng.randint(0, 6)])
@@ -218,7 +218,7 @@ def test_records_of_gains_that_differ_are_fitted_together_or_refused(rng):
         check_fit(model)
 
 
-@fuzz(10)
+@fuzz(6)
 def test_any_handful_of_samples_is_fitted_or_refused(rng):
     n, noise = rng.randint(3, 40), generator(rng)
     onset = rng.randrange(n)

@@ -32,9 +32,8 @@ def held_response(seed):
     return cr.spectral_frf(cr.Record(dt * np.arange(u.size), u, y), delay=2)
 
 
-@pytest.mark.parametrize("seed", [0, 1, 2])
-def test_aliases_of_a_held_input_do_not_move_the_dead_time_of_both_together(seed):
-    fit = fit_joint(step(seed), held_response(seed)).fit
+def test_aliases_of_a_held_input_do_not_move_the_dead_time_of_both_together():
+    fit = fit_joint(step(), held_response(0)).fit
     assert fit.interval[0] <= DEAD_TIME <= fit.interval[1] < fit.interval[0] + 0.05
     assert fit.dead_time == pytest.approx(DEAD_TIME, abs=0.01)
     assert "inverse_response" not in [flag.code for flag in fit.flags]

@@ -53,15 +53,15 @@ def fitted(seed=0):
 
 def test_gains_of_steps_are_within_their_intervals_and_the_dead_time_in_its():
     inside = []
-    for seed in range(12):
+    for seed in range(6):
         fit = fitted(seed).fit
         gains = fit.gains
         inside += [*((gains.low <= GAINS) & (gains.high >= GAINS))]
         inside.append(fit.interval[0] <= DEAD_TIME <= fit.interval[1])
         assert_allclose(gains.gains, GAINS, rtol=0, atol=5 * gains.errors.max())
         assert not gains.outlying
-    # 48 intervals of 95 %: 43 or more in 98.6 % of all such sets
-    assert sum(inside) >= 43
+    # 24 intervals of 95 %: 21 or more in 97 % of all such sets
+    assert sum(inside) >= 21
 
 
 def test_steps_agree_with_least_squares_over_all_parameters_at_once():
@@ -148,9 +148,9 @@ def test_a_gain_may_change_its_sign_between_records():
 
 
 def test_records_of_one_name_are_told_apart():
-    records = at_three_levels()
+    records = at_three_levels(n=300)
     alike = [cr.Record(r.time, r.input, r.output, name="bench") for r in records]
-    strange = step(91, 0.5, lag=0.6)
+    strange = step(91, 0.5, lag=0.6, n=300)
     fit = own([*alike, cr.Record(strange.time, strange.input, strange.output, name="bench")]).fit
     assert fit.gains.outlying == ("bench (3)",)
 

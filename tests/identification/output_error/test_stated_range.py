@@ -75,7 +75,7 @@ def test_a_stated_range_that_the_data_contradict_is_told(record, within):
 
 def test_statements_hold_for_any_input_and_for_a_frequency_response():
     rng = np.random.default_rng(5)
-    u = np.repeat(rng.choice([-1.0, 1.0], 60), 10)
+    u = np.repeat(rng.choice([-1.0, 1.0], 40), 10)
     lags = ct.tf([1], [LAGS[0], 1]) * ct.tf([1], [LAGS[1], 1])
     y = cr.delayed_ss(lags, dead_time=DEAD_TIME, dt=1.0).simulate(u) + 0.01 * rng.standard_normal(
         u.size
