@@ -35,11 +35,13 @@ class Achieved(Result):
 
     Examples
     --------
+    >>> import numpy as np
     >>> import ctrl_realize as cr
-    >>> heater = cr.bench.heater()
-    >>> plan = cr.experiment.plan(heater.step_record(rng=1), structures="P2D", time=600.0)
-    >>> record = heater.record(plan.command, rng=2)
-    >>> found = cr.experiment.achieved(plan, record, structures="P2D")
+    >>> flow = cr.design.ProcessModel(gain=1.2, lag=3.0, dead_time=2.0)
+    >>> plan = cr.experiment.plan(flow, time=60, amplitude=5, rate=5, noise=0.1)
+    >>> moved = flow.system(plan.dt).simulate(plan.command)
+    >>> noise = 0.1 * np.random.default_rng(1).standard_normal(moved.size)
+    >>> found = cr.experiment.achieved(plan, plan.record(moved + noise), structures="P1D")
     >>> bool(found.std < plan.step.std / 2)
     True
     """

@@ -40,7 +40,7 @@ class SeveralInputsFit(ModelFit):
     >>> import numpy as np
     >>> import ctrl_realize as cr
     >>> rng = np.random.default_rng(0)
-    >>> u = np.repeat(rng.choice([-1.0, 1.0], (2, 40)), 20, axis=1)
+    >>> u = np.repeat(rng.choice([-1.0, 1.0], (2, 25)), 20, axis=1)
     >>> heating = cr.delayed_ss(ct.tf([2.0], [20, 1]), dead_time=5.0, dt=1.0)
     >>> load = cr.delayed_ss(ct.tf([-1.0], [30, 1]), dead_time=9.0, dt=1.0)
     >>> y = heating.simulate(u[0]) + load.simulate(u[1]) + 0.05 * rng.standard_normal(u.shape[1])

@@ -67,15 +67,13 @@ def delay_comparison_plot(
 
     Examples
     --------
-    >>> import control as ct
     >>> import numpy as np
     >>> import ctrl_realize as cr
-    >>> plant = cr.delayed_ss(ct.tf([2.0], [0.3, 1]), dead_time=0.125, dt=0.01)
-    >>> rng = np.random.default_rng(0)
-    >>> u = np.repeat(rng.choice([-1.0, 1.0], 60), 15)
-    >>> y = plant.simulate(u) + 0.05 * rng.standard_normal(u.size)
-    >>> record = cr.Record(0.01 * np.arange(u.size), u, y)
-    >>> check = cr.validation.compare_delay_estimates(record, order=1)
+    >>> f = np.geomspace(0.02, 5, 60)
+    >>> s = 2j * np.pi * f
+    >>> noise = 0.01 * np.random.default_rng(0).standard_normal(f.size)
+    >>> frf = cr.MeasuredFRF(2 * np.exp(-0.125 * s) / (0.3 * s + 1) + noise, f)
+    >>> check = cr.validation.compare_delay_estimates(frf=frf, order=1)
     >>> cplt = cr.plots.delay_comparison_plot(check)
     >>> cplt.figure.axes[0].get_xlabel()
     'dead time, or bound ◂ [ms]'

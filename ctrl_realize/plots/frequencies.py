@@ -168,7 +168,7 @@ def joint_fit_plot(
     >>> import ctrl_realize as cr
     >>> bench = cr.bench.valve()
     >>> frf = bench.truth.frf(np.geomspace(0.1, 10.0, 20))
-    >>> sys = cr.identify(bench.step_record(16, rng=5), frf=frf, order=3)
+    >>> sys = cr.identify(bench.step_record(16, rng=5), frf=frf, order=1)
     >>> cplt = cr.plots.joint_fit_plot(sys)
     >>> cplt.figure.axes[-1].get_ylabel()
     'phase [deg]'

@@ -95,7 +95,9 @@ def valve_report(
     >>> import ctrl_realize as cr
     >>> valve = cr.bench.valve(noise=5e-4)
     >>> records = valve.step_campaign(1, amplitudes=(16.0, 4.0), repeats=2)
-    >>> report = cr.valves.valve_report(records, command_range=(4, 20), limits={"overshoot": 10})
+    >>> report = cr.valves.valve_report(
+    ...     records, command_range=(4, 20), limits={"overshoot": 10}, fit=False
+    ... )
     >>> print(report.verdict)
     All limits are met: overshoot (25 % opening).
     >>> print(f"{1e3 * report.metric('t86').interval.value:.0f} ms")

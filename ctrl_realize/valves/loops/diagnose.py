@@ -110,7 +110,7 @@ def diagnose_loop(
     >>> sticking = cr.bench.valve_loop(cr.actuators.Stiction(5, 2), noise=0.1)
     >>> disturbed = cr.bench.valve_loop(noise=0.1, oscillation=(2.0, 60.0))
     >>> for loop in (sticking, disturbed):
-    ...     print(cr.valves.diagnose_loop(loop.simulate(1200.0, rng=1).record).verdict)
+    ...     print(cr.valves.diagnose_loop(loop.simulate(600.0, rng=1).record).verdict)
     stiction
     no stiction: tuning or external oscillation
     """
