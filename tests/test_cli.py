@@ -76,6 +76,7 @@ def test_one_record_gives_model_report_and_figures(folder, first):
 
 def test_the_exit_code_tells_whether_a_required_verdict_is_good(folder, tmp_path, capsys):
     good = ["identify", str(folder / "step_0.csv"), "-o", str(tmp_path / "out"), "--no-report"]
+    good += ["--order", "3"]
     assert main([*good, "--require", "gain"]) == 0
     assert main([*good, "--overwrite", "--method", "scan", "--require", "gain"]) == 4
     assert "--require gain: the verdict is 'not judged by this method'" in capsys.readouterr().err

@@ -132,7 +132,7 @@ def slow_record(n, *, held, values=SLOW, sigma=0.05, seed=0):
     return cr.Record(DT * np.arange(n), u, y), u
 
 
-@pytest.mark.parametrize("seed", [7, 9, 10])
+@pytest.mark.parametrize("seed", [7, 10])
 def test_a_long_ramp_tells_the_delay_in_all_and_none_of_its_parts(seed):
     # A lag of 20 samples behind 13, a ramp of 2000. A part may be explained by a dead time alone,
     # whose response is too short for the lag that others need.

@@ -50,7 +50,7 @@ def test_gain_and_dead_time_of_a_step_hold_beyond_a_limit(limit, sign, where):
 
 def test_a_limit_in_noise_that_looks_like_a_load_is_told():
     u = np.where(TIME < 6, 0.0, 1.0)
-    fit = fitted(u, clipped(u, 1.8, "before", seed=3, noise=0.03))
+    fit = fitted(u, clipped(u, 1.8, "before", seed=3, noise=0.03), structures=FEW)
     # it was the limit, 1.805, known to 0.5 %
     assert "output_at_limit" in codes(fit)
     assert "load_disturbance" not in codes(fit)
