@@ -55,6 +55,15 @@ def friction_behind_lags(rng: Rng) -> Case:
     return plant.case(record(u, noisy(rng, sampled(y), part)), dead_time=plant.dead_time + loose)
 
 
+def spiky(rng: Rng) -> Case:
+    """Two to eight of 500 samples are spikes of up to five responses; 0.5 % noise."""
+    plant, u = drawn(rng), step()
+    y = noisy(rng, stepped(rng, plant, u), 0.005)
+    at = rng.choice(np.arange(120, y.size), int(rng.integers(2, 9)), replace=False)
+    y[at] += plant.gain * rng.uniform(-5.0, 5.0, at.size)
+    return plant.case(record(u, y))
+
+
 def step_behind_a_filter(rng: Rng) -> Case:
     """A step behind a lag of 3 to 30 samples without noise; 1e-6 to 1e-4 of it in the output."""
     plant = drawn(rng)
@@ -321,6 +330,7 @@ MADE_FOR = {
     "start at the ringing": wandering_output,
     "records weighted by their noise": unequal_sensors,
     "curves are no steps": step_behind_a_filter,
+    "spikes left out": spiky,
     "noise of a rest that is constant": padded_rest,
     "louder noise after the step": louder_from_the_step_on,
     "friction behind lags": friction_behind_lags,

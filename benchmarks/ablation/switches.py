@@ -409,6 +409,11 @@ SWITCHES = (
     ),
     Switch("curves are no steps", {f"{PUBLIC}.arguments:_curved": giving(False)}),
     Switch(
+        "spikes left out",
+        {f"{NUMERICS}.signals.noise:FAR": value(np.inf)},
+        (f"{PUBLIC}.actuated.limits:spikes",),
+    ),
+    Switch(
         "loop without its set point",
         {f"{PUBLIC}.fit:answers_the_output": giving(False)},
     ),

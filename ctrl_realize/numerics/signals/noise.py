@@ -25,9 +25,10 @@ References
 from __future__ import annotations
 
 import numpy as np
+from scipy.ndimage import median_filter
 from scipy.optimize import fminbound
 
-from ..arrays import FloatArray, IntArray
+from ..arrays import BoolArray, FloatArray, IntArray
 from ..constants import PIECE, VERY_STRONG
 from ..hankel.matrix import fft_length
 
@@ -35,6 +36,8 @@ _DITHER = 0.6
 """Noise, rounding included, in quantisation steps, from which means are unbiased: half a step of
 its own. The mean of rounded Gaussian values is off by exp(-2 (pi sigma)^2) / pi steps at most [4]_,
 chapter on dither: 0.002 of a step at sigma = 0.5, 0.05 at 0.3."""
+FAR = 20.0
+"""Standard deviations of a spike. Ablation: spikes left out."""
 LONG_REST = 50  # samples that are enough to tell the noise, to a tenth, and a slope
 _TURNS = 3  # of the line, and of the limits about it
 _MOST_OF_A_LINE = 45.0
@@ -243,6 +246,17 @@ def _lagged_products(values: FloatArray, lags: int) -> FloatArray:
         product *= np.conj(np.fft.rfft(values[start : start + size], n=points))
         total += np.fft.irfft(product, n=points)[:lags]
     return total
+
+
+def spikes(output: FloatArray, fitted: FloatArray) -> BoolArray:
+    """Samples (N,) that are far from a model, and from all but two of the six next to them.
+
+    Huber's loss bears them once a model is found; they lead its search astray.
+    """
+    error = output - fitted
+    alone = output - median_filter(output, size=7, mode="nearest")
+    limit = FAR * max(mad_sigma(error), rounding_error(output))
+    return np.asarray(np.minimum(np.abs(error), np.abs(alone)) > limit)
 
 
 def largest_excess(values: FloatArray) -> tuple[int, int]:

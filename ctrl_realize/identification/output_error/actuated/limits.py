@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -15,8 +16,9 @@ from ...._wording import in_time
 from ....data import Record
 from ....delayed.simulation import simulate_record
 from ....errors import DataError, UnsuitableSystemError
-from ....numerics.arrays import BoolArray, FloatArray
+from ....numerics.arrays import BoolArray, FloatArray, IntArray
 from ....numerics.constants import STRONG
+from ....numerics.signals.noise import FAR, spikes
 from ....numerics.validation.limits import at_limit, clips, ends, passed, plateaus
 from ..arguments import FEWEST_SAMPLES, step_data_of
 from ..loop_flags import feedback_flags
@@ -62,6 +64,7 @@ def fit_within_limits(record: Record, fit: Fit, *, may_clip: bool = True) -> Out
 
     With `may_clip`, also those of a limit before the noise are looked for.
     """
+    fit = partial(_without_spikes, fit=fit)
     kept, flags = without_cut_noise(record)
     try:
         found = fit(kept)
@@ -74,6 +77,21 @@ def fit_within_limits(record: Record, fit: Fit, *, may_clip: bool = True) -> Out
     if flags or not may_clip:
         return replace(found, flags=found.flags + flags)
     return _without_plateaus(record, found, fit)
+
+
+def _without_spikes(record: Record, fit: Fit) -> OutputErrorFit:
+    """Fit a record, and anew without samples that neither the plant nor its noise explains."""
+    found = fit(record)
+    far = spikes(found.measured, found.fitted)
+    kept = far.size - np.count_nonzero(far)
+    if kept == far.size or kept < FEWEST_SAMPLES or found.data.every > 1:
+        return found
+    left, rows = np.zeros(record.n_samples, dtype=bool), _rows(record, found)
+    left[rows[far]] = True
+    found = fit(_without(record, left))
+    first = in_time(record.time[np.argmax(left)])
+    flag = flagged("outliers.left_out", count=np.count_nonzero(far), first=first, limit=FAR)
+    return replace(found, flags=(*found.flags, flag))
 
 
 def _without_plateaus(record: Record, linear: OutputErrorFit, fit: Fit) -> OutputErrorFit:
@@ -98,7 +116,7 @@ def _without_plateaus(record: Record, linear: OutputErrorFit, fit: Fit) -> Outpu
         linear = replace(linear, flags=(*linear.flags, doubt))
     if evidence < STRONG or np.count_nonzero(record.seen & ~held) < FEWEST_SAMPLES:
         return linear
-    rows = np.round((linear.time - record.time[0]) / record.dt).astype(np.int64)
+    rows = _rows(record, linear)
     try:
         found = fit(_without(record, held))
         beyond = _simulated(found)
@@ -116,6 +134,11 @@ def _without_plateaus(record: Record, linear: OutputErrorFit, fit: Fit) -> Outpu
     count, levels = np.count_nonzero(held), _levels(output, held)
     flag = flagged("output_at_limit.plateau", count=count, limits=levels)
     return replace(found, flags=(*found.flags, flag))
+
+
+def _rows(record: Record, fit: OutputErrorFit) -> IntArray:
+    """Samples of a record that were fitted."""
+    return np.asarray(np.rint((fit.time - record.time[0]) / record.dt), dtype=np.int64)
 
 
 def _simulated(found: OutputErrorFit) -> FloatArray:

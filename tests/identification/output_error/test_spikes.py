@@ -1,0 +1,69 @@
+"""Spikes of a sensor: left out where neither the plant nor its noise explains them (simulated)."""
+
+import control as ct
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+import ctrl_realize as cr
+from ctrl_realize.numerics.signals.noise import spikes
+from tests.rigs import codes
+
+DELAY, GAIN, NOISE = 12.4, 2.0, 0.01
+PLANT = cr.delayed_ss(ct.tf([GAIN], [30, 1]), dead_time=DELAY, dt=1.0)
+TIME = np.arange(400.0)
+STEP = 1.0 * (TIME >= 100)
+BINARY = np.repeat(np.random.default_rng(3).choice([-1.0, 1.0], 40), 10)
+
+
+def fitted(u, y):
+    return cr.identify(cr.Record(TIME, u, y)).fit
+
+
+@pytest.mark.parametrize(
+    ("u", "where", "size"),
+    [
+        (STEP, [129, 383], -5 * GAIN),
+        (STEP, [250, 251, 252], 0.5 * GAIN),
+        (STEP, [30, 31, 70], 2 * GAIN),
+        (BINARY, [50, 200, 333], 4 * GAIN),
+    ],
+    ids=["apart", "three in a row", "at rest", "any input"],
+)
+def test_spikes_change_a_fit_as_missing_samples_do(u, where, size):
+    y = np.ravel(PLANT.simulate(u)) + NOISE * np.random.default_rng(3).standard_normal(u.size)
+    gaps, y = y.copy(), y.copy()
+    gaps[where] = np.nan
+    y[where] += size
+    fit = fitted(u, y)
+    told = cr.identify(cr.Record(TIME, u, gaps, missing="keep")).fit
+    assert fit.structure == told.structure == (1, 1)
+    assert_allclose([fit.dead_time, fit.gain], [told.dead_time, told.gain], rtol=1e-12)
+    assert fit.interval == told.interval
+    assert fit.interval[0] <= DELAY <= fit.interval[1]
+    assert codes(fit) - codes(told) == {"outliers"}
+    (said,) = [flag.message for flag in fit.flags if flag.code == "outliers"]
+    assert said.startswith(f"{len(where)} sample(s), the first at {where[0]} s, were left out")
+
+
+def test_samples_are_spikes_where_they_are_far_from_the_model_and_from_their_neighbours():
+    rng = np.random.default_rng(0)
+    fitted = np.where(np.arange(300) < 150, 0.0, 1.0)
+    output = fitted + 0.01 * rng.standard_normal(300)
+    assert not spikes(output, fitted).any()  # a jump that the model has
+    assert not spikes(output, np.roll(fitted, 2)).any()  # one that it has too late
+    output[[20, 200, 201]] += 0.5
+    assert np.flatnonzero(spikes(output, fitted)).tolist() == [20, 200, 201]
+    assert not spikes(output, output).any()  # samples that the model has
+    output[40:44] += 0.5  # four in a row may be what the plant did
+    assert not spikes(output, fitted)[40:44].any()
+
+
+def test_a_kick_of_the_plant_is_no_spike():
+    s = ct.tf("s")
+    plant = (2 + 40 * s / (0.3 * s + 1)) / (20 * s + 1)  # rises to three times its gain at once
+    y = np.ravel(cr.delayed_ss(plant, dead_time=5.0, dt=1.0).simulate(STEP))
+    fit = fitted(STEP, y + 0.001 * np.random.default_rng(1).standard_normal(y.size))
+    assert "outliers" not in codes(fit)
+    assert fit.interval[0] <= 5.0 <= fit.interval[1]
+    assert abs(fit.gain - 2.0) < 0.01
