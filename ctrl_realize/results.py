@@ -404,7 +404,8 @@ class FractionalDelayFit(ModelFit):
     Examples
     --------
     >>> import ctrl_realize as cr
-    >>> fit = cr.identify(cr.bench.valve().step_record(16, rng=5), order=3).fit
+    >>> record = cr.bench.valve().step_record(16, rng=5)
+    >>> fit = cr.identify(record, structures=[(3, 3)]).fit
     >>> isinstance(fit, cr.results.FractionalDelayFit), fit.delay == fit.dead_time / fit.dt
     (True, True)
     """

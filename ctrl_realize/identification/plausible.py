@@ -50,7 +50,8 @@ class PlausibleModels(Result):
     Examples
     --------
     >>> import ctrl_realize as cr
-    >>> models = cr.identify(cr.bench.valve().step_record(16, rng=5)).fit.plausible_models
+    >>> record = cr.bench.valve().step_record(16, rng=5)
+    >>> models = cr.identify(record, structures=[(3, 3)]).fit.plausible_models
     >>> len(models), models.systems[0].dt == models.dt
     (39, True)
     >>> models.frequency_response([1.0, 10.0]).shape

@@ -61,7 +61,7 @@ def fit_plot(
     --------
     >>> import ctrl_realize as cr
     >>> record = cr.bench.valve().step_record(16, rng=5)
-    >>> sys = cr.fit_output_error(record, structures=[(1, 1)])
+    >>> sys = cr.fit_output_error(record, structures=[(3, 3)])
     >>> cplt = cr.plots.fit_plot(sys)
     >>> cplt.figure.axes[-1].get_xlabel()
     'dead time [ms]'
@@ -105,7 +105,7 @@ def dead_time_plot(
     --------
     >>> import ctrl_realize as cr
     >>> record = cr.bench.valve().step_record(16, rng=5)
-    >>> sys = cr.fit_output_error(record, structures=[(1, 1)])
+    >>> sys = cr.fit_output_error(record, structures=[(3, 3)])
     >>> cplt = cr.plots.dead_time_plot(sys)
     >>> cplt.figure.axes[0].get_xlabel()
     'dead time [ms]'
@@ -148,10 +148,10 @@ def each_record_plot(
     >>> import ctrl_realize as cr
     >>> valve = cr.bench.valve()
     >>> records = [valve.step_record(16, rng=seed) for seed in (5, 6)]
-    >>> sys = cr.fit_output_error(records, structures=[(2, 2)])
+    >>> sys = cr.fit_output_error(records, structures=[(3, 3)])
     >>> cplt = cr.plots.each_record_plot(sys)
     >>> [axes.get_title(loc="left") for axes in cplt.figure.axes]
-    ['valve_16mA (0), 99.6 %', 'valve_16mA (1), 99.6 %']
+    ['valve_16mA (0), 99.7 %', 'valve_16mA (1), 99.7 %']
     """
     held = () if system.fit is None else system.fit.records
     given = [

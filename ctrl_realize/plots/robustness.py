@@ -75,7 +75,8 @@ def plausible_plot(
     Examples
     --------
     >>> import ctrl_realize as cr
-    >>> models = cr.identify(cr.bench.valve().step_record(16, rng=5)).fit.plausible_models
+    >>> record = cr.bench.valve().step_record(16, rng=5)
+    >>> models = cr.identify(record, structures=[(3, 3)]).fit.plausible_models
     >>> cplt = cr.plots.plausible_plot(models)
     >>> [axes.get_ylabel() for axes in cplt.figure.axes]
     ['step response', 'gain [dB]', 'phase [deg]']

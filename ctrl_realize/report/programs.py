@@ -66,7 +66,7 @@ def summary(
     --------
     >>> import ctrl_realize as cr
     >>> record = cr.bench.valve().step_record(16, rng=5)
-    >>> content = cr.report.summary(cr.identify(record), record)
+    >>> content = cr.report.summary(cr.identify(record, structures=[(3, 3)]), record)
     >>> content["use"]["tuning"]["allowed"], content["model"]["dead_time"]["unit"]
     ('yes', 's')
     """

@@ -81,17 +81,16 @@ class DelayComparison(Result):
 
     Examples
     --------
-    >>> import control as ct
     >>> import numpy as np
     >>> import ctrl_realize as cr
-    >>> plant = cr.delayed_ss(ct.tf([2.0], [0.3, 1]), dead_time=0.125, dt=0.01)
-    >>> rng = np.random.default_rng(0)
-    >>> u = np.repeat(rng.choice([-1.0, 1.0], 60), 15)
-    >>> y = plant.simulate(u) + 0.05 * rng.standard_normal(u.size)
-    >>> record = cr.Record(0.01 * np.arange(u.size), u, y)
-    >>> check = cr.validation.compare_delay_estimates(record, order=1)
-    >>> print(f"{check.common[0]:.2f} to {check.common[1]:.2f} s, take that of the {check.rely_on}")
-    0.11 to 0.13 s, take that of the output error
+    >>> f = np.geomspace(0.02, 5, 60)
+    >>> s = 2j * np.pi * f
+    >>> noise = 0.01 * np.random.default_rng(0).standard_normal(f.size)
+    >>> frf = cr.MeasuredFRF(2 * np.exp(-0.125 * s) / (0.3 * s + 1) + noise, f)
+    >>> check = cr.validation.compare_delay_estimates(frf=frf, order=1)
+    >>> low, high = (1e3 * end for end in check.common)
+    >>> print(f"{low:.0f} to {high:.0f} ms, take that of the {check.rely_on}")
+    118 to 125 ms, take that of the FRF fit
     """
 
     estimates: tuple[DelayEstimate, ...]
