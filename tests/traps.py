@@ -183,7 +183,7 @@ TRAPS = [
     Trap("a gap in the response", csv(np.r_[T[:60], T[75:]], np.r_[U[:60], U[75:]],
          np.r_[Y[:60], Y[75:]]), told="irregular", yes=("gain",)),
     Trap("codes for missing values", csv(T, U, np.where(T % 50 == 49, -9999.0, Y)),
-         flags=("outliers", "structured_misfit"), not_yes=("dead_time",)),
+         flags=("outliers",), yes=("gain",)),
     # the record does not tell
     Trap("ends while rising", csv(T[:50], U[:50], Y[:50]),
          flags=("gain_not_resolved", "not_settled"), not_yes=("gain",)),
@@ -205,7 +205,7 @@ TRAPS = [
     Trap("an oscillation of its own", csv(T, U, Y + 3 * np.sin(2 * np.pi * T / 40)),
          not_yes=("tuning",)),
     Trap("outliers", csv(T, U, np.where(T % 40 == 39, Y + 30, Y)),
-         flags=("outliers", "structured_misfit"), not_yes=("dead_time",)),
+         flags=("outliers",), yes=("gain",)),
     Trap("a sensor that stuck", csv(T, U, np.where((T > 45) & (T < 90), Y[45], Y)),
          flags=("stuck_output",), not_yes=("gain",)),
     Trap("a response that a limit ends", csv(T, U, np.minimum(Y, 36)),

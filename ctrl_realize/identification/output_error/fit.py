@@ -28,7 +28,7 @@ from ...results import Flag
 from ..process_structures import Structures, requested
 from .actuated.alternatives import ASKED, Asked
 from .actuated.fit import with_actuator
-from .actuated.limits import fit_within_limits, without_cut_noise
+from .actuated.limits import fit_within_limits, fit_without_spikes, without_cut_noise
 from .any_input import fit_any_input
 from .arguments import checked_records, edges_of, known_factor, on_common_axis, step_data_of
 from .averaging import (
@@ -313,6 +313,8 @@ def _linear(
     any_input = partial(fit_any_input, refuses=refuses)
     if len(several) == 1:
         fit_one = partial(_fit_one, requested=requested, any_input=any_input)
+        if requested.huber:
+            fit_one = partial(fit_without_spikes, fit=fit_one)
         return fit_within_limits(several[0], fit_one, may_clip=may_clip)
     several, at_limits = _without_cut_noise(several)
     # Complete records of one step each can be averaged. Of more steps the mean would end at the

@@ -78,11 +78,7 @@ def fit_batch(
 
 
 def _damped_step(
-    x: FloatArray,
-    residual: FloatArray,
-    jacobian: FloatArray,
-    damping: FloatArray,
-    bounds: Bounds,
+    x: FloatArray, residual: FloatArray, jacobian: FloatArray, damping: FloatArray, bounds: Bounds
 ) -> tuple[FloatArray, BoolArray]:
     """Levenberg-Marquardt steps in the free directions, and which of them were not limited."""
     # The dead time is relative to its range, so that the steps do not depend on the unit of time.

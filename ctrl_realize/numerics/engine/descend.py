@@ -175,10 +175,7 @@ def _step_to(
 
 
 def _step(
-    residual: FloatArray,
-    jacobian: FloatArray,
-    free: BoolArray,
-    damping: FloatArray,
+    residual: FloatArray, jacobian: FloatArray, free: BoolArray, damping: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     """Damped step in the free directions, and the decrease of the linear model."""
     columns = jacobian * free[:, None]

@@ -122,10 +122,7 @@ def partial_fractions(
 
 
 def moved_amplitudes(
-    poles: ComplexArray,
-    amplitudes: ComplexArray,
-    dresidues: ComplexArray,
-    numerator: FloatArray,
+    poles: ComplexArray, amplitudes: ComplexArray, dresidues: ComplexArray, numerator: FloatArray
 ) -> ComplexArray:
     """Derivatives of amplitudes (rows j) w.r.t. poles (columns k), shape (B, J, J)."""
     unit = np.eye(poles.shape[1])

@@ -189,11 +189,7 @@ def minimum(
 
 
 def _newton_step(
-    slope: FloatArray,
-    hessian: FloatArray,
-    free: BoolArray,
-    low: FloatArray,
-    high: FloatArray,
+    slope: FloatArray, hessian: FloatArray, free: BoolArray, low: FloatArray, high: FloatArray
 ) -> FloatArray:
     """Step (1 + n,) of the free parameters to the minimum of a parabola within bounds."""
     free, step = free.copy(), np.zeros(slope.size)
@@ -213,10 +209,7 @@ def _newton_step(
 
 
 def _curvature(
-    slopes: Slopes,
-    x: FloatArray,
-    unit: FloatArray,
-    bounds: tuple[FloatArray, FloatArray],
+    slopes: Slopes, x: FloatArray, unit: FloatArray, bounds: tuple[FloatArray, FloatArray]
 ) -> tuple[float, FloatArray, FloatArray]:
     """Cost, gradient and Hessian in scaled parameters."""
     # Near a sample, where the gradient jumps, one-sided differences are used.

@@ -250,7 +250,8 @@ class OutputErrorEstimate:
     each with its evidence over the model's. `others` is None if no structures were requested;
     `close` are decisions that rounding errors may reverse. `unweighted` is the model of
     plain least squares, if the residual was whitened. `load` is a step of a load; it is part
-    of the model unless it is early. `drawn` has the structures of which plausible models are drawn.
+    of the model unless it is early. `rounding` is the standard error of the gain from that of the
+    levels before and after a step. `drawn` has the structures of which plausible models are drawn.
     `points` are the profiles of structures that are not ruled out. If the dead time is
     `averaged`, it is the mean over them, and the interval holds 95 % of their weight: `with_moves`
     tells both for an input that moves so many times further.
@@ -282,6 +283,7 @@ class OutputErrorEstimate:
     load: LoadStep | None = None
     drawn: PlausibleDraw | None = None
     points: Mapping[Structure, Points] = field(default_factory=dict)
+    rounding: float = 0.0
     with_moves: Callable[[float], tuple[float, float, float]] | None = None
 
     @property
@@ -314,8 +316,9 @@ class OutputErrorEstimate:
             return -np.inf, np.inf
         if not self.static.resolved:
             return self.static.ends
+        every = ((self.static, 1.0), *self.alike)
         return averaged_ends(
-            [(one.gain, one.gain_std, weight) for one, weight in ((self.static, 1.0), *self.alike)]
+            [(one.gain, np.hypot(one.gain_std, self.rounding), weight) for one, weight in every]
         )
 
     @property

@@ -71,6 +71,7 @@ from ..engine.structures import ALL_STRUCTURES, SIMPLE_STRUCTURES, Candidate, Sc
 from ..engine.window_fit import WindowFit, among, fit_window, with_noise_of_residual
 from ..families.equal_lags import LagChain
 from ..families.flow import DispersedFlow
+from ..signals.noise import rounding_of_level
 from ..signals.noise_model import continues
 from .before_the_step import fitted_from_rest
 from .coloured import in_coloured_noise
@@ -135,6 +136,10 @@ def fit_step_record(
         found = _free_choice(data, fits, fit, requested.whiten)
     else:
         found = _given_structures(data, fits, free, requested)
+    if data.coarse:  # both levels of a step are rounded, however many samples they have
+        noise = found.residual.rounded or np.sqrt(max(data.sigma**2 - data.quantum**2 / 12, 0.0))
+        level = rounding_of_level(float(noise), data.quantum)
+        found = replace(found, rounding=np.sqrt(2) * level / float(np.ptp(data.input)))
     return data, found if loaded is None else replace(found, load=loaded[0])
 
 

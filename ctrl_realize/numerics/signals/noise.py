@@ -36,8 +36,10 @@ _DITHER = 0.6
 """Noise, rounding included, in quantisation steps, from which means are unbiased: half a step of
 its own. The mean of rounded Gaussian values is off by exp(-2 (pi sigma)^2) / pi steps at most [4]_,
 chapter on dither: 0.002 of a step at sigma = 0.5, 0.05 at 0.3."""
-FAR = 20.0
-"""Standard deviations of a spike. Ablation: spikes left out."""
+FAR, _LEAST = 50.0, 0.1
+"""Standard deviations of a spike, and part of the range of the other samples. Four among 400 of 100
+deviations and half of a response move its dead time by 0.1 samples, smaller ones do not. Ablation:
+spikes left out."""
 LONG_REST = 50  # samples that are enough to tell the noise, to a tenth, and a slope
 _TURNS = 3  # of the line, and of the limits about it
 _MOST_OF_A_LINE = 45.0
@@ -248,14 +250,33 @@ def _lagged_products(values: FloatArray, lags: int) -> FloatArray:
     return total
 
 
+def rounding_of_level(noise: float, quantum: float) -> float:
+    """Standard deviation of the mean of many rounded samples about their level, equally likely.
+
+    The Fourier series of the mean error, each term damped by the noise [4]_: half a step takes it
+    away.
+
+    Examples
+    --------
+    >>> from ctrl_realize.numerics.signals.noise import rounding_of_level
+    >>> round(rounding_of_level(0.0, 1.0), 3), round(rounding_of_level(0.5, 1.0), 3)
+    (0.288, 0.002)
+    """
+    k = np.arange(1, 100)
+    parts = np.exp(-((2 * np.pi * k * noise / quantum) ** 2)) / (2 * np.pi**2 * k**2)
+    return quantum * float(np.sqrt(parts.sum()))
+
+
 def spikes(output: FloatArray, fitted: FloatArray) -> BoolArray:
     """Samples (N,) that are far from a model, and from all but two of the six next to them.
 
     Huber's loss bears them once a model is found; they lead its search astray.
     """
     error = output - fitted
-    alone = output - median_filter(output, size=7, mode="nearest")
-    limit = FAR * max(mad_sigma(error), rounding_error(output))
+    middle = median_filter(output, size=7, mode="mirror")
+    alone = output - middle
+    noise = max(mad_sigma(error), 0.5 * quantisation_step(output))
+    limit = max(FAR * noise, _LEAST * float(np.ptp(middle)), rounding_error(output))
     return np.asarray(np.minimum(np.abs(error), np.abs(alone)) > limit)
 
 

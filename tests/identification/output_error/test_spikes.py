@@ -43,7 +43,7 @@ def test_spikes_change_a_fit_as_missing_samples_do(u, where, size):
     assert fit.interval[0] <= DELAY <= fit.interval[1]
     assert codes(fit) - codes(told) == {"outliers"}
     (said,) = [flag.message for flag in fit.flags if flag.code == "outliers"]
-    assert said.startswith(f"{len(where)} sample(s), the first at {where[0]} s, were left out")
+    assert said.startswith(f"{len(where)} sample(s), the first at {where[0]} s were left out")
 
 
 def test_samples_are_spikes_where_they_are_far_from_the_model_and_from_their_neighbours():
@@ -52,11 +52,15 @@ def test_samples_are_spikes_where_they_are_far_from_the_model_and_from_their_nei
     output = fitted + 0.01 * rng.standard_normal(300)
     assert not spikes(output, fitted).any()  # a jump that the model has
     assert not spikes(output, np.roll(fitted, 2)).any()  # one that it has too late
-    output[[20, 200, 201]] += 0.5
+    output[[20, 200, 201]] += 0.8
     assert np.flatnonzero(spikes(output, fitted)).tolist() == [20, 200, 201]
     assert not spikes(output, output).any()  # samples that the model has
     output[40:44] += 0.5  # four in a row may be what the plant did
     assert not spikes(output, fitted)[40:44].any()
+    coarse = np.round(-20.0 * np.expm1(-np.maximum(np.arange(300) - 150, 0) / 20))
+    steps = coarse.copy()
+    steps[[30, 90]] += 1.0  # steps of a converter, from a level that stands else
+    assert not spikes(steps, coarse).any()
 
 
 def test_a_kick_of_the_plant_is_no_spike():

@@ -5,6 +5,7 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy.linalg import toeplitz
 from scipy.signal import lfilter
+from scipy.special import ndtr
 
 from ctrl_realize.numerics.signals.baseline import relaxation
 from ctrl_realize.numerics.signals.bins import response_bins
@@ -14,6 +15,7 @@ from ctrl_realize.numerics.signals.noise import (
     hum_frequencies,
     quantisation_step,
     rest_noise,
+    rounding_of_level,
     winsorised_sigma,
 )
 from ctrl_realize.numerics.signals.noise_model import (
@@ -24,6 +26,16 @@ from ctrl_realize.numerics.signals.noise_model import (
 )
 from ctrl_realize.numerics.validation.held_output import held_share, longest_hold
 from ctrl_realize.numerics.validation.limits import at_limit
+
+
+@pytest.mark.parametrize("noise", [0.02, 0.1, 0.3])
+def test_the_mean_of_rounded_samples_is_off_as_their_probabilities_say(noise):
+    levels = (np.arange(400) + 0.5) / 400  # all equally likely, in steps of the converter
+    codes = np.arange(-8, 10)
+    ends = (codes[:, None] - 0.5 - levels) / noise, (codes[:, None] + 0.5 - levels) / noise
+    mean = codes @ (ndtr(ends[1]) - ndtr(ends[0]))
+    off = 2.5 * np.sqrt(np.mean((mean - levels) ** 2))
+    assert_allclose(rounding_of_level(2.5 * noise, 2.5), off, rtol=2e-3)
 
 
 def white(n, seed=0):

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from functools import partial
 
 import numpy as np
 
@@ -64,7 +63,6 @@ def fit_within_limits(record: Record, fit: Fit, *, may_clip: bool = True) -> Out
 
     With `may_clip`, also those of a limit before the noise are looked for.
     """
-    fit = partial(_without_spikes, fit=fit)
     kept, flags = without_cut_noise(record)
     try:
         found = fit(kept)
@@ -79,7 +77,7 @@ def fit_within_limits(record: Record, fit: Fit, *, may_clip: bool = True) -> Out
     return _without_plateaus(record, found, fit)
 
 
-def _without_spikes(record: Record, fit: Fit) -> OutputErrorFit:
+def fit_without_spikes(record: Record, fit: Fit) -> OutputErrorFit:
     """Fit a record, and anew without samples that neither the plant nor its noise explains."""
     found = fit(record)
     far = spikes(found.measured, found.fitted)
@@ -89,8 +87,9 @@ def _without_spikes(record: Record, fit: Fit) -> OutputErrorFit:
     left, rows = np.zeros(record.n_samples, dtype=bool), _rows(record, found)
     left[rows[far]] = True
     found = fit(_without(record, left))
-    first = in_time(record.time[np.argmax(left)])
-    flag = flagged("outliers.left_out", count=np.count_nonzero(far), first=first, limit=FAR)
+    wild, first = np.ravel(record.output)[left], in_time(record.time[np.argmax(left)])
+    which = f"the first at {first}" if np.ptp(wild) else f"the first at {first}, {wild[0]:g} each,"
+    flag = flagged("outliers.left_out", count=wild.size, which=which, limit=FAR)
     return replace(found, flags=(*found.flags, flag))
 
 
