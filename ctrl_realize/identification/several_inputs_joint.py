@@ -135,7 +135,10 @@ def fitted_together(
 
 def own_columns(fit: OutputErrorFit, clock: FloatArray, at_rest: bool) -> FloatArray:
     """Columns (N, q) of level, drift and what else is estimated beside a model."""
-    return own_regressors(fit.data, fit.poles) if at_rest else _in_operation(clock, fit.poles)
+    # A fit may have left out the first samples, or spikes.
+    if at_rest and fit.data.rows.size == clock.size:
+        return own_regressors(fit.data, fit.poles)
+    return _in_operation(clock, fit.poles)
 
 
 def _in_operation(clock: FloatArray, poles: ComplexArray) -> FloatArray:

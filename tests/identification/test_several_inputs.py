@@ -125,3 +125,18 @@ def test_structures_that_describe_every_plant_converge_and_others_say_that_they_
     assert wrong.flags[0].code == "not_converged"
     with pytest.raises(cr.errors.DataError, match=r"not converged: give structures= that describe"):
         cr.identify(data, structures="IPDT")
+
+
+def test_fits_that_leave_out_the_first_samples_have_intervals_of_both_together():
+    """Their inputs may have moved just before the record."""
+    rng = np.random.default_rng(1)
+    u = np.repeat(rng.choice([-1.0, 1.0], (2, 20)), 20, axis=1)
+    plants = [(2.0, 20.0, 5.0), (-1.0, 30.0, 9.0)]
+    y = 0.05 * rng.standard_normal(400)
+    for (gain, lag, dead_time), each in zip(plants, u, strict=True):
+        y = y + cr.delayed_ss(ct.tf([gain], [lag, 1]), dead_time=dead_time, dt=1.0).simulate(each)
+    fits = cr.identify(cr.Record(np.arange(400.0), u, y), structures="FOPDT").fit.fits
+    assert all(fit.data.rows.size < 400 for fit in fits)
+    for fit, (gain, _, dead_time) in zip(fits, plants, strict=True):
+        assert fit.interval[0] <= dead_time <= fit.interval[1]
+        assert abs(fit.gain - gain) < 0.05

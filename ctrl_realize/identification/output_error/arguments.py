@@ -30,9 +30,8 @@ _HOLDS = 0.2  # part of the step by which an input may stray between its edges
 _MOVES, _MEAN, _UNLIKELY = 0.05, 10, 5.0
 """Part of the step by which the mean of ten samples may, or standard deviations of such means."""
 _STRAY = 0.01  # part of the first step by which a clean input may stray before it
-_ONE_WAY = (
-    0.9  # of the moves of a curve: noise turns at two of three. Ablation: curves are no steps
-)
+_ONE_WAY = 0.9
+"""Of the moves of a curve; noise turns at two of three. Ablation: curves are no steps."""
 _SPIKE = 3  # samples of a spike of the input that do not move a plant
 _DWELL = 3  # times the visible onset: the onsets of faster steps overlap
 

@@ -1,6 +1,6 @@
-"""Outputs that clip: samples at a limit are left out of the fit, and it is told.
+"""Samples at a limit and spikes of a sensor: they are left out of the fit, and it is told.
 
-They are bounds of what the plant does, not measurements of it.
+The first are bounds of what the plant does, not measurements of it; the others neither.
 """
 
 from __future__ import annotations
@@ -88,8 +88,8 @@ def fit_without_spikes(record: Record, fit: Fit) -> OutputErrorFit:
     left[rows[far]] = True
     found = fit(_without(record, left))
     wild, first = np.ravel(record.output)[left], in_time(record.time[np.argmax(left)])
-    which = f"the first at {first}" if np.ptp(wild) else f"the first at {first}, {wild[0]:g} each,"
-    flag = flagged("outliers.left_out", count=wild.size, which=which, limit=FAR)
+    alike = f", {wild[0]:g} each," if wild.size > 1 and np.ptp(wild) == 0 else ""
+    flag = flagged("outliers.left_out", count=wild.size, first=first + alike, limit=FAR)
     return replace(found, flags=(*found.flags, flag))
 
 
