@@ -46,6 +46,16 @@ def test_spikes_change_a_fit_as_missing_samples_do(u, where, size):
     assert said.startswith(f"{len(where)} sample(s), the first at {where[0]} s were left out")
 
 
+def test_a_code_for_missing_values_does_not_hide_a_spike():
+    y = np.ravel(PLANT.simulate(STEP)) + NOISE * np.random.default_rng(3).standard_normal(400)
+    y[[150, 300]], y[250] = -9999.0, 8.0
+    fit = fitted(STEP, y)
+    assert fit.structure == (1, 1)
+    assert fit.interval[0] <= DELAY <= fit.interval[1]
+    (said,) = [flag.message for flag in fit.flags if flag.code == "outliers"]
+    assert said.startswith("3 sample(s), the first at 150 s were left out")
+
+
 def test_samples_are_spikes_where_they_are_far_from_the_model_and_from_their_neighbours():
     rng = np.random.default_rng(0)
     fitted = np.where(np.arange(300) < 150, 0.0, 1.0)

@@ -24,6 +24,7 @@ from ..loop_flags import feedback_flags
 from ..result import OutputErrorFit
 from ..summary import fitted_model
 
+_TURNS = 3  # at most: time
 _MORE = 0.05  # of the samples on plateaus that a model finds besides: it is fitted anew
 
 Fit = Callable[[Record], OutputErrorFit]
@@ -79,14 +80,15 @@ def fit_within_limits(record: Record, fit: Fit, *, may_clip: bool = True) -> Out
 
 def fit_without_spikes(record: Record, fit: Fit) -> OutputErrorFit:
     """Fit a record, and anew without samples that neither the plant nor its noise explains."""
-    found = fit(record)
-    far = spikes(found.measured, found.fitted)
-    kept = far.size - np.count_nonzero(far)
-    if kept == far.size or kept < FEWEST_SAMPLES or found.data.every > 1:
+    found, left = fit(record), np.zeros(record.n_samples, dtype=bool)
+    for _ in range(_TURNS):  # large ones hide smaller ones
+        far = spikes(found.measured, found.fitted)
+        if not far.any() or np.sum(~far) < FEWEST_SAMPLES or found.data.every > 1:
+            break
+        left[_rows(record, found)[far]] = True
+        found = fit(_without(record, left))
+    if not left.any():
         return found
-    left, rows = np.zeros(record.n_samples, dtype=bool), _rows(record, found)
-    left[rows[far]] = True
-    found = fit(_without(record, left))
     wild, first = np.ravel(record.output)[left], in_time(record.time[np.argmax(left)])
     alike = f", {wild[0]:g} each," if wild.size > 1 and np.ptp(wild) == 0 else ""
     flag = flagged("outliers.left_out", count=wild.size, first=first + alike, limit=FAR)
