@@ -190,8 +190,8 @@ WILD_AT_REST = np.r_[-4.94e-324, 0, 0, -653.0, np.zeros(11), -3.2 * np.arange(1,
 WILD_AND_LATE = np.r_[np.zeros(6), -8.58913364, np.zeros(22), -3.2]
 
 
-def odd_step(edge, height, dt, y, **options):
-    return cr.identify(record(np.where(np.arange(y.size) < edge, 0.0, height), y, dt), **options).A
+def odd_step(edge, height, dt, y):
+    return cr.identify(record(np.where(np.arange(y.size) < edge, 0.0, height), y, dt)).A
 
 
 FINITE = {
@@ -227,9 +227,7 @@ FINITE = {
         *((1e-155 if k % 7 == 5 else 0.0, np.sin(k)) for k in range(60))
     ).model.delay_free.C,
     # the line back to the rest level was drawn through a sample behind the end
-    "a motion at the last sample": lambda: odd_step(
-        44, 1.0, 1.0, np.r_[np.zeros(59), 1.0], order=1
-    ),
+    "a motion at the last sample": lambda: odd_step(44, 1.0, 1.0, np.r_[np.zeros(59), 1.0]),
     # the noise of the settled half was asked of a half without a sample
     "an edge near the end": lambda: odd_step(20, 1.0, 1.0, NOISE),
     # a chain of lags whose gain has no influence on the fit: 0/0 in the error of its delay
