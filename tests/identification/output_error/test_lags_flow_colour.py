@@ -191,15 +191,15 @@ def test_the_gain_in_slow_noise_has_its_standard_error_though_the_model_takes_pa
     pseudo = np.linalg.pinv(slopes)
     exact = np.sqrt((pseudo @ toeplitz(scale**2 * pole**k) @ pseudo.T)[2, 2])
     stated = []
-    for seed in range(8):
+    for seed in range(16):
         white = scale * np.sqrt(1 - pole**2) * np.random.default_rng(seed).standard_normal(n + 200)
         noise = lfilter([1], [1, -pole], white)[200:]
         record = cr.Record(1.0 * k, 1.0 * (k >= edge), model(*true) + noise)
         fit = cr.fit_output_error(record, structures=[(1, 1)]).fit
         stated.append(fit.gain_std_given_structure / exact)
-    # One scatters by 45 %, their median by 20 %, of which 1.4 is twice. Without what the model
-    # takes it is 0.69.
-    assert 0.8 < np.median(stated) < 1.4
+    # One scatters by 45 %, their median by 14 %. That of the first eight is 0.69 without what the
+    # model takes.
+    assert 0.8 < np.median(stated) < 1.25
 
 
 def test_records_fitted_together_know_the_noise_of_their_mean():
