@@ -119,7 +119,7 @@ def fit_lags(data: SampledData, requested: Requested) -> tuple[SampledWindow, Ou
     profiles = _profiles(fits, [*fitted, *equal])
     dead_times, shares = _weighted(fits, profiles)
     weights = shares.sum(axis=0)
-    mean, first, last = _known(fits, profiles)
+    mean, first, last = _known(dead_times, weights)
     if not requested.forms and shares[len(LAGS) - 1 :].sum() > 0.5:
         # Three lags may stand for more: one more than chosen is never ruled out.
         further = fit_form(problem, FURTHER, scales, fitted)
@@ -150,7 +150,7 @@ def fit_lags(data: SampledData, requested: Requested) -> tuple[SampledWindow, Ou
     others = OtherStructures(better)
     found = replace(
         found, process=process, points=points, others=others,
-        with_moves=partial(_known, fits, profiles),
+        with_moves=partial(_with_moves, fits, profiles),
     )  # fmt: skip
     return part, replace(found, drawn=PlausibleDraw(plainly, evidence, plain.__getitem__))
 
@@ -293,12 +293,16 @@ def _weighted(
     return fine, share * density
 
 
-def _known(
-    fits: WindowFit, profiles: Sequence[Points], larger: float = 1.0
+def _with_moves(
+    fits: WindowFit, profiles: Sequence[Points], larger: float
 ) -> tuple[float, float, float]:
     """Mean dead time and the ends of its interval, had the input moved so many times further."""
     dead_times, shares = _weighted(fits, profiles, larger)
-    weights = shares.sum(axis=0)
+    return _known(dead_times, shares.sum(axis=0))
+
+
+def _known(dead_times: FloatArray, weights: FloatArray) -> tuple[float, float, float]:
+    """Mean dead time and the ends of its interval."""
     ends = np.interp([_TAIL, 1.0 - _TAIL], np.cumsum(weights), dead_times).tolist()
     return float(weights @ dead_times), ends[0], ends[1]
 
