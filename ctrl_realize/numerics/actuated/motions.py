@@ -20,13 +20,7 @@ from ..arrays import FloatArray
 from .records import ActuatedRecord
 
 Kind: TypeAlias = Literal[
-    "slew_rate",
-    "slew_rates",
-    "dead_band",
-    "resolution",
-    "stiction",
-    "saturation",
-    "characteristic",
+    "slew_rate", "slew_rates", "dead_band", "resolution", "stiction", "saturation", "characteristic"
 ]
 Place: TypeAlias = Literal["input", "stem"]
 

@@ -71,11 +71,7 @@ def process_parameters(
 
 
 def fitted_parameters(
-    problem: Problem,
-    candidate: Candidate,
-    numerator: FloatArray,
-    variance: float,
-    length: float,
+    problem: Problem, candidate: Candidate, numerator: FloatArray, variance: float, length: float
 ) -> tuple[ProcessParameter, ...]:
     """Parameters of a fitted model with their standard errors, the structure being given.
 

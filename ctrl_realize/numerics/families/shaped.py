@@ -154,11 +154,7 @@ def paired(log_rates: FloatArray, slopes: FloatArray) -> tuple[FloatArray, Float
 
 
 def lowest(
-    problem: Problem,
-    family: Family,
-    starts: FloatArray,
-    dt: float,
-    enough: float = np.inf,
+    problem: Problem, family: Family, starts: FloatArray, dt: float, enough: float = np.inf
 ) -> Candidate:
     """Model of a family with the smallest sum of squares that is reached from starts (B, k).
 

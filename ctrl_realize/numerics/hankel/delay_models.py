@@ -184,11 +184,7 @@ def _single_channel(
 
 
 def iae_of_models(
-    markov: FloatArray,
-    delays: IntArray,
-    models: DelayModels,
-    order: int,
-    feedthrough: FloatArray,
+    markov: FloatArray, delays: IntArray, models: DelayModels, order: int, feedthrough: FloatArray
 ) -> FloatArray:
     """Integrated absolute error of all models of one order, over all channels.
 

@@ -86,12 +86,7 @@ def siso_zeros(form: DelayForm, degree: int) -> tuple[ComplexArray, bool]:
 
 
 def newton_polished(
-    form: DelayForm,
-    starts: ComplexArray,
-    *,
-    discrete: bool,
-    steps: int = 12,
-    zeros: bool = False,
+    form: DelayForm, starts: ComplexArray, *, discrete: bool, steps: int = 12, zeros: bool = False
 ) -> tuple[ComplexArray, FloatArray]:
     """Improve poles, or zeros, by Newton's method, each by itself.
 

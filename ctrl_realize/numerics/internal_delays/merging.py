@@ -106,9 +106,7 @@ def _with_one_chain(form: DelayForm) -> DelayForm | None:
     return None
 
 
-def ends_apart(
-    form: DelayForm,
-) -> tuple[tuple[float, ...], tuple[float, ...], DelayForm]:
+def ends_apart(form: DelayForm) -> tuple[tuple[float, ...], tuple[float, ...], DelayForm]:
     """Take delays at the inputs and outputs out of a form.
 
     Returns

@@ -43,10 +43,7 @@ _FARTHEST = 0.5  # logarithm of a gain in one turn
 
 
 def with_random_effects(
-    records: Window,
-    fit: OutputErrorEstimate,
-    spread: Sequence[tuple[Effect, float]],
-    dt: float,
+    records: Window, fit: OutputErrorEstimate, spread: Sequence[tuple[Effect, float]], dt: float
 ) -> Window:
     """Let gain, dead time or lags of the records deviate from the plant's.
 

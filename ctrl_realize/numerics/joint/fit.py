@@ -33,9 +33,7 @@ StartPoint = tuple[float, ComplexArray]
 
 
 def joint_fit(
-    data: JointData,
-    starts: Mapping[Structure, Sequence[StartPoint]],
-    within: tuple[float, float],
+    data: JointData, starts: Mapping[Structure, Sequence[StartPoint]], within: tuple[float, float]
 ) -> tuple[OutputErrorEstimate, Agreement]:
     """Fit all structures to both, and compare with what each would have alone.
 

@@ -64,10 +64,7 @@ def frequency_grid(low: float, top: float, features: ComplexArray, turn_time: fl
 
 
 def follow(
-    curve: Curve,
-    grid: FloatArray,
-    largest_turn: float = 0.5,
-    values: ComplexArray | None = None,
+    curve: Curve, grid: FloatArray, largest_turn: float = 0.5, values: ComplexArray | None = None
 ) -> tuple[FloatArray, ComplexArray]:
     """Refine a grid until the curve turns by less than `largest_turn` rad between its points.
 

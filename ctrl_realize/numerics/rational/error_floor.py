@@ -25,13 +25,7 @@ from ..constants import VERY_STRONG
 from ..engine.problem import Structure
 from ..engine.structures import Candidate
 from .frf_data import FRFData
-from .search import (
-    MISSING,
-    correlation_cost,
-    fit_structures,
-    information_criteria,
-    unexplained,
-)
+from .search import MISSING, correlation_cost, fit_structures, information_criteria, unexplained
 
 _TRIED = 100  # floors over the range of the response: 10 % apart over four decades
 

@@ -67,9 +67,7 @@ def dead_time_bound(response: ComplexArray, omega: FloatArray, sigma: FloatArray
 
 
 def fit_structures(
-    data: FRFData,
-    orders: Sequence[int] | None,
-    degrees: Sequence[int] | None,
+    data: FRFData, orders: Sequence[int] | None, degrees: Sequence[int] | None
 ) -> dict[Structure, Candidate]:
     """Fit every structure, each from its own starts and from its neighbours' solutions.
 
@@ -103,10 +101,7 @@ def fit_structures(
 
 
 def _with_larger_orders(
-    data: FRFData,
-    ladder: _Ladder,
-    fits: dict[Structure, Candidate],
-    degrees: Sequence[int] | None,
+    data: FRFData, ladder: _Ladder, fits: dict[Structure, Candidate], degrees: Sequence[int] | None
 ) -> None:
     """Add larger orders while the largest is the best, or dynamics are missing."""
     # An order is accepted if a larger one was tried and is no better. Where the response is not

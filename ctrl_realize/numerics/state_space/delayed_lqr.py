@@ -21,11 +21,7 @@ Weights = tuple[FloatArray, FloatArray]
 
 
 def line_gain(
-    A: FloatArray,
-    B: FloatArray,
-    weights: Weights,
-    final: Weights,
-    delays: tuple[int, ...],
+    A: FloatArray, B: FloatArray, weights: Weights, final: Weights, delays: tuple[int, ...]
 ) -> FloatArray:
     r"""Gain for the core's state and the past inputs within the delays.
 

@@ -46,11 +46,7 @@ def pole_directions(poles: FloatArray | ComplexArray, dt: float) -> list[Directi
 
 
 def sensitivity_system(
-    A: FloatArray,
-    B: FloatArray,
-    C: FloatArray,
-    D: float,
-    directions: list[Direction],
+    A: FloatArray, B: FloatArray, C: FloatArray, D: float, directions: list[Direction]
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
     """Build the system from u to the core's output w and to its derivative in each direction.
 

@@ -61,11 +61,7 @@ def schur_form(A: FloatArray) -> Schur:
 
 
 def frequency_response(
-    form: Schur,
-    B: FloatArray,
-    C: FloatArray,
-    D: FloatArray,
-    points: ComplexArray,
+    form: Schur, B: FloatArray, C: FloatArray, D: FloatArray, points: ComplexArray
 ) -> ComplexArray:
     """Evaluate C (x I - A)^-1 B + D at many points by back substitution.
 

@@ -252,11 +252,7 @@ def _basis(
 
 
 def _residual(
-    model: Sections,
-    moved: Motion,
-    one: Experiment,
-    known: NDArray[np.bool_],
-    weights: FloatArray,
+    model: Sections, moved: Motion, one: Experiment, known: NDArray[np.bool_], weights: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     """Residual of the outputs with the best initial state and levels, and that state (2 q,)."""
     root = np.sqrt(weights)[:, None]

@@ -186,12 +186,7 @@ def own_step_response(
 
 
 def matched(
-    output: FloatArray,
-    moved: Moved,
-    beside: FloatArray,
-    own: FloatArray,
-    reach: float,
-    dt: float,
+    output: FloatArray, moved: Moved, beside: FloatArray, own: FloatArray, reach: float, dt: float
 ) -> OwnResponse:
     """Shift, scale and stretch a common response to fit one record best.
 
