@@ -17,7 +17,8 @@ ELSEWHERE = {  # other tests raise them, on smaller records or beside what the f
         gains_differ held_output hum integrating inverse_response lags_differ many_lags
         marginal_decision no_common_gain no_delay_resolved no_rest not_at_rest not_linear
         not_settled onset_in_gap outliers outlying_records parameter_at_bound
-        records_differ structured_misfit structures_disagree stuck_output time_varying
+        records_differ repeats_left_out structured_misfit structures_disagree
+        stuck_output time_varying
     """,
     "identify_campaign": "amplitude_trend gains_differ lags_differ no_common_gain",
 }

@@ -95,7 +95,8 @@ CASES = [
     ),
     _case("gain_not_resolved", steps.ends_while_rising, described.one_lag),
     _case("not_settled", steps.ends_while_rising, described.two_lags),
-    _case("held_output", sensors.analyser, described.fine_converter),
+    _case("held_output", sensors.dead_band_of_a_historian, described.fine_converter),
+    _case("repeats_left_out", sensors.analyser, described.fine_converter),
     _case("output_at_limit", sensors.clipped, described.one_lag),
     FlagCase(
         "fit_output_error",

@@ -34,6 +34,7 @@ from ..numerics.arrays import BoolArray, FloatArray
 from ..numerics.blas_threads import single_threaded
 from ..numerics.constants import SMALLEST
 from .impulse.from_io import impulse_from_io
+from .output_error.actuated.limits import at_updates
 from .output_error.fit import fit_output_error, model_alone
 from .output_error.result import OutputErrorFit
 from .output_error.summary import fitted_model
@@ -89,7 +90,7 @@ def fit_several_inputs(
     >>> sys.fit.table()["gain"].round(1).tolist()
     [2.0, -1.0]
     """
-    record = _checked(as_records(records))
+    record, repeated = at_updates(_checked(as_records(records)))
     inputs, output = np.atleast_2d(record.input), np.ravel(record.output)
     options: dict[str, Any] = {"max_delay": max_delay, "noise": noise}
     responses = _starting(record)
@@ -119,6 +120,7 @@ def fit_several_inputs(
     if record.irregular:
         systems = [_sampled(system, record.sample_time) for system in systems]
     fits = [fit_of(system, OutputErrorFit) for system in systems]
+    fits[0] = replace(fits[0], flags=(*repeated, *fits[0].flags))
     result = SeveralInputsFit(
         _wider(fits, record, ~np.isnan(output - earlier)), (record,), responses, cycle, settled
     )

@@ -57,3 +57,24 @@ def test_held_samples_and_coloured_residuals_widen_the_interval_to_the_truth():
     low, high = fit.interval
     assert low <= fit.dead_time <= high
     assert low <= case.dead_time
+
+
+@pytest.mark.parametrize("driven_by", ["step", "binary"])
+def test_samples_that_repeat_an_output_between_its_updates_are_left_out(driven_by):
+    # with them the dead time of 12 samples was 18.8 (15.4 to 21.0), with a load that was none, and
+    # 19 (19 to 20) without a gain
+    t = np.arange(700.0)
+    rng = np.random.default_rng(3)
+    u = np.where(t < 60, 0.0, 1.0)
+    if driven_by == "binary":
+        u = np.repeat(rng.choice([-1.0, 1.0], 35), 20)
+    moved = np.append(u[:1], np.diff(u))[:, None]
+    since = np.clip(t - np.arange(700)[:, None] - 12, 0, None)
+    y = 2 * np.sum(moved * -np.expm1(-since / 20), axis=0) + 0.01 * rng.standard_normal(700)
+    y = y[(np.arange(700) // 10) * 10]
+    fit = cr.identify(cr.Record(t, u, y)).fit
+    assert {"repeats_left_out", "load_disturbance"} & codes(fit) == {"repeats_left_out"}
+    assert fit.interval[0] <= 12 <= fit.interval[1]
+    assert fit.dead_time == pytest.approx(12, abs=1)
+    assert fit.gain_interval[0] <= 2 <= fit.gain_interval[1]
+    assert fit.gain == pytest.approx(2, rel=0.01)

@@ -28,7 +28,12 @@ from ...results import Flag
 from ..process_structures import Structures, requested
 from .actuated.alternatives import ASKED, Asked
 from .actuated.fit import with_actuator
-from .actuated.limits import fit_within_limits, fit_without_spikes, without_cut_noise
+from .actuated.limits import (
+    at_updates,
+    fit_within_limits,
+    fit_without_spikes,
+    without_cut_noise,
+)
 from .any_input import fit_any_input
 from .arguments import checked_records, edges_of, known_factor, on_common_axis, step_data_of
 from .averaging import (
@@ -311,12 +316,14 @@ def _linear(
 ) -> OutputErrorFit:
     """Fit linear models. One that hardly follows the output is refused, or not."""
     any_input = partial(fit_any_input, refuses=refuses)
+    several, repeated = _left_out(several, at_updates)
     if len(several) == 1:
         fit_one = partial(_fit_one, requested=requested, any_input=any_input)
         if requested.huber:
             fit_one = partial(fit_without_spikes, fit=fit_one)
-        return fit_within_limits(several[0], fit_one, may_clip=may_clip)
-    several, at_limits = _without_cut_noise(several)
+        result = fit_within_limits(several[0], fit_one, may_clip=may_clip)
+        return replace(result, flags=result.flags + repeated)
+    several, at_limits = _left_out(several, without_cut_noise)
     # Complete records of one step each can be averaged. Of more steps the mean would end at the
     # second one: a relay test of 40 samples a half period left 40 samples of a record of 600.
     stepped = not requested.loop and all(
@@ -328,15 +335,19 @@ def _linear(
         result = fit_own_gains(several, partial(way, several, requested), start)
     else:
         result = way(several, requested)
-    return replace(result, flags=result.flags + at_limits + same_record_flags(several))
+    return replace(result, flags=result.flags + repeated + at_limits + same_record_flags(several))
 
 
-def _without_cut_noise(records: tuple[Record, ...]) -> tuple[tuple[Record, ...], tuple[Flag, ...]]:
-    """Leave out samples at the limits of every record, and name the first that has some."""
-    kept, flags = zip(*map(without_cut_noise, records), strict=True)
+def _left_out(
+    several: tuple[Record, ...], rule: Callable[[Record], tuple[Record, tuple[Flag, ...]]]
+) -> tuple[tuple[Record, ...], tuple[Flag, ...]]:
+    """Leave out samples of every record by a rule, and name the first record that has some."""
+    kept, flags = zip(*map(rule, several), strict=True)
+    if len(several) == 1:
+        return kept, flags[0]
     named_flags = [
         replace(flag, message=f"{named('record', record.name)}: {flag.message}")
-        for record, own in zip(records, flags, strict=True)
+        for record, own in zip(several, flags, strict=True)
         for flag in own
     ]
     return kept, tuple(named_flags[:1])

@@ -19,6 +19,9 @@ from ..signals.noise import rounding_error
 _FAST = 0.2
 """Part of the steepest slope of a model from which its output counts as moving: of one lag, until
 it has made 80 % of its way."""
+_FEWEST_UPDATES = 20
+"""Changes of an output that are enough: by chance, all of so many distances are even in one of half
+a million records."""
 _FEWEST = 8  # moving samples of which a part can be judged
 SELDOM = 0.2
 """Part of equal neighbours up to which an output is said to have noise."""
@@ -39,6 +42,21 @@ def held_share(output: FloatArray, fitted: FloatArray) -> float:
     if not moving.any() or moving.sum() < _FEWEST:
         return 0.0
     return float(np.mean(held[moving]))
+
+
+def updates(output: FloatArray) -> BoolArray:
+    """Samples (N,), of an output that is updated every few samples, at which it is.
+
+    All of them unless the distances of its changes have a common divisor. The output (N,) is NaN
+    where it is missing.
+    """
+    changes, rounding = np.abs(np.diff(output)), rounding_error(output[np.isfinite(output)])
+    at = 1 + np.flatnonzero(changes > rounding)  # not beside a missing one
+    # Steps of one size are those of a converter, which an even ramp passes at equal distances.
+    if at.size < _FEWEST_UPDATES or np.ptp(changes[at - 1]) <= rounding:
+        return np.ones(output.size, dtype=np.bool_)
+    period = int(np.gcd.reduce(np.diff(at)))
+    return np.asarray((np.arange(output.size) - at[0]) % period == 0)
 
 
 def longest_hold(output: FloatArray, fitted: FloatArray) -> int:

@@ -7,6 +7,7 @@ from ctrl_realize.numerics.validation.held_output import (
     held_share,
     longest_hold,
     stuck_samples,
+    updates,
 )
 
 TIME = np.arange(300)
@@ -56,3 +57,22 @@ def test_rest_and_quantisation_are_not_taken_for_a_stuck_sensor(step, noise):
         output = (np.round(output / step) * step if step else output)[100 - before :]
         first, last = stuck_samples(output, RISE[100 - before :])
         assert first == last
+
+
+@pytest.mark.parametrize(("period", "first"), [(2, 1), (5, 0), (12, 7)])
+def test_updates_of_a_held_output_are_found_though_some_samples_are_missing(period, first):
+    rng = np.random.default_rng(3)
+    noisy = np.append(RISE, RISE[-1] * np.ones(300)) + 0.01 * rng.standard_normal(600)
+    at = np.arange(600)
+    new = (at - first) % period == 0
+    held = noisy[np.clip(at - (at - first) % period, 0, None)]
+    assert np.array_equal(updates(held), new)
+    held[30:70] = np.nan
+    assert np.array_equal(updates(held), new)
+
+
+def test_noise_steps_of_a_converter_and_an_even_ramp_are_no_updates():
+    noisy = RISE + 0.01 * np.random.default_rng(0).standard_normal(300)
+    ramp = np.floor(TIME / 4) - np.floor(np.clip(TIME - 150, 0, None) / 2)
+    for output in (noisy, np.round(noisy / 0.05) * 0.05, RISE, ramp, np.zeros(300)):
+        assert updates(output).all()

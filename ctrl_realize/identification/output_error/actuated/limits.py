@@ -18,6 +18,7 @@ from ....errors import DataError, UnsuitableSystemError
 from ....numerics.arrays import BoolArray, FloatArray, IntArray
 from ....numerics.constants import STRONG
 from ....numerics.signals.noise import FAR, spikes
+from ....numerics.validation.held_output import updates
 from ....numerics.validation.limits import at_limit, clips, ends, passed, plateaus
 from ..arguments import FEWEST_SAMPLES, step_data_of
 from ..loop_flags import feedback_flags
@@ -49,6 +50,17 @@ def without_cut_noise(record: Record) -> tuple[Record, tuple[Flag, ...]]:
             left |= samples
         flags.append(_at_limit(limit, samples, left_out=left_out))
     return _without(record, left) if left.any() else record, tuple(flags)
+
+
+def at_updates(record: Record) -> tuple[Record, tuple[Flag, ...]]:
+    """Leave out samples that repeat an output between two of its updates, and tell it."""
+    new = updates(np.ravel(record.output))
+    left_out = np.count_nonzero(record.seen & ~new)
+    if not left_out or np.count_nonzero(record.seen & new) < FEWEST_SAMPLES:
+        return record, ()
+    period = int(np.diff(np.flatnonzero(new))[0])
+    flag = flagged("repeats_left_out", period=period, time=in_time(period * record.dt))
+    return _without(record, ~new), (flag,)
 
 
 def _at_limit(limit: float, samples: BoolArray, *, left_out: bool) -> Flag:
