@@ -55,6 +55,18 @@ def stuck(part: float) -> Run:
     return run
 
 
+def seldom_stored(part: float) -> Run:
+    """A plain step whose output is stored when it has changed by a part of its range."""
+
+    def run(seed: int) -> Codes:
+        record = described.two_lags(np.random.default_rng([seed, 45])).records
+        y = np.ravel(record.output)
+        y = sensors.stored(y, part * np.ptp(y))
+        return codes(cr.fit_output_error(cr.Record(record.time, record.input, y)).fit)
+
+    return run
+
+
 def without(where: str) -> Run:
     """One lag of 0.3 s behind 0.5 s, without samples where its response begins, or later."""
 
@@ -95,7 +107,14 @@ CASES = [
     ),
     _case("gain_not_resolved", steps.ends_while_rising, described.one_lag),
     _case("not_settled", steps.ends_while_rising, described.two_lags),
-    _case("held_output", sensors.dead_band_of_a_historian, described.fine_converter),
+    FlagCase(
+        "fit_output_error",
+        "held_output",
+        "stored when it has changed by a twelfth",
+        seldom_stored(1 / 12),
+        "stored with all digits",
+        seldom_stored(0.0),
+    ),
     _case("repeats_left_out", sensors.analyser, described.fine_converter),
     _case("output_at_limit", sensors.clipped, described.one_lag),
     FlagCase(

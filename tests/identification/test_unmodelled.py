@@ -13,7 +13,8 @@ from tests.rigs import codes
 
 FAMILIES = [
     (steps.still_coming_to_rest, 0, "not_at_rest"),
-    (sensors.dead_band_of_a_historian, 0, "held_output"),
+    (sensors.dead_band_of_a_historian, 0, "repeats_left_out"),
+    (sensors.dead_band_of_a_historian, 2, "held_output"),
     (driven.insensitive, 0, "not_linear"),
 ]
 

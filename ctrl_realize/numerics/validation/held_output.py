@@ -22,7 +22,13 @@ it has made 80 % of its way."""
 _FEWEST_UPDATES = 20
 """Changes of an output that are enough: by chance, all of so many distances are even in one of half
 a million records."""
-_FEWEST = 8  # moving samples of which a part can be judged
+_BAND, _EVEN = 0.01, 3.0
+"""Least change of an output that is stored when it has changed enough, over its range, and longest
+distance of updates that come at about equal ones, over their median."""
+_RARE, _VARIOUS = 0.5, 0.5
+"""Part of the samples that are updates at most, and part of their changes that differ in size at
+least: those of a coarse converter have few sizes."""
+_FEWEST = 8  # changes, and moving samples of which a part can be judged
 SELDOM = 0.2
 """Part of equal neighbours up to which an output is said to have noise."""
 _LONG = 20  # samples: with a fifth of equal neighbours noise stands for so long by 0.2^19
@@ -44,19 +50,34 @@ def held_share(output: FloatArray, fitted: FloatArray) -> float:
     return float(np.mean(held[moving]))
 
 
-def updates(output: FloatArray) -> BoolArray:
-    """Samples (N,), of an output that is updated every few samples, at which it is.
+def updates(output: FloatArray, inputs: FloatArray) -> BoolArray:
+    """Samples (N,) at which a held output is updated; all of them if it is not held.
 
-    All of them unless the distances of its changes have a common divisor. The output (N,) is NaN
-    where it is missing.
+    Changes of an output (N,), NaN where it is missing, that is updated every few samples have
+    distances with a common divisor, or about equal ones; one that is stored when it has changed
+    enough has no small changes. Of these the first and last sample count as updates. Where an
+    output changes as the inputs (M, N) do, that explains it.
     """
     changes, rounding = np.abs(np.diff(output)), rounding_error(output[np.isfinite(output)])
     at = 1 + np.flatnonzero(changes > rounding)  # not beside a missing one
+    sizes, new = changes[at - 1], np.zeros(output.size, dtype=np.bool_)
+    moves = 1 + np.flatnonzero(np.any(np.diff(inputs) != 0, axis=0))
+    copied = np.array_equal(np.diff(at), np.diff(moves)[: max(at.size - 1, 0)])
     # Steps of one size are those of a converter, which an even ramp passes at equal distances.
-    if at.size < _FEWEST_UPDATES or np.ptp(changes[at - 1]) <= rounding:
-        return np.ones(output.size, dtype=np.bool_)
+    if at.size < _FEWEST or np.ptp(sizes) <= rounding or copied:
+        return ~new
     period = int(np.gcd.reduce(np.diff(at)))
-    return np.asarray((np.arange(output.size) - at[0]) % period == 0)
+    if period > 1 and at.size >= _FEWEST_UPDATES:
+        new[at[0] % period :: period] = True
+        return new
+    new[at], new[0], new[-1] = True, True, True
+    # Values at an end of the range are those of a limit.
+    inside = (output > np.nanmin(output)) & (output < np.nanmax(output))
+    rare = np.count_nonzero(new & inside) < _RARE * np.count_nonzero(inside)
+    various = np.unique(np.round(sizes / rounding)).size > _VARIOUS * at.size
+    large = sizes.min() > _BAND * np.nanmax(output) - _BAND * np.nanmin(output)
+    even = np.diff(at).max() <= _EVEN * np.median(np.diff(at)) and at.size >= _FEWEST_UPDATES
+    return new if rare and various and (large or even) else np.ones_like(new)
 
 
 def longest_hold(output: FloatArray, fitted: FloatArray) -> int:

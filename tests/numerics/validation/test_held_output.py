@@ -59,20 +59,44 @@ def test_rest_and_quantisation_are_not_taken_for_a_stuck_sensor(step, noise):
         assert first == last
 
 
+STEP = np.where(TIME >= 100, 1.0, 0.0)[None]
+
+
 @pytest.mark.parametrize(("period", "first"), [(2, 1), (5, 0), (12, 7)])
 def test_updates_of_a_held_output_are_found_though_some_samples_are_missing(period, first):
     rng = np.random.default_rng(3)
     noisy = np.append(RISE, RISE[-1] * np.ones(300)) + 0.01 * rng.standard_normal(600)
-    at = np.arange(600)
+    at, step = np.arange(600), np.append(STEP, np.ones((1, 300)), axis=1)
     new = (at - first) % period == 0
     held = noisy[np.clip(at - (at - first) % period, 0, None)]
-    assert np.array_equal(updates(held), new)
+    assert np.array_equal(updates(held, step), new)
     held[30:70] = np.nan
-    assert np.array_equal(updates(held), new)
+    assert np.array_equal(updates(held, step), new)
 
 
-def test_noise_steps_of_a_converter_and_an_even_ramp_are_no_updates():
-    noisy = RISE + 0.01 * np.random.default_rng(0).standard_normal(300)
+def test_updates_at_about_equal_distances_and_those_of_a_dead_band_are_found():
+    rng = np.random.default_rng(4)
+    noisy = RISE + 0.01 * rng.standard_normal(300)
+    new = np.zeros(300, dtype=bool)
+    new[[0, *np.cumsum(rng.integers(4, 9, 48)), 299]] = True
+    held = noisy[np.maximum.accumulate(np.where(new, TIME, 0))]
+    assert np.array_equal(updates(held, STEP), new)
+    stored, last = [0], noisy[0]
+    for k in TIME:
+        if abs(noisy[k] - last) > 0.05:
+            stored, last = [*stored, k], noisy[k]
+    new = np.isin(TIME, [*stored, 299])
+    held = noisy[np.maximum.accumulate(np.where(np.isin(TIME, stored), TIME, 0))]
+    assert np.array_equal(updates(held, STEP), new)
+
+
+def test_noise_steps_of_a_converter_an_even_ramp_and_a_gain_are_no_updates():
+    rng = np.random.default_rng(0)
+    noisy = RISE + 0.01 * rng.standard_normal(300)
     ramp = np.floor(TIME / 4) - np.floor(np.clip(TIME - 150, 0, None) / 2)
-    for output in (noisy, np.round(noisy / 0.05) * 0.05, RISE, ramp, np.zeros(300)):
-        assert updates(output).all()
+    coarse = np.round(noisy / 0.05) * 0.05
+    tacho = np.round(0.0445 * np.round(noisy / 0.0445), 2)
+    for output in (noisy, coarse, tacho, RISE, ramp, np.zeros(300)):
+        assert updates(output, STEP).all()
+    levels = np.repeat(rng.uniform(-1, 1, 30), 10)
+    assert updates(2 * np.append(np.zeros(12), levels[:-12]), levels[None]).all()

@@ -54,12 +54,19 @@ def without_cut_noise(record: Record) -> tuple[Record, tuple[Flag, ...]]:
 
 def at_updates(record: Record) -> tuple[Record, tuple[Flag, ...]]:
     """Leave out samples that repeat an output between two of its updates, and tell it."""
-    new = updates(np.ravel(record.output))
-    left_out = np.count_nonzero(record.seen & ~new)
-    if not left_out or np.count_nonzero(record.seen & new) < FEWEST_SAMPLES:
+    output = np.ravel(record.output)
+    new = updates(output, np.atleast_2d(record.input))
+    if not np.any(record.seen & ~new):
         return record, ()
-    period = int(np.diff(np.flatnonzero(new))[0])
-    flag = flagged("repeats_left_out", period=period, time=in_time(period * record.dt))
+    apart, count = np.diff(np.flatnonzero(new)), np.count_nonzero(record.seen & new)
+    longest = in_time(int(apart.max()) * record.dt)
+    if count < FEWEST_SAMPLES:
+        return record, (flagged("held_output.few", count=count, hold=longest),)
+    if np.ptp(apart) == 0:
+        flag = flagged("repeats_left_out", period=int(apart[0]), time=longest)
+    else:
+        band = np.nanmin(np.abs(np.diff(output[new]))[:-1])
+        flag = flagged("repeats_left_out.seldom", count=count, band=band, hold=longest)
     return _without(record, ~new), (flag,)
 
 
