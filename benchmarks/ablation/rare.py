@@ -8,7 +8,7 @@ from scipy.signal import lfilter
 import ctrl_realize as cr
 from benchmarks.closed_loop import cases as loops
 from benchmarks.relay import __main__ as tests
-from benchmarks.worlds import sensors, steps
+from benchmarks.worlds import driven, sensors, steps
 from benchmarks.worlds.simulation import (
     DT,
     FINE,
@@ -62,6 +62,15 @@ def spiky(rng: Rng) -> Case:
     at = rng.choice(np.arange(120, y.size), int(rng.integers(2, 9)), replace=False)
     y[at] += plant.gain * rng.uniform(-5.0, 5.0, at.size)
     return plant.case(record(u, y))
+
+
+def seldom_updated(rng: Rng) -> Case:
+    """An analyser, telegrams at random levels, or a historian with a dead band of 2 to 4 %."""
+    if rng.random() < 2 / 3:
+        return (sensors.analyser if rng.random() < 0.5 else driven.telegrams)(rng)
+    plant, u = drawn(rng), step()
+    y = noisy(rng, stepped(rng, plant, u), 0.002)
+    return plant.case(record(u, sensors.stored(y, float(rng.uniform(0.02, 0.04)) * np.ptp(y))))
 
 
 def step_behind_a_filter(rng: Rng) -> Case:
@@ -331,6 +340,7 @@ MADE_FOR = {
     "records weighted by their noise": unequal_sensors,
     "curves are no steps": step_behind_a_filter,
     "spikes left out": spiky,
+    "repeats left out": seldom_updated,
     "noise of a rest that is constant": padded_rest,
     "louder noise after the step": louder_from_the_step_on,
     "friction behind lags": friction_behind_lags,

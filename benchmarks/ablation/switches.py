@@ -414,6 +414,14 @@ SWITCHES = (
         (f"{PUBLIC}.actuated.limits:spikes",),
     ),
     Switch(
+        "repeats left out",
+        {
+            f"{NUMERICS}.validation.held_output:_FEWEST_UPDATES": value(np.inf),
+            f"{NUMERICS}.validation.held_output:_BAND": value(1.0),
+        },
+        (f"{PUBLIC}.actuated.limits:updates",),
+    ),
+    Switch(
         "loop without its set point",
         {f"{PUBLIC}.fit:answers_the_output": giving(False)},
     ),
