@@ -9,6 +9,7 @@ import ctrl_realize as cr
 from benchmarks.closed_loop import cases as loops
 from benchmarks.relay import __main__ as tests
 from benchmarks.worlds import driven, sensors, steps
+from benchmarks.worlds import loops as answered
 from benchmarks.worlds.simulation import (
     DT,
     FINE,
@@ -353,5 +354,6 @@ MADE_FOR = {
     "steps that are held": running_loop,
     "loop without its set point": running_loop,
     "controller behind rounding": rounded_loop,
+    "first turn in slow noise": answered.relay_with_load,
 }
 """Rules, and the world that each was made for."""

@@ -426,6 +426,12 @@ SWITCHES = (
         {f"{PUBLIC}.fit:answers_the_output": giving(False)},
     ),
     Switch(
+        "first turn in slow noise",
+        {f"{FITS}.any_input.lags:_SLOW": value(np.ones(1))},
+        (f"{FITS}.any_input.lags:_unlikely",),
+        called=True,
+    ),
+    Switch(
         "controller behind rounding",
         {f"{NUMERICS}.validation.innovations:_ROUNDED": value(_EXACTLY)},
         asked=(f"{PUBLIC}.fit:answers_the_output",),

@@ -10,6 +10,8 @@ from scipy.signal import lfilter
 import ctrl_realize as cr
 from benchmarks.accuracy import factors
 from benchmarks.closed_loop.cases import CASES, GAIN, PLANTS, record
+from benchmarks.worlds.judge import judged
+from benchmarks.worlds.loops import relay_with_load
 
 PLANT = PLANTS["0.4"]
 TOTAL = PLANT.dead_time + sum(PLANT.lags)
@@ -201,3 +203,9 @@ def test_without_a_set_point_slow_noise_is_not_taken_for_the_response():
     assert fit.interval[0] <= truth.dead_time <= fit.interval[1]
     assert any("the input depends on the output" in one for one in fit.choices)
     assert "feedback" in [one.code for one in fit.flags]
+
+
+@pytest.mark.parametrize("seed", [0, 3])
+def test_a_relay_test_beside_a_slow_load_has_the_dead_time_of_the_plant(seed):
+    # of 16.3 and 10.3 samples; they were 1.7 (0 to 2.7) and 1.2 (0 to 1.9)
+    assert "dead time" not in judged(relay_with_load, seed).missed
