@@ -30,10 +30,7 @@ def parse_delays(given: int | Sequence[int], count: int, name: str, side: str) -
 
 
 def chain_labels(
-    inputs: Sequence[str],
-    outputs: Sequence[str],
-    before: tuple[int, ...],
-    behind: tuple[int, ...],
+    inputs: Sequence[str], outputs: Sequence[str], before: tuple[int, ...], behind: tuple[int, ...]
 ) -> list[str]:
     """Name the states of the chains: u[k-1] ... and, for outputs before their delay, y*[k-1]."""
     labels = [f"{u}[k-{i}]" for u, d in zip(inputs, before, strict=True) for i in range(1, d + 1)]

@@ -147,9 +147,7 @@ def check_limits(limits: Mapping[str, Any] | None) -> None:
 
 
 def judged(
-    metrics: Sequence[Metric],
-    groups: Sequence[SizeAndDirection],
-    limits: Mapping[str, Any] | None,
+    metrics: Sequence[Metric], groups: Sequence[SizeAndDirection], limits: Mapping[str, Any] | None
 ) -> tuple[Metric, ...]:
     """Compare metrics with limits; limits by size add a metric for each size and direction."""
     given = limits or {}

@@ -28,12 +28,7 @@ from ...results import Flag
 from ..process_structures import Structures, requested
 from .actuated.alternatives import ASKED, Asked
 from .actuated.fit import with_actuator
-from .actuated.limits import (
-    at_updates,
-    fit_within_limits,
-    fit_without_spikes,
-    without_cut_noise,
-)
+from .actuated.limits import at_updates, fit_within_limits, fit_without_spikes, without_cut_noise
 from .any_input import fit_any_input
 from .arguments import checked_records, edges_of, known_factor, on_common_axis, step_data_of
 from .averaging import (

@@ -19,12 +19,7 @@ from ...numerics.signals.edges import difference_noise
 from ...numerics.state_space.delay_split import split_delays
 from ...results import Flag, ModelFit
 from .impulses import as_impulse, channels
-from .mimo_cores import (
-    Assembly,
-    aligned_core,
-    channel_iae,
-    cores_one_by_one,
-)
+from .mimo_cores import Assembly, aligned_core, channel_iae, cores_one_by_one
 
 Structure = Literal["auto", "common", "rows", "columns"]
 NOISE_STDS = 5.0

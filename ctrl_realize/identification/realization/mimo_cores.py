@@ -82,11 +82,7 @@ def _realized(
 
 
 def aligned_core(
-    data: ImpulseResponse,
-    order: int,
-    outputs: IntArray,
-    inputs: IntArray,
-    samples: int | None,
+    data: ImpulseResponse, order: int, outputs: IntArray, inputs: IntArray, samples: int | None
 ) -> Assembly:
     """Align all channels by delays of inputs and outputs, and realize them with one A."""
     moved = _aligned(channels(data), np.add.outer(outputs, inputs))

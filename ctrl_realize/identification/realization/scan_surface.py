@@ -12,11 +12,7 @@ from numpy.typing import ArrayLike
 from ..._checks import integer, one_of
 from ...data import ImpulseResponse
 from ...numerics.arrays import FloatArray
-from ...numerics.hankel.delay_models import (
-    hankel_size,
-    iae_of_models,
-    realize_at_delays,
-)
+from ...numerics.hankel.delay_models import hankel_size, iae_of_models, realize_at_delays
 from .impulses import as_impulse, channels, check_samples, noise_floor, settled_samples
 from .realize import HANKEL
 

@@ -118,10 +118,7 @@ def fit_state_space(
 
 @single_threaded
 def refine_state_space(
-    system: ct.StateSpace,
-    records: Record | Sequence[Record],
-    *,
-    feedthrough: bool | None = None,
+    system: ct.StateSpace, records: Record | Sequence[Record], *, feedthrough: bool | None = None
 ) -> DelayedStateSpace:
     """Fit all parameters of a model to records, with fixed order and delays.
 

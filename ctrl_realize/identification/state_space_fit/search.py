@@ -95,11 +95,7 @@ class Search:
     """
 
     def __init__(
-        self,
-        group: Sequence[Record],
-        markov: FloatArray,
-        top: int,
-        enough: int = ENOUGH_SAMPLES,
+        self, group: Sequence[Record], markov: FloatArray, top: int, enough: int = ENOUGH_SAMPLES
     ) -> None:
         self._group = group
         self._enough = enough

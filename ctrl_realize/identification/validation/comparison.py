@@ -115,8 +115,7 @@ class ModelComparison(Result):
 
 @single_threaded
 def compare(
-    models: Mapping[str, ct.StateSpace] | Sequence[ct.StateSpace] | ct.StateSpace,
-    record: Record,
+    models: Mapping[str, ct.StateSpace] | Sequence[ct.StateSpace] | ct.StateSpace, record: Record
 ) -> ModelComparison:
     """Compare models with a record, best one that they were not fitted to.
 
