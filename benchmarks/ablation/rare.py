@@ -317,6 +317,13 @@ def rounded_loop(rng: Rng) -> Case:
     return Case(cr.Record(made.time, u, y), plant.dead_time, loops.GAIN, total)
 
 
+def coarse_controller(rng: Rng) -> Case:
+    """A loop without its set point, which moves once; most outputs of the controller are alike."""
+    plant = loops.PLANTS[str(rng.choice(["0.4", "0.3", "1", "1.5"]))]
+    _, made = loops.record(plant, loops.CASES["quantised"], "one", int(rng.integers(2**31)))
+    return Case(made, plant.dead_time, loops.GAIN, plant.dead_time + sum(plant.lags))
+
+
 MADE_FOR = {
     "unlike residual left alone": noise_of_the_response,
     "noise made white": waves_on_a_canal,
@@ -354,6 +361,7 @@ MADE_FOR = {
     "steps that are held": running_loop,
     "loop without its set point": running_loop,
     "controller behind rounding": rounded_loop,
+    "past outputs tell a controller": coarse_controller,
     "first turn in slow noise": answered.relay_with_load,
 }
 """Rules, and the world that each was made for."""

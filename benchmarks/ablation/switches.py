@@ -87,6 +87,11 @@ def first(_: Any) -> Any:
     return lambda given, *_args, **_kwargs: given
 
 
+def _with_the_present(chance: Any) -> Any:
+    """Chances of predictions by past outputs alone are 1."""
+    return lambda *signals, first=0: 1.0 if first else chance(*signals)
+
+
 def _only(wanted: Callable[[Any], bool]) -> Change:
     """Explanations of what comes before a step, without some of them."""
     return lambda ways: lambda data: [way for way in ways(data) if wanted(way)] or [data]
@@ -424,6 +429,11 @@ SWITCHES = (
     Switch(
         "loop without its set point",
         {f"{PUBLIC}.fit:answers_the_output": giving(False)},
+    ),
+    Switch(
+        "past outputs tell a controller",
+        {f"{NUMERICS}.validation.innovations:_answer_chance": _with_the_present},
+        asked=(f"{PUBLIC}.fit:answers_the_output",),
     ),
     Switch(
         "first turn in slow noise",

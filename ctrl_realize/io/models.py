@@ -18,15 +18,7 @@ from ..delayed.inside.pure import TransferDelay
 from ..errors import CtrlRealizeError, FileFormatError, OptionError
 from .atomic import write_text
 from .checks import usable_file
-from .json_content import (
-    boolean_free,
-    field,
-    finite_numbers,
-    matrix,
-    parsed,
-    texts,
-    whole_numbers,
-)
+from .json_content import boolean_free, field, finite_numbers, matrix, parsed, texts, whole_numbers
 from .stored_fit import summary_from_json, summary_of, summary_to_json
 
 FORMAT = "ctrl_realize model"
@@ -134,10 +126,7 @@ def load_model(path: str | os.PathLike[str]) -> Model:
 
 
 def model_to_text(
-    system: ct.StateSpace,
-    *,
-    settings: Mapping[str, Any] | None = None,
-    note: str = "",
+    system: ct.StateSpace, *, settings: Mapping[str, Any] | None = None, note: str = ""
 ) -> str:
     """Return a model as the text that `save_model` writes."""
     model: Model = system

@@ -35,11 +35,7 @@ _READERS = {
 
 
 def read_table(
-    path: str | os.PathLike[str],
-    options: TextOptions,
-    *,
-    variable: str | None,
-    max_bytes: float,
+    path: str | os.PathLike[str], options: TextOptions, *, variable: str | None, max_bytes: float
 ) -> Table:
     """Read the columns of a text, Excel, ``.npz``, ``.mat``, Parquet, HDF5 or TDMS file.
 

@@ -180,10 +180,7 @@ def read_record(
 
 
 def read_records(
-    path: str | os.PathLike[str],
-    *,
-    by: str | int | None = None,
-    **options: Any,
+    path: str | os.PathLike[str], *, by: str | int | None = None, **options: Any
 ) -> list[Record]:
     r"""Read several tests in one file as a list of records.
 

@@ -18,14 +18,7 @@ from ..identification.joint.result import JointFit
 from ..numerics.arrays import FloatArray
 from . import style
 from .fits import data_and_model
-from .frf_comparison import (
-    FITTED,
-    TRUSTED_COHERENCE,
-    Curve,
-    curves_of,
-    mark_band,
-    trusted_band,
-)
+from .frf_comparison import FITTED, TRUSTED_COHERENCE, Curve, curves_of, mark_band, trusted_band
 from .names import plain
 from .shared_docs import documented
 from .style import decibel, frequency_axis, phase_ticks

@@ -171,11 +171,7 @@ def mark_band(axes: Axes, band_hz: tuple[float, float]) -> None:
 
 @documented("sequence of two Axes")
 def comparison_plot(
-    comparison: FRFComparison,
-    *,
-    ax: style.AxesLike = None,
-    title: str | None = None,
-    **kwargs: Any,
+    comparison: FRFComparison, *, ax: style.AxesLike = None, title: str | None = None, **kwargs: Any
 ) -> ct.ControlPlot:
     """Draw the gain and phase errors of a model, and the trusted band.
 

@@ -188,12 +188,7 @@ def _singular_values(result: Any, count: int) -> tuple[FloatArray, int, float | 
 
 
 def _singular_values_on(
-    axes: Axes,
-    values: FloatArray,
-    order: int,
-    floor: float | None,
-    at: Any = None,
-    **kwargs: Any,
+    axes: Axes, values: FloatArray, order: int, floor: float | None, at: Any = None, **kwargs: Any
 ) -> list[Line2D]:
     positions = np.arange(1, values.size + 1) if at is None else at
     positive = np.where(values > 0, values, np.nan)

@@ -135,12 +135,7 @@ def put_title(axes: Axes, ax: AxesLike, title: str | None, default: str) -> None
 
 @contextmanager
 def canvas(
-    ax: AxesLike,
-    rows: int = 1,
-    *,
-    title: str | None = None,
-    default_title: str = "",
-    **layout: Any,
+    ax: AxesLike, rows: int = 1, *, title: str | None = None, default_title: str = "", **layout: Any
 ) -> Iterator[list[Axes]]:
     """Provide the axes to draw in, in the toolbox's style; a new figure gets its title at the end.
 

@@ -175,10 +175,7 @@ def process_model_plot(
         time = np.linspace(0, span, 600)
         factor, unit = axis_time_unit(span, axes)
         lines = axes.plot(
-            time * factor,
-            model.step(time),
-            color=style.MODEL,
-            label=plain(model.formula),
+            time * factor, model.step(time), color=style.MODEL, label=plain(model.formula)
         )
         axes.set(xlabel=f"time [{unit}]", ylabel="step response")
         return style.finished([axes], [lines], loc="lower right")

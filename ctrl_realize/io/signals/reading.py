@@ -23,14 +23,7 @@ from ..time_column import Clock, time_axis
 from .long_format import LongTable, long_table, tags_as_columns
 from .names import Parts, choose_columns
 from .quality import Rows, Rules, rules_of
-from .samples import (
-    check_part,
-    labels_of,
-    long_samples,
-    span_of,
-    wide_axis,
-    wide_samples,
-)
+from .samples import check_part, labels_of, long_samples, span_of, wide_axis, wide_samples
 
 _JUMP = 10.0
 """Length of a jump of time that separates two tests, in usual steps; missing samples of one test

@@ -12,6 +12,7 @@ from benchmarks.accuracy import factors
 from benchmarks.closed_loop.cases import CASES, GAIN, PLANTS, record
 from benchmarks.worlds.judge import judged
 from benchmarks.worlds.loops import relay_with_load
+from tests.rigs import codes
 
 PLANT = PLANTS["0.4"]
 TOTAL = PLANT.dead_time + sum(PLANT.lags)
@@ -209,3 +210,16 @@ def test_without_a_set_point_slow_noise_is_not_taken_for_the_response():
 def test_a_relay_test_beside_a_slow_load_has_the_dead_time_of_the_plant(seed):
     # of 16.3 and 10.3 samples; they were 1.7 (0 to 2.7) and 1.2 (0 to 1.9)
     assert "dead time" not in judged(relay_with_load, seed).missed
+
+
+@pytest.mark.parametrize(("plant", "moves"), [("1", "one"), ("0.3", "one")])
+def test_a_controller_that_rounds_its_output_is_told_by_past_outputs(plant, moves):
+    # without its set point the inverse of the controller was found: 0 (0 to 0.7) and 0 (0 to 1.0)
+    bare = record(PLANTS[plant], CASES["quantised"], moves, 700 + (plant == "0.3"))[1]
+    fit = cr.identify(bare).fit
+    assert "feedback" in codes(fit)
+    low, high = fit.interval
+    assert low <= PLANTS[plant].dead_time <= high
+    assert fit.total_delay == pytest.approx(
+        PLANTS[plant].dead_time + sum(PLANTS[plant].lags), rel=0.2
+    )
