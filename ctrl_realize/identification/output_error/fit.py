@@ -42,7 +42,7 @@ from .averaging import (
 )
 from .checks import checked
 from .flags import fit_flags
-from .loop_flags import answers_the_output, in_automatic
+from .loop_flags import answers_the_output, feedback_flags, in_automatic
 from .own_gains import fit_own_gains
 from .repeat_flags import repeat_flags, same_record_flags
 from .repeatability import delay_outliers, fit_alike, unlike_records
@@ -311,7 +311,12 @@ def _linear(
 ) -> OutputErrorFit:
     """Fit linear models. One that hardly follows the output is refused, or not."""
     any_input = partial(fit_any_input, refuses=refuses)
-    several, repeated = _left_out(several, at_updates)
+    # What sticks rests between its moves, and does not repeat itself.
+    kept, repeated = _left_out(several, at_updates) if may_clip else (several, ())
+    gaps = [sum(one.n_missing for one in records) for records in (several, kept)]
+    if requested.loop and not gaps[0] and gaps[1]:
+        repeated += tuple(feedback_flags(several, 0.0))  # which records with gaps do not tell
+    several = kept
     if len(several) == 1:
         fit_one = partial(_fit_one, requested=requested, any_input=any_input)
         if requested.huber:

@@ -223,3 +223,22 @@ def test_a_controller_that_rounds_its_output_is_told_by_past_outputs(plant, move
     assert fit.total_delay == pytest.approx(
         PLANTS[plant].dead_time + sum(PLANTS[plant].lags), rel=0.2
     )
+
+
+@pytest.mark.parametrize("seed", [5, 10])
+def test_a_loop_about_an_analyser_is_told_though_repeats_are_left_out(seed):
+    rng, wanted = (
+        np.random.default_rng(seed),
+        np.where((TIME >= 100) & (TIME % 300 < 250), 1.0, 0.0),
+    )
+    noise = 0.08 * lfilter([np.sqrt(1 - 0.9**2)], [1, -0.9], rng.standard_normal(900))
+    sent, seen, level, whole = np.zeros(912), np.zeros(900), 0.0, 0.0
+    for k in range(900):
+        seen[k] = seen[k - 1] if k % seed else level + noise[k]
+        whole += (wanted[k] - seen[k]) / 25
+        sent[k + 12] = 0.5 * (wanted[k] - seen[k] + whole)
+        level += (1 - np.exp(-1 / 20)) * (2 * sent[k] - level)
+    fit = cr.identify(cr.Record(TIME, sent[12:], seen, reference=wanted)).fit
+    assert {"repeats_left_out", "closed_loop"} <= codes(fit)
+    assert fit.interval[0] <= 12 <= fit.interval[1]
+    assert fit.gain_interval[0] <= 2 <= fit.gain_interval[1]
