@@ -71,8 +71,9 @@ def updates(output: FloatArray, inputs: FloatArray) -> BoolArray:
         new[at[0] % period :: period] = True
         return new
     new[at], new[0], new[-1] = True, True, True
-    # Values at an end of the range are those of a limit.
+    # Values at an end of the range are those of a limit, and before the first change it is at rest.
     inside = (output > np.nanmin(output)) & (output < np.nanmax(output))
+    inside[: at[0]] = inside[at[-1] + 1 :] = False
     rare = np.count_nonzero(new & inside) < _RARE * np.count_nonzero(inside)
     various = np.unique(np.round(sizes / rounding)).size > _VARIOUS * at.size
     large = sizes.min() > _BAND * np.nanmax(output) - _BAND * np.nanmin(output)

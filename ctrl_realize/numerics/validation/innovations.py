@@ -65,6 +65,8 @@ _ROUNDED, _AS_ROUNDED = 0.5, 1.25
 rounded to their median change between samples, none of the 18 of those loops with three moves was
 above 0.47 of either, or left more than 1.24 times the rounding. Ablation: controller behind
 rounding."""
+_SINGLE = 0.9
+"""Part of the moves of such an input that are a single step; those of a set point are more."""
 _PIECES = 6
 """Means of the past input whose products are asked about."""
 _WILD = 3.0
@@ -135,8 +137,8 @@ def shows_feedback(records: Sequence[tuple[FloatArray, FloatArray]]) -> bool:
 
     The innovations are dependent, and outputs tell the input but for rare moves, those of a set
     point: what a response within the same sample leaves, or an input that is recorded late, is
-    noise. Neither explains that past outputs tell the input of a controller that rounds so coarsely
-    that it mostly rests. Ablation: past outputs tell a controller.
+    noise. If a controller rounds so coarsely that it mostly rests, past outputs tell the input.
+    Ablation: past outputs tell a controller.
     """
     pairs = [(y[-REGRESSED:], u[-REGRESSED:]) for y, u in records]
     rare = RARE / len(pairs)
@@ -145,7 +147,7 @@ def shows_feedback(records: Sequence[tuple[FloatArray, FloatArray]]) -> bool:
         past = past_inputs(y.size, 0.0)
         if feedback_chance(y, u, past) >= rare:
             return False
-        return _told(y, u) or _answer_chance(y, u, past, first=1) < rare
+        return _told(y, u) or (_mostly_rests(u) and _answer_chance(y, u, past, first=1) < rare)
 
     return all(answers(y, u) for y, u in pairs)
 
@@ -166,6 +168,13 @@ def _told(output: FloatArray, drive: FloatArray) -> bool:
     size = float(np.median(np.abs(left)))
     exactly = _ROUNDED if mad_sigma(left) <= _AS_ROUNDED * rounding else _EXACTLY
     return size < exactly * min(float(np.median(np.abs(alone))), float(np.std(left)))
+
+
+def _mostly_rests(drive: FloatArray) -> bool:
+    """Whether an input rests at most samples, and moves by single steps of a converter."""
+    moves = np.abs(np.diff(drive))
+    moves, step = moves[moves > 0], quantisation_step(drive)
+    return 2 * moves.size < drive.size and float(np.quantile(moves, _SINGLE)) < 1.5 * step
 
 
 def _answer_chance(output: FloatArray, drive: FloatArray, past: int, first: int = 0) -> float:

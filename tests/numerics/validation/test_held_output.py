@@ -96,6 +96,8 @@ def test_noise_steps_of_a_converter_an_even_ramp_and_a_gain_are_no_updates():
     ramp = np.floor(TIME / 4) - np.floor(np.clip(TIME - 150, 0, None) / 2)
     coarse = np.round(noisy / 0.05) * 0.05
     tacho = np.round(0.0445 * np.round(noisy / 0.0445), 2)
+    late = np.append(np.zeros(400), rng.uniform(0.1, 1, 100) * np.tile([1, -1], 50))
+    assert updates(late, np.append(STEP, np.ones((1, 200)), axis=1)).all()
     for output in (noisy, coarse, tacho, RISE, ramp, np.zeros(300)):
         assert updates(output, STEP).all()
     levels = np.repeat(rng.uniform(-1, 1, 30), 10)
