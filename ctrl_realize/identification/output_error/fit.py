@@ -311,11 +311,12 @@ def _linear(
 ) -> OutputErrorFit:
     """Fit linear models. One that hardly follows the output is refused, or not."""
     any_input = partial(fit_any_input, refuses=refuses)
-    # What sticks rests between its moves, and does not repeat itself.
+    # Behind an actuator an output may rest because that sticks: these samples are measurements.
     kept, repeated = _left_out(several, at_updates) if may_clip else (several, ())
     gaps = [sum(one.n_missing for one in records) for records in (several, kept)]
     if requested.loop and not gaps[0] and gaps[1]:
-        repeated += tuple(feedback_flags(several, 0.0))  # which records with gaps do not tell
+        # Records with gaps are not tested for feedback afterwards.
+        repeated += tuple(feedback_flags(several, 0.0))
     several = kept
     if len(several) == 1:
         fit_one = partial(_fit_one, requested=requested, any_input=any_input)

@@ -1,6 +1,7 @@
-"""Samples at a limit and spikes of a sensor: they are left out of the fit, and it is told.
+"""Samples that are no measurements of the plant are left out of the fit, and it is told.
 
-The first are bounds of what the plant does, not measurements of it; the others neither.
+Those at a limit are bounds of what it does, spikes are the sensor's, and between two of its updates
+a held output repeats what was measured before.
 """
 
 from __future__ import annotations
