@@ -207,12 +207,7 @@ class Valve:
         return recorded(self, time, held, moved + self._rest, generator, name)
 
     def static_test(
-        self,
-        rng: Seed = None,
-        *,
-        levels: int = 11,
-        cycles: int = 3,
-        ramp: float | None = 120.0,
+        self, rng: Seed = None, *, levels: int = 11, cycles: int = 3, ramp: float | None = 120.0
     ) -> Record:
         """Record the test of linearity and hysteresis: levels and a ramp over the whole range.
 

@@ -17,12 +17,7 @@ from ..identification.campaign.run import identify_campaign
 from ..identification.methods import identify as identify_record
 from ..io import read_frf
 from ..results import ModelFit
-from .inputs import (
-    Reading,
-    Settings,
-    Source,
-    calls_again,
-)
+from .inputs import Reading, Settings, Source, calls_again
 from .machine import Told, told_as_json
 from .manifest import Run, refuse_other_results
 from .results import Provenance, campaign_table, write_campaign_files, write_record_files
@@ -197,11 +192,7 @@ def _say_model(system: DelayedStateSpace, comparison: FRFComparison | None) -> N
 
 
 def _many(
-    task: _Task,
-    sources: list[Source],
-    output: Path,
-    calls: list[tuple[str, str]],
-    jobs: int | None,
+    task: _Task, sources: list[Source], output: Path, calls: list[tuple[str, str]], jobs: int | None
 ) -> int:
     settings, frf = task.settings, task.frf
     n_jobs = jobs if jobs is not None else -1 if len(sources) >= _MANY else 1

@@ -20,8 +20,7 @@ Files = Annotated[
     typer.Argument(help="Records: CSV, TSV, LVM, .xlsx, .mat, .npz, Parquet, HDF5, TDMS."),
 ]
 MaybeFiles = Annotated[
-    list[Path] | None,
-    typer.Argument(help="Records, a measured frequency response, or saved work."),
+    list[Path] | None, typer.Argument(help="Records, a measured frequency response, or saved work.")
 ]
 NoBrowser = Annotated[bool, _OPTION("--no-browser", help="Say the address, and open no browser.")]
 Port = Annotated[int, _OPTION("--port", min=0, max=65535, help="Port; 0: a free one.")]

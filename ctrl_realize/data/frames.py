@@ -21,10 +21,7 @@ _NO_SECONDS = re.compile(r"[ _/(\[](ms|[uµμ]s|ns|min|minutes|h|hours|days?)[)\
 
 
 def signals_of_frame(
-    frame: Any,
-    input: str | Sequence[str],
-    output: str | Sequence[str],
-    time: str | None,
+    frame: Any, input: str | Sequence[str], output: str | Sequence[str], time: str | None
 ) -> tuple[FloatArray, FloatArray, FloatArray, list[str], list[str]]:
     """Time in s, input, output and their labels, from columns of a table."""
     import pandas as pd

@@ -17,13 +17,7 @@ from ..errors import DataError, OptionError, TimeAxisError
 from ..numerics.arrays import BoolArray, read_only
 from ..numerics.signals.time_axis import axis_fault
 from ..numerics.signals.time_axis import sample_time as mean_step
-from .record_checks import (
-    axis_words,
-    checked_reference,
-    checked_signal,
-    checked_units,
-    labelled,
-)
+from .record_checks import axis_words, checked_reference, checked_signal, checked_units, labelled
 from .record_conversions import RecordConversions
 from .resampling import MIN_SAMPLES
 

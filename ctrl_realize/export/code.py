@@ -95,11 +95,7 @@ def to_python(system: Any, path: str | os.PathLike[str], *, name: str | None = N
 
 
 def to_structured_text(
-    system: Any,
-    path: str | os.PathLike[str],
-    *,
-    name: str | None = None,
-    real: str = "LREAL",
+    system: Any, path: str | os.PathLike[str], *, name: str | None = None, real: str = "LREAL"
 ) -> Path:
     r"""Write a controller or plant as a function block in Structured Text (IEC 61131-3).
 

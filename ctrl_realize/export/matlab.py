@@ -22,11 +22,7 @@ FORMULAS = {"tustin": "Trapezoidal", "forward": "ForwardEuler", "backward": "Bac
 
 
 def to_matlab(
-    system: Any,
-    path: str | os.PathLike[str],
-    *,
-    name: str | None = None,
-    continuous: bool = False,
+    system: Any, path: str | os.PathLike[str], *, name: str | None = None, continuous: bool = False
 ) -> Path:
     """Write a model or controller as a script of MATLAB's Control System Toolbox.
 
@@ -112,12 +108,7 @@ def _process(model: ProcessModel, variable: str) -> str:
 
 
 def _state_space(
-    core: ct.StateSpace,
-    name: str,
-    variable: str,
-    dt: str,
-    before: list[float],
-    behind: list[float],
+    core: ct.StateSpace, name: str, variable: str, dt: str, before: list[float], behind: list[float]
 ) -> str:
     unit = "s" if dt == "0" else "samples"
     lines = [

@@ -16,16 +16,8 @@ from ..numerics.arrays import locked, read_only
 from ..numerics.constants import Z_95
 from ..numerics.engine.problem import Structure
 from ..numerics.engine.structures import Candidate
-from ..numerics.rational.frf_data import (
-    FRFData,
-    modal_state_space,
-    pole_deviations,
-)
-from ..numerics.rational.search import (
-    DEFAULT_ORDERS,
-    dead_time_bound,
-    fit_structures,
-)
+from ..numerics.rational.frf_data import FRFData, modal_state_space, pole_deviations
+from ..numerics.rational.search import DEFAULT_ORDERS, dead_time_bound, fit_structures
 from ..numerics.signals.noise import largest_excess
 from ..numerics.statistics import mixture_quantile
 from .comparison import hertz

@@ -21,9 +21,7 @@ Source = Literal["coherence", "std", "all"]
 
 
 def trusted_points(
-    points: MeasuredPoints,
-    min_coherence: float | None,
-    band_hz: tuple[float, float] | None,
+    points: MeasuredPoints, min_coherence: float | None, band_hz: tuple[float, float] | None
 ) -> tuple[BoolArray, Source]:
     """Mark the points of the trusted band, and name its criterion."""
     if min_coherence is not None:

@@ -128,11 +128,7 @@ def write_identification(
         subtitle="model with dead time" if system.fit is None else system.fit._method,
         verdict=verdict_of(system, comparison=comparison),
         sketches=identification_sketches(system, record, frf=frf, comparison=comparison),
-        tables=[
-            *fit_tables(system.fit),
-            *comparison_tables(comparison),
-            model_table(system),
-        ],
+        tables=[*fit_tables(system.fit), *comparison_tables(comparison), model_table(system)],
         records=[record],
         fit=system.fit,
         controller=_controller(system, controller, form),

@@ -6,11 +6,7 @@ import control as ct
 import numpy as np
 
 from .._parameters import Parameter, formula
-from .._wording import (
-    in_time,
-    poles_in_words,
-    times_in,
-)
+from .._wording import in_time, poles_in_words, times_in
 from ..delayed import DelayedStateSpace
 from ..design.models.conversions import to_continuous
 from ..errors import CtrlRealizeError

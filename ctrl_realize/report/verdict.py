@@ -17,13 +17,7 @@ from ..frequency.disagreement import CLOSE, FAR
 from ..identification.campaign.campaign import Campaign
 from ..identification.output_error.words import gain_scatter, sign_is_told
 from ..plots.delays import estimate_of, interval_of
-from .facts import (
-    INTEGRATING,
-    disagreement,
-    facts_of,
-    formula_of,
-    gain_of,
-)
+from .facts import INTEGRATING, disagreement, facts_of, formula_of, gain_of
 
 _CONTRADICTED = "frf_disagrees"
 

@@ -109,11 +109,7 @@ def _continuous(system: Any, controller: Any, given: tuple[float, float] | None)
 
 
 def over_interval(
-    plant: DelayedStateSpace,
-    loop: Loop,
-    found: Margins,
-    interval: tuple[float, float],
-    most: int,
+    plant: DelayedStateSpace, loop: Loop, found: Margins, interval: tuple[float, float], most: int
 ) -> DelayRobustness:
     """Vary the delay of the first factor of a loop, the plant; `found` are the nominal margins.
 

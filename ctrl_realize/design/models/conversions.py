@@ -136,10 +136,7 @@ class ContinuousModel(Result):
             f"{in_time(tau, 5)} ({tau / self.dt:.4g} samples)"
             for tau in dict.fromkeys(np.ravel(self.dead_time).tolist())
         )
-        return [
-            ("dead time", delays),
-            ("poles", f"{poles} rad/s" if poles else "none"),
-        ]
+        return [("dead time", delays), ("poles", f"{poles} rad/s" if poles else "none")]
 
     def __repr__(self) -> str:
         delays = ", ".join(f"{tau:.6g}" for tau in dict.fromkeys(np.ravel(self.dead_time).tolist()))

@@ -63,10 +63,7 @@ class KalmanPredictor(Result):
 
     def _rows(self) -> list[tuple[str, str]]:
         largest = float(np.abs(self.poles).max(initial=0.0))
-        return [
-            ("gain", in_numbers(self.gain)),
-            ("slowest pole", f"|z| = {largest:.4g}"),
-        ]
+        return [("gain", in_numbers(self.gain)), ("slowest pole", f"|z| = {largest:.4g}")]
 
     def __repr__(self) -> str:
         return f"<KalmanPredictor order {self.gain.shape[0]}>"

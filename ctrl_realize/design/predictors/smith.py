@@ -52,30 +52,18 @@ class SmithPredictor(CheckedController):
 
 @overload
 def smith_predictor(
-    system: DelaySystem,
-    controller: Any,
-    *,
-    filter_time: float | None = None,
-    name: str = "smith",
+    system: DelaySystem, controller: Any, *, filter_time: float | None = None, name: str = "smith"
 ) -> DelaySystem: ...
 
 
 @overload
 def smith_predictor(
-    system: ct.StateSpace,
-    controller: Any,
-    *,
-    filter_time: float | None = None,
-    name: str = "smith",
+    system: ct.StateSpace, controller: Any, *, filter_time: float | None = None, name: str = "smith"
 ) -> SmithPredictor: ...
 
 
 def smith_predictor(
-    system: Any,
-    controller: Any,
-    *,
-    filter_time: float | None = None,
-    name: str = "smith",
+    system: Any, controller: Any, *, filter_time: float | None = None, name: str = "smith"
 ) -> SmithPredictor | DelaySystem:
     """Make a Smith predictor for a controller designed for the delay-free core.
 
@@ -219,11 +207,7 @@ def _filter(seconds: float | None, plant: DelayedStateSpace, *, integrating: boo
 
 
 def _assemble(
-    plant: DelayedStateSpace,
-    primary: ct.StateSpace,
-    removed: Part,
-    kept: Part,
-    filter_: Filter,
+    plant: DelayedStateSpace, primary: ct.StateSpace, removed: Part, kept: Part, filter_: Filter
 ) -> tuple[Any, ...]:
     """Matrices of u = C v, v = F (e + y_d) - y_0, with states [x_c; x_d; x_F] and the line.
 
