@@ -114,7 +114,15 @@ def static_gain(
         axis=1,
     )
     errors = local_errors(problem, candidate, numerator, length)
-    gain_std, total_std, rate_std = errors.std(gradient, variance)
+    gain_std, _, rate_std = errors.std(gradient, variance)
+    if errors.tangent is None and theta.size > 1:
+        # A lag that no sample shows has a slope of nothing, but is one of those between a sample
+        # and the record: the standard deviation of a uniform distribution of its logarithm.
+        count = errors.slopes.shape[1] + errors.own.shape[1]
+        known = np.eye(count)[1 : theta.size] * np.sqrt(12 * variance) / np.log(problem.data.size)
+        slopes, own = np.split(known, [errors.slopes.shape[1]], axis=1)
+        errors = LocalErrors(np.vstack([errors.slopes, slopes]), np.vstack([errors.own, own]))
+    total_std = errors.std(gradient, variance)[1]
     gain, total, rate = (float(value) for value in steady_values(point, apart=True))
     slow = np.abs(candidate.poles)
     # An integrator has no slowest time constant, but a constant slope.
