@@ -56,15 +56,14 @@ def updates(output: FloatArray, inputs: FloatArray) -> BoolArray:
     Changes of an output (N,), NaN where it is missing, that is updated every few samples have
     distances with a common divisor, or about equal ones; one that is stored when it has changed
     enough has no small changes. Of these the first and last sample count as updates. Where an
-    output changes as the inputs (M, N) do, that explains it.
+    output is a monotonic function of one of the inputs (M, N) some samples before, its changes are
+    the input's.
     """
     changes, rounding = np.abs(np.diff(output)), rounding_error(output[np.isfinite(output)])
     at = 1 + np.flatnonzero(changes > rounding)  # not beside a missing one
     sizes, new = changes[at - 1], np.zeros(output.size, dtype=np.bool_)
-    moves = 1 + np.flatnonzero(np.any(np.diff(inputs) != 0, axis=0))
-    copied = np.array_equal(np.diff(at), np.diff(moves)[: max(at.size - 1, 0)])
     # Steps of one size are those of a converter, which an even ramp passes at equal distances.
-    if at.size < _FEWEST or np.ptp(sizes) <= rounding or copied:
+    if at.size < _FEWEST or np.ptp(sizes) <= rounding or _static(output, inputs, at, rounding):
         return ~new
     period = int(np.gcd.reduce(np.diff(at)))
     if period > 1 and at.size >= _FEWEST_UPDATES:
@@ -79,6 +78,23 @@ def updates(output: FloatArray, inputs: FloatArray) -> BoolArray:
     large = sizes.min() > _BAND * np.nanmax(output) - _BAND * np.nanmin(output)
     even = np.diff(at).max() <= _EVEN * np.median(np.diff(at)) and at.size >= _FEWEST_UPDATES
     return new if rare and various and (large or even) else np.ones_like(new)
+
+
+def _static(output: FloatArray, inputs: FloatArray, at: IntArray, rounding: float) -> bool:
+    """Whether the first changes are those of a gain behind a dead time, which may saturate.
+
+    It changes at half of the input's moves at least: one that is held moves at more of them.
+    """
+    if np.count_nonzero(np.diff(inputs).any(axis=0)) > 2 * at.size:
+        return False
+    some = at[:_FEWEST_UPDATES]
+    levels = inputs[:, some - np.arange(some[0] + 1)[:, None]]  # inputs, dead times, changes
+    order = np.argsort(levels, axis=-1, kind="stable")
+    way = np.diff(output[some][order])
+    same = np.diff(np.take_along_axis(levels, order, axis=-1)) == 0
+    alone = np.all((np.abs(way) <= rounding) | ~same, axis=-1)
+    one_way = np.all(way >= -rounding, axis=-1) | np.all(way <= rounding, axis=-1)
+    return bool(np.any(alone & one_way))
 
 
 def longest_hold(output: FloatArray, fitted: FloatArray) -> int:

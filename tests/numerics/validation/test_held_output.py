@@ -101,4 +101,12 @@ def test_noise_steps_of_a_converter_an_even_ramp_and_a_gain_are_no_updates():
     for output in (noisy, coarse, tacho, RISE, ramp, np.zeros(300)):
         assert updates(output, STEP).all()
     levels = np.repeat(rng.uniform(-1, 1, 30), 10)
-    assert updates(2 * np.append(np.zeros(12), levels[:-12]), levels[None]).all()
+    gain = 2 * np.append(np.zeros(12), levels[:-12])
+    assert updates(gain, levels[None]).all()
+    assert updates(np.clip(gain, -1.5, 1.5), levels[None]).all()
+
+
+def test_held_output_beside_a_curve_that_it_follows_is_no_gain():
+    curve, new = (TIME / 100.0) ** 2, TIME % 10 == 0
+    held = curve[np.maximum.accumulate(np.where(new, TIME, 0))]
+    assert np.array_equal(updates(held, curve[None]), new)
