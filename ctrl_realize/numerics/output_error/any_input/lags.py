@@ -101,15 +101,13 @@ def fit_lags(data: SampledData, requested: Requested) -> tuple[SampledWindow, Ou
     left: tuple[FloatArray, ...] = ()
     early = 0.0
     for turn in range(_TURNS):
-        made = _turn(data, forms, within, noise, left, early, fitted)
-        most = noise_lags(min(made.part.data.counts)) if requested.whiten else 0
-        following = whitening_filter(np.concatenate(made.errors), most)
-        if turn == 0 and following.size > 1:
-            slow = _turn(data, forms, within, _SLOW, left, early, fitted)
+        fit = partial(_turn, data, forms, requested.whiten, within, left, early, fitted)
+        made = fit(noise)
+        if turn == 0 and made.noise.size > 1:
+            slow = fit(_SLOW)
             count = min(*made.part.data.counts, *slow.part.data.counts)
             made = min(made, slow, key=lambda one: _unlikely(one.errors, count))
-            following = whitening_filter(np.concatenate(made.errors), most)
-        part, fitted, best, errors = made
+        part, fitted, best, errors, following = made
         alike = following.size == noise.size and np.abs(following - noise).max() <= _ALIKE
         if (turn and alike) or turn == _TURNS - 1:
             break
@@ -164,29 +162,36 @@ def fit_lags(data: SampledData, requested: Requested) -> tuple[SampledWindow, Ou
 
 
 class _Turn(NamedTuple):
-    """Records with a fit, lags that were fitted, the best, and what it leaves of every record."""
+    """Records with a fit, lags that were fitted, the best, what it leaves, and noise like that."""
 
     part: SampledWindow
     fitted: list[Candidate]
     best: Candidate
     errors: list[FloatArray]
+    noise: FloatArray
 
 
 def _turn(
     data: SampledData,
     forms: Sequence[ProcessForm],
+    whiten: bool,
     within: tuple[float, float],
-    noise: FloatArray,
     left: tuple[FloatArray, ...],
     early: float,
     like: Sequence[Candidate],
+    noise: FloatArray,
 ) -> _Turn:
-    """Fit lags in given noise."""
+    """Fit lags in given noise, and find the noise that they leave."""
     # Huber's loss would pull the data towards one lag.
     part = fit_windows(data, (Structure(1, 1),), within, False, noise, left, early)
     fits, fitted = _fitted(part.fit, forms, like)
     best = _plain(min(fitted, key=partial(_value, fits)))
-    return _Turn(replace(part, fit=fits), fitted, best, _left(part, best))
+    part = replace(part, fit=fits)
+    errors = _left(part, best)
+    following = whitening_filter(
+        np.concatenate(errors), noise_lags(min(part.data.counts)) if whiten else 0
+    )
+    return _Turn(part, fitted, best, errors, following)
 
 
 def _unlikely(errors: Sequence[FloatArray], count: int) -> float:
