@@ -11,6 +11,7 @@ import numpy as np
 from .._checks import numbers
 from .._wording import in_time, interval_in_time, time_and_interval, time_within
 from ..numerics.arrays import ComplexArray, FloatArray
+from ..numerics.constants import Z_95
 from ..results import Flag, FractionalDelayFit, IntervalKind
 
 if TYPE_CHECKING:
@@ -186,16 +187,18 @@ class FRFFit(FractionalDelayFit):
         size = f"{self.weighted_rms:.3g} x"
         if not self.noise_known:
             size = f"{100 * self.weighted_rms:.3g} % of"
-        hold = []
+        hold, unknown = [], ""
+        if np.any(Z_95 * self.pole_std[:1] > np.abs(self.poles[:1])):
+            unknown = f"not determined from {self.frequency_hz[0]:.4g} Hz on"
         if self.hold_time is not None:
             hold.append(("hold", f"zero-order hold of {in_time(self.hold_time)}, divided out"))
         return [
             ("dead time", f"{time_within(self.dead_time, *self.interval)}, {self._std_in_words()}"),
             ("95 % interval", interval_in_time(*self.interval)),
-            ("total delay at DC", in_time(self.total_delay, 5)),
+            ("total delay at DC", unknown or in_time(self.total_delay, 5)),
             ("structure", f"order {self.order}, relative degree {self.relative_degree}"),
             ("poles", ", ".join(shown) or "none"),
-            ("gain", f"{self.gain:.5g}"),
+            ("gain", unknown or f"{self.gain:.5g}"),
             ("points", f"{self.frequency_hz.size}, {ends}"),
             ("weighted residual", f"{size} {unit}"),
             *hold,

@@ -34,9 +34,11 @@ from ..engine.structures import Candidate, Scales, parameter_bounds
 from ..signals.sines import HeldSines, Sines, stacked_parts
 
 _FIRST_ITERATIONS = 10  # after which the starts are compared, and the best ones go on
-_BEYOND, _SHARPEST, _DULLEST = 100.0, 1e-4, 1e3
+_BEYOND, _INTEGRATES, _SHARPEST, _DULLEST = 100.0, 1e4, 1e-4, 1e3
 """Of poles of a frequency response: times beyond the band, and damping of a pair. A pole farther
-away turns the phase by 0.6 degrees at most."""
+away turns the phase by 0.6 degrees at most. One that stands for an integrator is slower still, as
+one of a dull pair is: of nine intervals of an integrator seven missed the dead time, since second
+poles made up for 0.6 degrees."""
 _LEAST_INFORMATION = 1e-10
 """Singular value, over the largest, of scaled columns that is rounding: the data do not determine
 the parameter."""
@@ -93,12 +95,17 @@ class FRFData:
 
     def _bounds(self, order: int) -> Bounds:
         """Poles two decades beyond the band, resonances sharper than a record can show them."""
-        slow = float(np.log(self.omega.min() / _BEYOND))
+        slow = float(np.log(self.omega.min() / (_INTEGRATES if order == 1 else _BEYOND)))
         fast = float(np.log(self.omega.max() * _BEYOND))
         pairs, single = order // 2, order % 2
         low = [0.0, *[slow] * single, *[slow, np.log(_SHARPEST)] * pairs]
         high = [self.max_dead_time, *[fast] * single, *[fast, np.log(_DULLEST)] * pairs]
         return Bounds(np.array(low), np.array(high), smooth=True)
+
+    def poles_to_grow(self, fit: Candidate) -> ComplexArray:
+        """Poles (n,) from which larger orders start: those have no integrator of their own."""
+        slowest = float(self.omega.min()) / _BEYOND if fit.structure.order == 1 else 0.0
+        return np.asarray(fit.poles * np.maximum(slowest / np.abs(fit.poles), 1.0))
 
     def at(self, fit: Candidate) -> Evaluation:
         """Evaluate the problem at a fit, as a batch of one."""

@@ -15,6 +15,7 @@ References
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -92,6 +93,12 @@ def fit_structures(
                 fits[Structure(n, r)] = _fit_one(data, ladder, fits, Structure(n, r))
     if orders is None:
         _with_larger_orders(data, ladder, fits, degrees)
+    # One zero more is never worse: what is was caught beside the minimum.
+    for structure in sorted(fits, key=lambda one: -one.relative_degree):
+        fewer = fits.get(Structure(structure.order, structure.relative_degree + 1))
+        if fewer is not None and fewer.cost < fits[structure].cost:
+            there = Candidate(structure, fewer.parameters, fewer.cost)
+            fits[structure] = replace(there, cost=float(data.at(there).cost[0]))
     criteria = information_criteria(data, fits)
     least = min(criteria.values())
     for structure, value in criteria.items():
@@ -163,7 +170,7 @@ def _fit_one(
     if (freer := fits.get(Structure(n, r - 1))) is not None:
         tried.append(freer.parameters)
     if (smaller := fits.get(Structure(n - 1, r - 1))) is not None:
-        poles = np.append(smaller.poles, -3.0 * data.omega.max())
+        poles = np.append(data.poles_to_grow(smaller), -3.0 * data.omega.max())
         tried.append(np.append(smaller.dead_time, parameters_from_poles(poles)))
     return refined(data, structure, tried, _KEPT)[0]
 

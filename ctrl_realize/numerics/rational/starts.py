@@ -211,8 +211,9 @@ def grown_starts(data: FRFData, smaller: Candidate, order: int) -> list[FloatArr
     else:
         turned = [w * complex(-z, np.sqrt(1 - z * z)) for w in places for z in _DAMPINGS]
         added = [[p, p.conjugate()] for p in turned]
+    poles = data.poles_to_grow(smaller)
     trials = [
-        np.append(smaller.dead_time, parameters_from_poles(np.append(smaller.poles, more)))
+        np.append(smaller.dead_time, parameters_from_poles(np.append(poles, more)))
         for more in added
     ]
     starts, cost = _costs(data, order, trials)
