@@ -181,3 +181,8 @@ def test_a_robust_closed_loop_time_is_as_long_as_the_data_ask_for():
     assert found[8][0].kp > found[8][1].kp
     with pytest.raises(cr.errors.OptionError, match=r"rule='amigo'; expected one of simc"):
         cr.design.pid(truth, "amigo", closed_loop_time="robust")
+
+
+def test_cohen_and_coon_have_no_pd_beyond_three_lags():
+    with pytest.raises(cr.errors.UnsuitableSystemError, match="below 3 lags; this model has 5"):
+        cr.design.pid(cr.design.ProcessModel(1, 1, 5), "cohen_coon", "PD")

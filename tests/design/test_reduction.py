@@ -143,3 +143,15 @@ def test_integrators_and_unstable_poles_are_kept(cores):
         z = np.exp(1j * np.array([0.1, 1.0]))
         error = np.abs(small.delay_free(z) - cores[kind](z)).max()
         assert error <= small.fit.error_bound * (1 + 1e-9)
+
+
+def test_a_plant_without_dead_time_has_none_and_one_without_gain_is_refused():
+    """1.1e-5 s was left by the optimizer, and the gain of SIMC was 22470."""
+    lag = ct.tf([2], [1, 1])
+    assert cr.design.reduce_fopdt(lag).dead_time == 0.0
+    with pytest.raises(cr.errors.OptionError, match="the model has no dead time"):
+        cr.design.pid(lag, "simc")
+    washout = ct.tf([1, 0], [1, 2, 1]) * cr.delay(0.1)
+    for plant in (washout, washout.to_discrete(0.05)):
+        with pytest.raises(cr.errors.UnsuitableSystemError, match="the static gain is"):
+            cr.design.reduce_fopdt(plant)

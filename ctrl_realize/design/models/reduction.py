@@ -30,7 +30,8 @@ FIT_POINTS = 1500
 NO_LAG = 1e-3
 """Share of the total time below which the last lag of a fit is its remainder, and counts as dead
 time. The step response then changes by 5e-6 to 5e-5 of the gain (root mean square, measured for
-dead times of 0.05 to 10 lags)."""
+dead times of 0.05 to 10 lags). A dead time that is so near to the least one is that."""
+_ROUNDED = 1e-9  # gain over the largest value of a step response, that is rounding
 
 
 @single_threaded
@@ -195,9 +196,10 @@ def _step_record(plant: DelayedStateSpace) -> tuple[FloatArray, FloatArray, bool
     count = int(min(MOST_SAMPLES, plant.delay * 1.5 + settling + 20))
     step = plant.step(count)
     gain = _slope(core) if integrating else float(np.real(core.dcgain()))
-    if gain == 0 or not np.isfinite(gain):
+    reached = abs(gain) * (count * dt if integrating else 1.0)
+    if not np.isfinite(gain) or reached <= _ROUNDED * np.abs(step).max():
         raise UnsuitableSystemError(
-            f"the static gain is {gain:g}, so it cannot be approximated by this model"
+            f"the static gain is {gain:.2g}, so it cannot be approximated by this model"
         )
     stride = max(1, count // FIT_POINTS)
     return np.arange(count)[::stride] * dt, step[::stride], integrating, float(gain)
@@ -270,7 +272,8 @@ def _by_fit(
         found = least_squares(deviation, start, bounds=(lower, upper), x_scale=total)
         if best is None or found.cost < best.cost:
             best = found
-    lag, second, dead_time = unpack(best.x)
+    lag, second, later = unpack(best.x)
+    dead_time = later if later - dead_time >= NO_LAG * total else dead_time
     last = lag if integrating else second
     if last < NO_LAG * total:
         dead_time += last

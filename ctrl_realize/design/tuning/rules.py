@@ -109,6 +109,11 @@ def cohen_coon(model: ProcessModel, kind: str, closed_loop_time: float | None) -
     _needs_lag(model, "cohen_coon")
     L = _dead_time(model, "cohen_coon")
     r, a = L / model.lag, model.gain * L / model.lag
+    if kind == "PD" and r >= 3:
+        raise UnsuitableSystemError(
+            f"rule 'cohen_coon' has a PD for dead times below 3 lags; this model has {r:.3g}. Use "
+            "P, PI or PID, or rule='optimal'"
+        )
     return {
         "P": ((1 + r / 3) / a, INF, 0.0),
         "PI": ((0.9 + r / 12) / a, L * (30 + 3 * r) / (9 + 20 * r), 0.0),
