@@ -14,7 +14,7 @@ from ..numerics.arrays import FloatArray
 from ..numerics.signals.counters import clock_change, clock_unit
 from .columns import holds_numbers
 from .tables import Table
-from .text.dates import direction, have_offset, in_utc, stamps_of
+from .text.dates import Dates, direction, have_offset, in_utc, stamps_of
 from .units import checked_time_unit, plain_unit, sample_time_unit, to_seconds, unit_named
 
 # from here on neighbouring integers are the same double
@@ -82,9 +82,12 @@ def time_axis(table: Table, index: int, clock: Clock, date: int | None = None) -
     named = table.columns[index].told_unit or unit_named(table.columns[index].name)
     if time_format is not None or not holds_numbers(table, index):
         unit_used = named if unit == "auto" else unit
-        stamps, doubt = _parsed_dates(table, index, time_format, unit_used, date)
+        dates = _parsed_dates(table, index, time_format, unit_used, date)
         shown = None if have_offset(str(cells[0]).strip()) else zone
-        return _since_first(table, index, stamps, shown)._replace(doubt=doubt, zone=zone)
+        if dates.other is not None:
+            _refuse_other_clock(table, index, dates, shown)
+        axis = _since_first(table, index, dates.stamps, shown)
+        return axis._replace(doubt=dates.doubt, zone=zone)
     if zone is not None:
         _refuse_zone(table, index, zone)
     if unit == "auto" and cells.dtype.kind in "iu" and _FILETIME[0] < cells[0] < _FILETIME[1]:
@@ -177,9 +180,32 @@ def _since_first(
     return TimeAxis(seconds, stamps[0] if stamps.dtype.kind == "M" else None, zone=zone)
 
 
+def _refuse_other_clock(table: Table, index: int, dates: Dates, zone: str | None) -> None:
+    """Refuse dates of which one reading alone is of a day on which the clock is set.
+
+    Raises
+    ------
+    OptionError
+    """
+    hours = []
+    for stamps in (dates.stamps, dates.other):
+        try:
+            clock = np.asarray(stamps) if zone is None else in_utc(np.asarray(stamps), zone)
+        except DataError:
+            hours.append(np.inf)  # not a day of that clock
+        else:
+            moved = clock_change(clock[:: direction(clock)])[1] if zone is None else 0
+            hours.append((clock[-1] - clock[0]) / np.timedelta64(1, "h") - moved)
+    if hours[0] != hours[1]:
+        raise OptionError(
+            f"{table.path}: {table.title(index)}: the clock is set for summer time on one of two "
+            f"possible days: {dates.doubt}"
+        )
+
+
 def _parsed_dates(
     table: Table, index: int, time_format: str | None, unit: str, date: int | None
-) -> tuple[np.ndarray[Any, Any], str]:
+) -> Dates:
     cells = [_PART.sub(".", str(cell).strip()) for cell in table.columns[index].cells]
     if time_format is None:
         cells = [cell.replace(",", ".") for cell in cells]
@@ -187,23 +213,23 @@ def _parsed_dates(
         days = [str(cell).strip() for cell in table.columns[date].cells]
         cells = [f"{day} {cell}" for day, cell in zip(days, cells, strict=True)]
     elif time_format is None and all(re.fullmatch(_CLOCK, cell) for cell in cells[:3]):
-        return _parsed_times_of_day(table, index, cells, unit), ""
+        return Dates(_parsed_times_of_day(table, index, cells, unit), "")
     try:
         if time_format is None and all(re.match(r"-?\d+ days?\b", cell) for cell in cells[:3]):
-            stamps, form, doubt = _durations(cells), "0 days 00:00:00", ""
+            dates = Dates(_durations(cells), "0 days 00:00:00")
         else:
-            stamps, form, doubt = stamps_of(cells, time_format)
+            dates = stamps_of(cells, time_format)
     except OptionError as error:
         raise OptionError(f"{table.path}: {table.title(index)}: {error}") from error
-    bad = np.isnat(stamps)
+    bad = np.isnat(dates.stamps)
     if bad.any():
         row = int(np.argmax(bad))
         raise DataError(
             f"{table.path}: {table.title(index)}, {table.place(row)}: {cells[row][:60]!r} is "
-            f"neither a number nor a time in the format {form}; give time_format=, or dt= to "
+            f"neither a number nor a time in the format {dates.form}; give time_format=, or dt= to "
             "ignore the column"
         )
-    return stamps, doubt
+    return dates
 
 
 def _durations(cells: Sequence[str]) -> np.ndarray[Any, Any]:

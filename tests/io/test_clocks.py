@@ -1,6 +1,7 @@
 """What a time column means: its unit, its zone, how times are said; and counters that turn."""
 
 import re
+import warnings
 
 import numpy as np
 import pandas as pd
@@ -191,6 +192,32 @@ def test_a_test_of_minutes_in_which_the_clock_is_set_back(tmp_path, first, order
     with pytest.warns(DataWarning, match="set back by an hour for summer time"):
         np.testing.assert_array_equal(cr.read_record(path).time, t[:360])
     np.testing.assert_array_equal(cr.read_record(path, time_zone="Europe/Berlin").time, t[:360])
+
+
+@pytest.mark.parametrize("first", ["2026-03-08 06:10", "2026-11-01 05:30"])
+def test_a_night_of_the_change_tells_that_day_and_month_matter(tmp_path, first):
+    """Both readings have equal distances: a gap of an hour in March made 3663 s of 63 s."""
+    path, form = tmp_path / "a.csv", "%m/%d/%Y %I:%M:%S %p"
+    t = logged(path, "America/New_York", pd.Timestamp(first, tz="UTC"), form, 10.0)
+    rows = path.read_text().splitlines()[:601]
+    path.write_text("\n".join(rows) + "\n")
+    for options in ({}, {"time_zone": "America/New_York"}):
+        with pytest.raises(OptionError, match=r"one of two possible days: .* time_format="):
+            cr.read_record(path, **options)
+    told = cr.read_record(path, time_zone="America/New_York", time_format=form)
+    np.testing.assert_array_equal(told.time, t[:600])
+
+
+@pytest.mark.parametrize("dt", [5.0, 10.0, 20.0, 60.0])
+def test_days_of_a_spreadsheet_with_few_digits_have_the_sample_time(tmp_path, dt):
+    """Steps of 0.864 s: their median is 4 % off."""
+    path = tmp_path / "a.csv"
+    days = [f"{46000.25 + k * dt / 86400:.5f},{k % 7},{k}" for k in range(400)]
+    path.write_text("\n".join(["day,u,y", *days]) + "\n")
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", DataWarning)  # stamps of 5 s are irregular, others not
+        record = cr.read_record(path, time="day", time_unit="day")
+    assert record.sample_time == pytest.approx(dt, rel=1e-3)
 
 
 def test_tags_in_a_long_table_share_the_hour_that_comes_twice(tmp_path):

@@ -33,13 +33,14 @@ weeks where the days change."""
 class Dates(NamedTuple):
     """Time stamps, NaT where a cell is none.
 
-    ``form`` is their format in words; ``doubt`` tells if they may be other dates, with the same
-    distances between them.
+    ``form`` is their format in words; ``doubt`` tells if they may be the `other` dates, with the
+    same distances between them.
     """
 
     stamps: Stamps
     form: str
     doubt: str = ""
+    other: Stamps | None = None
 
 
 def stamps_of(cells: list[str], time_format: str | None) -> Dates:
@@ -69,7 +70,7 @@ def stamps_of(cells: list[str], time_format: str | None) -> Dates:
         f"time_format={formats[0]!r} or {formats[1]!r}"
     )
     if np.array_equal(*(one - one[0] for one in read)):
-        return Dates(read[0], formats[0], doubt)
+        return Dates(read[0], formats[0], doubt, read[1])
     regular = [_is_regular(one) for one in read]
     if sum(regular) != 1:
         raise OptionError(doubt)

@@ -69,6 +69,8 @@ def usual_step(stamps: FloatArray) -> float:
     """
     steps = np.diff(stamps)
     low, usual, high = (float(q) for q in np.quantile(steps, [0.05, 0.5, 0.95]))
+    if high - low > _ROUNDED * usual and 0.5 * usual < steps.min() and steps.max() < 1.5 * usual:
+        usual = float(steps.mean())  # stamps are rounded, and none is missing: so is the median
     within = min((high - low) / 2, _ROUNDED * usual)
     short = (float(f"{usual:.{digits}g}") for digits in range(1, 7))
     return next((one for one in short if abs(one - usual) < within), without_rounding(usual))
