@@ -243,6 +243,7 @@ COLUMNS = {  # names of columns, and which of them are input and output; None is
     "one left beside a set-point": ("CO,Setpoint,Temp", 0, 2),
     "a controller's output and its valve": ("OP,MV,PV", None, None),
     "two loops": ("A_PV,B_PV,OP", 2, None),
+    "two loops with dots": ("A.PV,B.PV,OP", 2, None),
 }
 
 

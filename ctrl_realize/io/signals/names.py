@@ -27,7 +27,7 @@ from ..columns import (
     plain_name,
 )
 from ..tables import Column, Table
-from ..units import TIME_UNITS, is_no_time, plain_unit, sample_time_unit, to_seconds
+from ..units import TIME_UNITS, is_no_time, plain_unit, sample_time_unit, split_unit, to_seconds
 
 NAMES = {key: frozenset(words) for key, words in facts("io/words.toml")["columns"].items()}
 """Names of columns by what they hold, and the last parts of tags, such as ``TIC101_PV``."""
@@ -144,9 +144,14 @@ def _signals(table: Table, kind: str, taken: Sequence[int], loop: bool) -> list[
     found = named(table, names, taken) or _tagged(table, NAMES[f"{kind}_tag"], taken)
     if not found and _tagged(table, NAMES[f"{other}_tag"], ()):
         found = _tagged(table, NAMES["either_tag"], taken)
-    families = {family(table.columns[k].name) for k in found}
-    # channels have one name with numbers; two different names of a loop are two candidates
-    if len(families) > 1 and families & (NAMES["input_tag"] | NAMES["output_tag"]):
+    own_names = [table.columns[k].name for k in found]
+    families = {family(name) for name in own_names}
+    loops = {split_unit(name)[0].rpartition(".")[0] for name in own_names}
+    # channels have one name with numbers; two different names of a loop are two candidates, and so
+    # are equal ones of two loops
+    if (len(families) > 1 or len(loops) > 1) and families & (
+        NAMES["input_tag"] | NAMES["output_tag"]
+    ):
         raise ambiguous(table, found, f"the {kind}", kind)
     return found
 
