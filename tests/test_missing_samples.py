@@ -8,7 +8,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from scipy.signal import lfilter
 
 import ctrl_realize as cr
-from ctrl_realize.errors import DataError, OptionError, TimeAxisError
+from ctrl_realize.errors import DataError, DataWarning, OptionError, TimeAxisError
 
 RNG = np.random.default_rng(20261123)
 SOME = np.sort(RNG.choice(1000, 700, replace=False))
@@ -187,6 +187,19 @@ def test_dead_sensors_and_outliers_of_operating_data_are_named():
     coded[[100, 400]] = -9999.0
     with pytest.raises(DataError, match=r"2 sample.s., the first at index .*, are -9999"):
         flags(coded)
+
+
+@pytest.mark.parametrize("rows", [slice(101, 102), slice(200, 215)])
+def test_a_code_in_the_input_of_a_file_is_named(tmp_path, rows):
+    """One of 300 rows made a gain of -0.00014 of one of 1.5, and no word said why."""
+    t = 10.0 * np.arange(300)
+    u = np.where(t < 500, 40.0, 50.0)
+    u[rows] = -9999
+    path = tmp_path / "a.csv"
+    table = np.stack([t, u, np.where(t < 563, 20.0, 35.0)], axis=1)
+    np.savetxt(path, table, delimiter=",", header="t,u,y", comments="")
+    with pytest.warns(DataWarning, match=r"u is -9999 in \d+ of 300 samples.*; na_values=-9999"):
+        cr.read_record(path)
 
 
 def test_a_response_that_begins_in_a_gap_is_named_and_the_interval_holds():

@@ -11,7 +11,7 @@ from ..._wording import in_time, plainly
 from ...numerics.arrays import FloatArray
 from ...numerics.constants import SMALLEST
 from ...numerics.signals.jumps import swapped
-from ...numerics.signals.noise import winsorised_sigma
+from ...numerics.signals.noise import BEYOND, far_value, winsorised_sigma
 from ...numerics.validation.held_output import held_share, longest_hold, stuck_samples
 from ...numerics.validation.limits import at_limit
 from .result import OutputErrorFit
@@ -20,7 +20,6 @@ _HELD = 0.5
 """Fraction of moving samples that repeat the previous one, above which an output counts as held;
 noise of one quantisation step repeats 28 %. Ablation: held output."""
 # The following thresholds for flags are a matter of presentation.
-_BEYOND = 20.0  # ranges: no overshoot goes as far
 _OUTLIER = 5.0  # standard deviations: Gaussian noise has none of a million samples beyond
 _MANY = 0.002  # of the samples beyond, from which on they are named
 _GAP = 3.0  # usual distances of samples that a gap has at least
@@ -69,13 +68,11 @@ def outliers(output: FloatArray, off: FloatArray, time: FloatArray) -> Iterator[
 
 def missing_code(output: FloatArray) -> Flag | None:
     """Find a single value far beyond all others, as loggers write for missing samples."""
-    low, high = np.percentile(output, [1, 99])
-    beyond = _BEYOND * (high - low)
-    far = np.flatnonzero((output < low - beyond) | (output > high + beyond))
-    if not far.size or high == low or np.ptp(output[far]) > 0:
+    far = far_value(output)
+    if not far.size:
         return None
     value = output[far[0]]
-    return flagged("outliers.code", count=far.size, first=far[0], value=value, limit=_BEYOND)
+    return flagged("outliers.code", count=far.size, first=far[0], value=value, limit=BEYOND)
 
 
 def hold_time(output: FloatArray, fitted: FloatArray, dt: float) -> tuple[float, Flag] | None:

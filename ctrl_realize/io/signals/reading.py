@@ -14,7 +14,8 @@ import numpy as np
 from ..._checks import one_of, positive
 from ...data import Record
 from ...data.samples import COARSE, Samples
-from ...errors import DataError, OptionError, TimeAxisError
+from ...errors import DataError, DataWarning, OptionError, TimeAxisError, warn_caller
+from ...numerics.signals.noise import far_value
 from ..frf import parts_of_frf
 from ..read import read_table
 from ..tables import Table
@@ -107,7 +108,21 @@ def record_of(table: Table, how: Reading, name: str, taken: Sequence[int] = ()) 
         raise TimeAxisError(_explained(error, table, samples)) from error
     except DataError as error:
         raise DataError(f"{table.path}: {error}") from error
+    _warn_of_codes(table, record)
     return record if how.rest is None else record.with_baseline(*how.rest)
+
+
+def _warn_of_codes(table: Table, record: Record) -> None:
+    """Tell inputs with nines far from all else: what a code did to an output is told by its fit."""
+    for label, values in zip(record.input_labels, np.atleast_2d(record.input), strict=True):
+        far = far_value(values)
+        if far.size and set(f"{abs(values[far[0]]):.0f}") == {"9"}:
+            code = f"{values[far[0]]:g}"
+            warn_caller(
+                f"{table.path}: {label} is {code} in {far.size} of {values.size} samples, far from "
+                f"all others; na_values={code} if that stands for a missing value",
+                DataWarning,
+            )
 
 
 @np.errstate(over="ignore", invalid="ignore")  # the largest doubles

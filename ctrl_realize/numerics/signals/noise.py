@@ -40,6 +40,7 @@ FAR, _LEAST = 50.0, 0.1
 """Standard deviations of a spike, and part of the range of the other samples. Four among 400 of 100
 deviations and half of a response move its dead time by 0.1 samples, smaller ones do not. Ablation:
 spikes left out."""
+BEYOND = 20.0  # ranges of the other samples, from which on a value is no signal's: no overshoot is
 LONG_REST = 50  # samples that are enough to tell the noise, to a tenth, and a slope
 _TURNS = 3  # of the line, and of the limits about it
 _MOST_OF_A_LINE = 45.0
@@ -278,6 +279,15 @@ def spikes(output: FloatArray, fitted: FloatArray) -> BoolArray:
     noise = max(mad_sigma(error), 0.5 * quantisation_step(output))
     limit = max(FAR * noise, _LEAST * float(np.ptp(middle)), rounding_error(output))
     return np.asarray(np.minimum(np.abs(error), np.abs(alone)) > limit)
+
+
+def far_value(values: FloatArray) -> IntArray:
+    """Samples of a single value far beyond all others, as loggers write for missing samples."""
+    for end in (np.nanmin(values), np.nanmax(values)):
+        others = values[(values != end) & np.isfinite(values)]
+        if others.size and np.abs(others - end).min() > BEYOND * np.ptp(others) > 0:
+            return np.flatnonzero(values == end)
+    return np.empty(0, dtype=np.int64)
 
 
 def largest_excess(values: FloatArray) -> tuple[int, int]:
