@@ -14,11 +14,14 @@ from .._wording import times_in
 from ..actuators.plain import Plain, to_plain
 from ..errors import FileFormatError
 from ..identification.output_error.actuated.result import ActuatorFit
+from ..identification.plausible import PlausibleModels
 from ..identification.verdicts import Verdict
+from ..numerics.engine.plausible_models import PlausibleModel
 from ..results import INTERVAL_LABELS, Flag, IntervalKind, ModelFit
 from .json_content import field, of_kind
 
 Ends = tuple[float, float]
+Numbers = tuple[float, ...]
 _KEPT: dict[str, Any] = {
     "delay": float, "order": int, "dead_time": float, "dead_time_interval": Ends, "interval": Ends,
     "delay_interval": Ends, "total_delay": float, "total_delay_interval": Ends, "gain": float,
@@ -26,6 +29,7 @@ _KEPT: dict[str, Any] = {
     "interval_kind": IntervalKind, "residual_std": float, "sampling": str, "integrators": int,
     "input_unit": str, "output_unit": str, "parameters": tuple[Parameter, ...],
     "actuator": ActuatorFit, "verdicts": tuple[Verdict, ...],
+    "plausible_models": tuple[float, tuple[tuple[float, Numbers, Numbers, Numbers], ...]],
 }  # fmt: skip
 """Attributes of a `ModelFit` that are stored -> their kinds; also the keys in the file."""
 _ABSENT = {"integrators": 0, "input_unit": "", "output_unit": "", "parameters": (), "verdicts": ()}
@@ -112,6 +116,8 @@ def _read(summary: FitSummary, key: str) -> Any:
         return absent
     try:
         found = of_kind(value, _KEPT[key])
+        if key == "plausible_models":
+            return _drawn(*found)
     except (TypeError, ValueError) as error:
         if key == "actuator":  # without it the model would be simulated as another one
             raise FileFormatError(f"'actuator' of 'fit': {error}; save the model again") from error
@@ -121,6 +127,15 @@ def _read(summary: FitSummary, key: str) -> Any:
         if not 0 <= first <= last or (key in _TIMES and last == math.inf):
             return absent
     return found
+
+
+def _drawn(dt: float, models: tuple[tuple[float, Numbers, Numbers, Numbers], ...]) -> Any:
+    """Models of dead time, poles (real and imaginary parts) and numerator."""
+    every = [
+        PlausibleModel(dead_time, np.array(real) + 1j * np.array(imag), np.array(numerator))
+        for dead_time, real, imag, numerator in models
+    ]
+    return PlausibleModels(tuple(every), dt)
 
 
 def _stored(key: str) -> property:
@@ -139,7 +154,8 @@ def summary_of(fit: ModelFit | None) -> FitSummary | None:
     """Reduce any fit to plain numbers and text."""
     if fit is None or isinstance(fit, FitSummary):
         return fit
-    values = {key: _plain(getattr(fit, key)) for key in _KEPT if key != "actuator"}
+    own = ("actuator", "plausible_models")
+    values = {key: _plain(getattr(fit, key)) for key in _KEPT if key not in own}
     for key in ("std_given_structure", "fit_percent"):  # of some fits
         values[key] = _plain(getattr(fit, key, None))
     values["time_unit"], values["method"] = fit._record_unit, fit._method
@@ -148,6 +164,11 @@ def summary_of(fit: ModelFit | None) -> FitSummary | None:
         values["formula"] = fit.formula
     if fit.actuator is not None:
         values["actuator"] = _actuator_row(fit.actuator)
+    if (drawn := fit.plausible_models) is not None:
+        every = [
+            (one.dead_time, one.poles.real, one.poles.imag, one.numerator) for one in drawn.models
+        ]
+        values["plausible_models"] = _plain((drawn.dt, every))
     with times_in(fit.time_unit):
         rows = tuple((str(label), str(value)) for label, value in fit._rows())
         title = fit._title()

@@ -236,11 +236,34 @@ def test_a_model_that_was_loaded_is_saved_as_it_was_and_keeps_its_interval(tmp_p
     save_model(tmp_path / "a.json", system)
     again = load_model(tmp_path / "a.json")
     assert again.fit.dead_time_interval == system.fit.dead_time_interval
+    drawn, stored = (one.fit.plausible_models.models for one in (system, again))
+    for each, other in zip(drawn, stored, strict=True):
+        assert each.dead_time == other.dead_time
+        assert_array_equal(each.poles, other.poles)
+        assert_array_equal(each.numerator, other.numerator)
     pi = cr.design.pid(system)
     told = [cr.design.delay_robustness(each, pi).report() for each in (system, again)]
     assert told[0] == told[1]
     save_model(tmp_path / "b.json", again)
     assert (tmp_path / "a.json").read_bytes() == (tmp_path / "b.json").read_bytes()
+
+
+def test_a_controller_of_a_loaded_model_is_that_of_the_model(tmp_path):
+    """It was checked without the models that the record does not rule out, and had no units."""
+    t = 10.0 * np.arange(70)
+    lags = np.maximum(t - 563, 0)
+    y = 15 - 15 * (150 * np.exp(-lags / 150) - 40 * np.exp(-lags / 40)) / 110
+    y += 0.5 * np.random.default_rng(2).standard_normal(70)
+    record = cr.Record(t, np.where(t < 500, 40.0, 50.0), y, units={"u": "%", "y": "°C"})
+    system = cr.identify(record)
+    save_model(tmp_path / "a.json", system)
+    told = []
+    for model in (system, load_model(tmp_path / "a.json")):
+        with pytest.warns(cr.errors.ModelWarning):
+            told.append(cr.design.pid(model, "simc", closed_loop_time="robust").report())
+    assert told[0] == told[1]
+    assert "UNSTABLE somewhere" in told[0]
+    assert "%/°C" in told[0]
 
 
 def test_notes_and_what_was_chosen_about_the_clock_are_read_as_they_were_written(tmp_path):

@@ -8,7 +8,6 @@ from typing import Any
 import control as ct
 
 from ..._parameters import gain_unit
-from ...data.shown_units import shown_time_unit
 from ...delayed import DelayedStateSpace, DelaySystem, delay
 from ...errors import OptionError
 from ..models.conversions import to_discrete
@@ -78,8 +77,6 @@ def total_time(system: Any, plant: DelayedStateSpace) -> float:
 
 def gain_and_time_units(plant: DelayedStateSpace) -> tuple[str, str]:
     """Units of a controller gain and of shown times, from the first record of a fitted plant."""
-    records = () if plant.fit is None else plant.fit.records
-    if not records:
+    if plant.fit is None:
         return "", "s"
-    first = records[0]
-    return gain_unit(first.input_units[0], first.output_units[0]), shown_time_unit(first)
+    return gain_unit(plant.fit.input_unit, plant.fit.output_unit), plant.fit.time_unit
