@@ -154,6 +154,11 @@ def test_plan_ranks_all_candidates(want, tmp_path):
     np.testing.assert_allclose(written, np.stack([plan.time, plan.command], axis=1))
     np.testing.assert_array_equal(np.ravel(plan.record(plan.time).input), plan.command)
     assert "standard error" in plan.report()
+    # the exported code returns to the level at rest, and a log may run on
+    longer = plan.dt * np.arange(plan.time.size + 5)
+    np.testing.assert_array_equal(
+        np.ravel(plan.record(longer, time=longer).input), [*plan.command, *[40.0] * 5]
+    )
 
 
 def test_longer_tests_tell_more_and_limits_of_the_output_cost():

@@ -50,6 +50,11 @@ class PlannedInput(Result):
         """Duration in s."""
         return self.time.size * self.dt
 
+    @property
+    def _afterwards(self) -> float:
+        """Command once the plan is over."""
+        return float(self.command[-1])
+
     def to_csv(self, path: str | os.PathLike[str]) -> Path:
         """Write the command to a file, atomically.
 
@@ -80,7 +85,8 @@ class PlannedInput(Result):
         output : array_like, shape (N,)
             For a valve its position.
         time : array_like, shape (N,), optional
-            In s from the start of the plan. Default: that of the plan.
+            In s from the start of the plan. Default: that of the plan. After the plan of an
+            experiment its command is that at rest, after that of a valve the last one.
         **labels
             Further arguments of `Record`.
 
@@ -96,7 +102,9 @@ class PlannedInput(Result):
                 f"output has shape {measured.shape}; expected {stamps.shape}, one for each time"
             )
         last = np.searchsorted(self.time, stamps + 1e-6 * self.dt, side="right") - 1
-        return Record(stamps, self.command[np.clip(last, 0, None)], measured, **labels)
+        played = self.command[np.clip(last, 0, None)]
+        played[stamps + 1e-6 * self.dt >= self.time[-1] + self.dt] = self._afterwards
+        return Record(stamps, played, measured, **labels)
 
 
 def duration_in_words(seconds: float) -> str:

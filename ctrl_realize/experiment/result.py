@@ -137,6 +137,10 @@ class ExperimentPlan(PlannedInput):
     choices: tuple[str, ...] = field(default=())
 
     @property
+    def _afterwards(self) -> float:
+        return self.level
+
+    @property
     def chosen(self) -> PlannedTest:
         """The candidate that is the command."""
         return next(one for one in self.candidates if one.kind == self.kind)
