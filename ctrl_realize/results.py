@@ -410,6 +410,9 @@ class FractionalDelayFit(ModelFit):
     (True, True)
     """
 
+    _answered_noise = False
+    """Whether noise is so slow that a controller answers it: lags are then taken for dead time."""
+
     if TYPE_CHECKING:
 
         @property

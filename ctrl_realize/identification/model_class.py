@@ -56,7 +56,7 @@ def with_modes_judged(
     neither for records with gains of their own.
     """
     fit = fit_of(system, OutputErrorFit)
-    if fit.estimate.averaged or all(in_automatic(record) for record in fit.records):
+    if fit.estimate.averaged or any(in_automatic(record) for record in fit.records):
         # Coloured noise that a controller answers is correlated with the input.
         return system
     records, cut = lively_parts(at_model_gain(fit))

@@ -112,6 +112,8 @@ def _dead_time(fit: FractionalDelayFit) -> Verdict:
     if fit.total_delay is not None and np.isfinite(fit.total_delay_interval or np.inf).all():
         least = max(least, _OF_TOTAL * fit.total_delay)
     level, why = _level(fit.flags, "dead_time", width <= least, some=True)
+    if level == "good" and fit._answered_noise:
+        level, why = "with care", "slow noise in a loop"
     said = interval_in_time(low, high)
     if width <= least:
         said = f"known to {in_time(width)}, {said}"

@@ -256,7 +256,7 @@ def fit_output_error(
         huber=loss == "huber",
         simulates=focus == "simulation",
         # Of long records every sample tells, where the response is not fitted by means of blocks.
-        loop=all(map(in_automatic, several))
+        loop=any(map(in_automatic, several))
         or (max(one.n_samples for one in several) <= MOST_SAMPLES and answers_the_output(several)),
     )
     setting = {"own_gains": gains == "own", "may_clip": actuator is None}

@@ -106,7 +106,7 @@ def feedback_flags(records: tuple[Record, ...], delay: float) -> Iterator[Flag]:
     ]
     if not _rare(chances):
         return
-    if all(in_automatic(record) for record in records):
+    if any(in_automatic(record) for record in records):
         yield flagged("closed_loop", chance=min(chances))
     elif late := late_input(records):
         yield late

@@ -368,6 +368,11 @@ class OutputErrorFit(FractionalDelayFit):
         return PlausibleModels(models, self.dt) if models else None
 
     @property
+    def _answered_noise(self) -> bool:  # type: ignore[override]
+        in_loop = any(flag.code == "closed_loop" for flag in self.flags)
+        return in_loop and self.estimate.residual.noise_lags > 0
+
+    @property
     def verdicts(self) -> tuple[Verdict, ...]:
         """Whether dead time and gain are known, and whether the model is fit for tuning.
 

@@ -60,6 +60,31 @@ def test_it_is_said_what_was_used_and_that_noise_hides_the_lags(slow):
     assert "moved by 1. " in hidden
 
 
+def test_slow_noise_in_a_loop_leaves_no_good_dead_time():
+    """Lags that the noise hides are taken for dead time, beside an interval that looks narrow."""
+    case = replace(CASES["AR(0.9)"], noise=0.01)
+    wanted, bare = record(PLANT, case, "nine", 7)
+    fit = cr.identify(cr.Record(bare.time, bare.input, bare.output, reference=wanted)).fit
+    verdict = fit.verdicts[0]
+    assert verdict.level == "with care"
+    assert verdict.sentence.startswith("known to ")
+    assert verdict.sentence.endswith("slow noise in a loop")
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+def test_a_step_in_manual_beside_loops_is_fitted_as_they_are(seed):
+    """It switched their rules off: a false `feedback`, and pairs of poles in 5 of 8."""
+    loops = [loop("AR(0.9)", seed=seed), loop("AR(0.9)", seed=seed + 50)]
+    step = (loops[0].time >= 60) * 1.0
+    lags = ct.tf([GAIN], np.polymul([PLANT.lags[0], 1], [PLANT.lags[1], 1]))
+    y = np.ravel(cr.delayed_ss(lags, dead_time=PLANT.dead_time, dt=loops[0].dt).simulate(step))
+    noise = lfilter([0.05], [1, -0.9], np.random.default_rng(seed).standard_normal(y.size))
+    fit = cr.identify([cr.Record(loops[0].time, step, y + noise), *loops]).fit
+    assert codes(fit) & {"feedback", "closed_loop"} == {"closed_loop"}
+    assert np.isreal(fit.poles).all()
+    assert fit.interval[0] <= PLANT.dead_time <= fit.interval[1]
+
+
 def test_the_move_that_the_flag_names_is_enough_to_a_factor_of_two(slow):
     named = float(flag(slow, "small_set_point").split("moves of about ")[1].split()[0])
     assert 1.4 < named < 16
