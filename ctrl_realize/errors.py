@@ -10,22 +10,10 @@ import sys
 import warnings
 
 __all__ = [
-    "CtrlRealizeError",
-    "CtrlRealizeWarning",
-    "DataError",
-    "DataWarning",
-    "DelayRangeError",
-    "FileFormatError",
-    "MissingFileError",
-    "MissingPackageError",
-    "ModelWarning",
-    "NoStepError",
-    "OptionError",
-    "OrderError",
-    "TimeAxisError",
-    "UnresolvedWarning",
-    "UnsuitableSystemError",
-]
+    "CtrlRealizeError", "CtrlRealizeWarning", "DataError", "DataWarning", "DelayRangeError",
+    "FileFormatError", "MissingFileError", "MissingPackageError", "ModelWarning", "NoStepError",
+    "OptionError", "OrderError", "TimeAxisError", "UnresolvedWarning", "UnsuitableSystemError",
+]  # fmt: skip
 
 _INSIDE = ("ctrl_realize", "control", "contextlib")
 """Modules whose frames are skipped when a warning is attributed to a line of the caller."""

@@ -14,17 +14,9 @@ from .identification.validation.residuals import analyse_residuals as analyse_re
 from .identification.validation.residuals_result import ResidualAnalysis as ResidualAnalysis
 
 __all__ = [
-    "DelayComparison",
-    "DelayEstimate",
-    "ModelComparison",
-    "Prediction",
-    "ResidualAnalysis",
-    "analyse_residuals",
-    "compare",
-    "compare_delay_estimates",
-    "cross_validate",
-    "predict",
-]
+    "DelayComparison", "DelayEstimate", "ModelComparison", "Prediction", "ResidualAnalysis",
+    "analyse_residuals", "compare", "compare_delay_estimates", "cross_validate", "predict",
+]  # fmt: skip
 
 
 def __dir__() -> list[str]:

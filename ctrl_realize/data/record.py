@@ -86,18 +86,9 @@ class Record(RecordConversions):
     """
 
     __slots__ = (
-        "dt",
-        "input",
-        "input_labels",
-        "missing",
-        "name",
-        "output",
-        "output_labels",
-        "reference",
-        "sample_time",
-        "time",
-        "units",
-    )
+        "dt", "input", "input_labels", "missing", "name", "output", "output_labels", "reference",
+        "sample_time", "time", "units",
+    )  # fmt: skip
 
     missing: str
     units: Mapping[str, str]

@@ -22,25 +22,10 @@ from .errata import Erratum
 from .settings import Settings, SetUp, SteppedSine
 
 __all__ = [
-    "DEAD_TIME",
-    "DELAY",
-    "DELAY_VARIANCE",
-    "ERRATA",
-    "FINAL_RECORD",
-    "SETTINGS",
-    "SETUP",
-    "SHOWN_RECORD",
-    "STEPPED_SINE",
-    "TABLE_1",
-    "TRUSTED_BAND_HZ",
-    "Erratum",
-    "SetUp",
-    "Settings",
-    "SteppedSine",
-    "TrimmedStatistics",
-    "table_1_statistics",
-    "trimmed_statistics",
-]
+    "DEAD_TIME", "DELAY", "DELAY_VARIANCE", "ERRATA", "FINAL_RECORD", "SETTINGS", "SETUP",
+    "SHOWN_RECORD", "STEPPED_SINE", "TABLE_1", "TRUSTED_BAND_HZ", "Erratum", "SetUp", "Settings",
+    "SteppedSine", "TrimmedStatistics", "table_1_statistics", "trimmed_statistics",
+]  # fmt: skip
 
 
 def __dir__() -> list[str]:

@@ -82,36 +82,13 @@ def _first_of_the_set(result: Dataset, **kwargs: Any) -> ct.ControlPlot:
 
 # the annotation of the first argument is the kind of result
 for _plot in (
-    campaign_plot,
-    comparison_plot,
-    delay_comparison_plot,
-    delay_robustness_plot,
-    experiment_plot,
-    frf_fit_plot,
-    gain_plot,
-    hankel_plot,
-    impulse_estimate_plot,
-    impulse_plot,
-    loop_diagnosis_plot,
-    margins_plot,
-    mimo_realization_plot,
-    model_comparison_plot,
-    order_plot,
-    pid_comparison_plot,
-    plausible_plot,
-    prediction_plot,
-    process_model_plot,
-    record_plot,
-    residual_plot,
-    robustness_plot,
-    state_space_fit_plot,
-    system_plot,
-    track_plot,
-    truth_plot,
-    uncertainty_plot,
-    valve_plan_plot,
-    valve_plot,
-):
+    campaign_plot, comparison_plot, delay_comparison_plot, delay_robustness_plot, experiment_plot,
+    frf_fit_plot, gain_plot, hankel_plot, impulse_estimate_plot, impulse_plot, loop_diagnosis_plot,
+    margins_plot, mimo_realization_plot, model_comparison_plot, order_plot, pid_comparison_plot,
+    plausible_plot, prediction_plot, process_model_plot, record_plot, residual_plot,
+    robustness_plot, state_space_fit_plot, system_plot, track_plot, truth_plot, uncertainty_plot,
+    valve_plan_plot, valve_plot,
+):  # fmt: skip
     draw.register(_plot)
 
 # for functions with more than one kind
