@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from functools import wraps
 from inspect import signature
 from typing import TYPE_CHECKING, Any, Literal, ParamSpec, TypeVar
@@ -42,6 +42,8 @@ def _of_records(function: Callable[P, T]) -> Callable[P, T]:
                 f"expected a Record or a list of them, got {len(args)} arguments; arrays become a "
                 "record by Record(time, input, output), and options have names"
             )
+        if args and isinstance(args[0], Iterator):  # is empty when it is looked at again
+            args = (list(args[0]),)  # type: ignore[assignment]
         return function(*args, **kwargs)
 
     return checked

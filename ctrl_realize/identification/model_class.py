@@ -59,6 +59,8 @@ def with_modes_judged(
     if fit.estimate.averaged or any(in_automatic(record) for record in fit.records):
         # Coloured noise that a controller answers is correlated with the input.
         return system
+    if any(flag.code == "no_common_gain" for flag in fit.flags):
+        return system  # no model of one plant explains them
     records, cut = lively_parts(at_model_gain(fit))
     try:
         checks = _checks(system, records)

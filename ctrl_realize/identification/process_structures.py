@@ -93,7 +93,7 @@ class ProcessStructure:
 
 
 StructureLike: TypeAlias = "tuple[int, int] | str | ProcessStructure"
-Structures: TypeAlias = "Sequence[StructureLike] | str | ProcessStructure"
+Structures: TypeAlias = "Sequence[StructureLike] | StructureLike"
 
 
 def requested(given: Structures | None) -> Requested:
@@ -106,7 +106,10 @@ def requested(given: Structures | None) -> Requested:
     """
     if given is None:
         return Requested()
-    alone = isinstance(given, str | ProcessStructure)
+    if isinstance(given, int | float):
+        raise OptionError(f"structures={given!r}; expected (order, relative_degree), or a name")
+    pair = isinstance(given, tuple) and [type(one) for one in given] == [int, int]
+    alone = pair or isinstance(given, str | ProcessStructure)
     several: Iterable[Any] = [given] if alone else given  # type: ignore[assignment]
     pairs: list[Structure] = []
     forms: list[ProcessForm] = []

@@ -3,21 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from itertools import compress
 
 import numpy as np
 
 from ..._flags import Flag, flagged
-from ..._wording import chosen, named
+from ..._wording import chosen, in_time, named
 from ...data import Record
 from ...errors import DataError
 from ...numerics.arrays import FloatArray
 from ...numerics.constants import SMALLEST
-from ...numerics.output_error.any_input.data import SampledData
+from ...numerics.output_error.any_input.data import SOUGHT, SampledData
 from ...numerics.output_error.any_input.fit import SampledFit, fit_sampled
 from ...numerics.output_error.any_input.stretch import FOLLOWS
 from ...numerics.output_error.other_structures import Requested
-from ...numerics.output_error.result import OutputErrorEstimate
+from ...numerics.output_error.result import AT_BOUND, OutputErrorEstimate
 from ...numerics.output_error.step_data import StepData, bare_data
 from ...numerics.signals.counters import counter_period
 from ...numerics.validation.own_response import OwnResponse
@@ -30,6 +31,7 @@ from .result import OutputErrorFit
 from .sensor_flags import missing_code
 from .summary import choices_of
 
+_SOUGHT_THEN = 2.0  # times as far where nothing explains the output, or a dead time is at the bound
 _ALL = 0.99  # of a record, from which on the rest is not reported
 
 
@@ -89,11 +91,17 @@ def _fit(
         _check_moves(record)
     outputs, inputs = zip(*signals, strict=True)
     found = fit_sampled(outputs, inputs, dt, requested)
+    limit = SOUGHT * found.data.longest
+    beyond = found.explained < FOLLOWS or found.fit.high >= AT_BOUND * limit
+    if requested.latest is None and beyond:
+        wider = fit_sampled(outputs, inputs, dt, replace(requested, latest=_SOUGHT_THEN * limit))
+        found = found if wider.explained < FOLLOWS <= found.explained else wider
     if refuses and found.explained < FOLLOWS:
         codes = [str(code) for y in found.data.measured if (code := missing_code(y))]
         raise UnrelatedError(
             f"{_named(records)}: the output does not respond to the input, which explains nothing "
-            f"beyond the noise (test value {found.explained:.3g}, needed {FOLLOWS:g}); "
+            f"beyond the noise (test value {found.explained:.3g}, needed {FOLLOWS:g}), with dead "
+            f"times up to {in_time(found.fit.latest)}; "
             + (codes[0] if codes else _advice(records, found.data.measured))
         )
     return found
@@ -144,7 +152,8 @@ def _summary(
     data = found.data
     used = records if repeats is None else tuple(compress(records, repeats.kept))
     shown, time = joined(used, data, fit.residual.std)
-    flags = [*sampled_flags(fit, data.dt, data.longest, latest), *_cut(used, found)]
+    limit = SOUGHT * data.longest if latest is None else latest
+    flags = [*sampled_flags(fit, data.dt, data.longest, limit), *_cut(used, found)]
     if repeats is not None:
         flags += repeat_flags(repeats, fit.dead_time, data.dt)
     sums = found.condensed

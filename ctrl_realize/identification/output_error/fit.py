@@ -265,7 +265,7 @@ def fit_output_error(
     if fastest_lag is not None or dead_time is not None:
         from .stated import bounded, checked_statements, told
 
-        beside = {"actuator": actuator, "max_delay": dead_time and max_delay}
+        beside = {"actuator": actuator, "max_delay": None if dead_time is None else max_delay}
         stated = checked_statements(fastest_lag, dead_time, **beside)
         linear = partial(_linear, several, bounded(tried, stated), **setting)
 

@@ -22,7 +22,12 @@ from ...numerics.engine.poles import lag_sum
 from ...numerics.engine.profile import profile_limits
 from ...numerics.engine.static_gain import INTEGRATOR
 from ...numerics.output_error.margins import CLOSE, DecisionKey
-from ...numerics.output_error.result import OtherStructures, OutputErrorEstimate, StructureFit
+from ...numerics.output_error.result import (
+    AT_BOUND,
+    OtherStructures,
+    OutputErrorEstimate,
+    StructureFit,
+)
 from ...numerics.output_error.step_data import StepData
 from ...numerics.signals.filters import moving_mean
 from ...numerics.signals.noise import largest_excess
@@ -113,7 +118,7 @@ def model_flags(
     if form and (bounds := [name for name in fit.process.at_bound if name in form.bounds]):
         yield flagged("parameter_at_bound", names=", ".join(bounds))
     reached = latest is not None and fit.latest >= latest * (1 - 1e-9)
-    if reached and fit.high >= 0.98 * fit.latest:
+    if reached and fit.high >= AT_BOUND * fit.latest:
         yield flagged("delay_at_bound", max_delay=fit.latest / dt)
     none = _may_be_none(fit, dt)
     if none or fit.open_start or (not fit.averaged and _is_wide(fit, dt)):

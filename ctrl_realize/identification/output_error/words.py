@@ -76,11 +76,12 @@ def structure_words(fit: OutputErrorEstimate) -> str:
 def total_in_words(total: float, interval: tuple[float, float], flags: Iterable[Flag]) -> str:
     """Write a total delay with its interval, and whether it is well determined."""
     low, high = interval
+    doubted = any(flag.code in marked("total_in_doubt") for flag in flags)
     if high == np.inf:
-        return "not determined: the record is much shorter than the slowest time constant"
+        why = ": the record is much shorter than the slowest time constant"
+        return "not determined" + why * (not doubted)
     if np.isnan(high):
         return f"{in_time(total, 5)} (dead time plus lags)"
-    doubted = any(flag.code in marked("total_in_doubt") for flag in flags)
     firm = "well determined, " if not doubted and is_firm(total, interval) else ""
     said = f"dead time plus lags; {firm}{interval_in_time(low, high)}"
     return f"{time_within(total, low, high)} ({said})"

@@ -41,6 +41,7 @@ from .margins import CloseDecision
 from .profiles import Profile
 
 _LEAST_WIDTH = 1e-6  # samples
+AT_BOUND = 0.98  # of the range of dead times, from which on an interval reaches its bound
 _TEMPERED = 0.5
 """Power of the evidence with which a structure counts: the criterion says too surely which one of
 two is right (five lags: a further one is seldom seen). Measured: `benchmarks.verdicts`, seeds below
@@ -340,11 +341,12 @@ class OutputErrorEstimate:
     @property
     def total_ends(self) -> tuple[float, float]:
         """95 % interval of the total delay, in s, as that of the gain."""
-        if self.static is None or not self.static.resolved:
+        early = self.load is not None and self.load.early
+        if self.static is None or early or not self.static.resolved:
             return self.low, np.inf
         every = ((self.static, 1.0), *self.alike)
         low, high = averaged_ends([(one.total, one.total_std, weight) for one, weight in every])
-        return max(low, 0.0), high
+        return (low if self.numerator.size > 1 else max(low, 0.0)), high  # a lead may be longer
 
 
 def _table(fits: WindowFit, profiles: dict[Structure, Profile]) -> tuple[StructureFit, ...]:

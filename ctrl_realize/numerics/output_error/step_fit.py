@@ -71,6 +71,7 @@ from ..engine.structures import ALL_STRUCTURES, SIMPLE_STRUCTURES, Candidate, Sc
 from ..engine.window_fit import WindowFit, among, fit_window, with_noise_of_residual
 from ..families.equal_lags import LagChain
 from ..families.flow import DispersedFlow
+from ..signals.edges import difference_noise
 from ..signals.noise import rounding_of_level
 from ..signals.noise_model import continues
 from .before_the_step import fitted_from_rest
@@ -136,11 +137,26 @@ def fit_step_record(
         found = _free_choice(data, fits, fit, requested.whiten)
     else:
         found = _given_structures(data, fits, free, requested)
+    if found.static is not None:
+        found = replace(found, rounding=_input_error(data) * abs(found.static.gain))
     if data.coarse:  # both levels of a step are rounded, however many samples they have
         noise = found.residual.rounded or np.sqrt(max(data.sigma**2 - data.quantum**2 / 12, 0.0))
         level = rounding_of_level(float(noise), data.quantum)
-        found = replace(found, rounding=np.sqrt(2) * level / float(np.ptp(data.input)))
+        level *= np.sqrt(2) / float(np.ptp(data.input))
+        found = replace(found, rounding=float(np.hypot(found.rounding, level)))
     return data, found if loaded is None else replace(found, load=loaded[0])
+
+
+def _input_error(data: StepData) -> float:
+    """Standard error of the height of steps, over that height, from noise of the recorded input.
+
+    Levels are medians of normal noise.
+    """
+    first, (last, samples) = data.edges[0][0], data.edges[-1]
+    noise = difference_noise(data.input)
+    after = max(data.input.size - last - samples, 1)
+    shares = 1 / max(first, 1) + 1 / after
+    return float(np.sqrt(np.pi / 2 * shares)) * noise / float(np.ptp(data.input))
 
 
 def _given_structures(

@@ -12,6 +12,7 @@ from ..arrays import FloatArray, IntArray
 from .edges import difference_noise
 
 MOST_MOVES = 24  # of an exact input: each costs a response
+_ALIKE = 3.0  # standard errors of the difference of two medians, up to which levels are one
 _SEGMENT_GROWTH = 0.5  # of the distance from the edge, over which a droop is nearly straight
 
 
@@ -40,7 +41,9 @@ def input_moves(
     -----
     A clean input is returned exactly. A noisy one keeps its edges sample by sample; between them it
     is replaced by means over segments that grow from the edge on, if these means differ by more
-    than their noise: the droop of an amplifier is followed, its noise is not. Spikes of a few
+    than their noise: the droop of an amplifier is followed, its noise is not. Levels that differ by
+    less than their errors are one, or else a step and its way back would leave an offset that an
+    integrator explains. Spikes of a few
     samples, too short to move the plant, are left out.
     """
     signal = signal[:stop]
@@ -52,11 +55,14 @@ def input_moves(
     level = np.empty_like(signal)
     bounds = [0, *[i for i, _ in edges if i < stop], stop]
     lengths = [0, *[n for i, n in edges if i < stop]]
+    known: list[tuple[float, int]] = []
     for start, end, ramp in zip(bounds[:-1], bounds[1:], lengths, strict=True):
         settled = min(start + max(ramp - 1, 0), end)
         level[start:settled] = signal[start:settled]
         if settled < end:
             level[settled:end] = _steady(signal[settled:end], noise, grow=start > 0)
+            if np.ptp(level[settled:end]) == 0:
+                level[settled:end] = _known(known, level[settled], end - settled, noise)
     moves = np.diff(level, prepend=level[0])
     index = np.flatnonzero(moves)
     return index, moves[index]
@@ -80,3 +86,12 @@ def _steady(values: FloatArray, noise: float, grow: bool) -> FloatArray:
     if np.all(off <= 6 * noise / np.sqrt(widths)):
         return mean
     return np.repeat(means, widths)
+
+
+def _known(known: list[tuple[float, int]], level: float, count: int, noise: float) -> float:
+    """Level of so many samples: an earlier one within its error, or a new one, which is kept."""
+    for other, samples in known:
+        if abs(level - other) <= _ALIKE * noise * np.sqrt(np.pi / 2 * (1 / count + 1 / samples)):
+            return other
+    known.append((level, count))
+    return level

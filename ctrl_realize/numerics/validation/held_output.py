@@ -31,7 +31,10 @@ least: those of a coarse converter have few sizes."""
 _FEWEST = 8  # changes, and moving samples of which a part can be judged
 SELDOM = 0.2
 """Part of equal neighbours up to which an output is said to have noise."""
-_LONG = 20  # samples: with a fifth of equal neighbours noise stands for so long by 0.2^19
+_LONG = 20
+"""Samples: with a fifth of equal neighbours noise stands for so long by 0.2^19, with fewer for a
+shorter time by as much."""
+_BY_CHANCE = 3.0  # equal neighbours of which none is seen in one of twenty records
 _PASSED = 0.2
 """Part of the range of a model that it makes while an output without noise is taken for stuck."""
 _ALIKE, _MOST = 0.15, 0.9
@@ -154,7 +157,9 @@ def stuck_samples(output: FloatArray, fitted: FloatArray) -> tuple[int, int]:
     moves = np.abs(np.diff(fitted))
     quiet = moves < _FAST * moves.max(initial=0.0)
     quiet[first:last] = False
-    if last - first < _LONG or quiet.sum() < _LONG or np.mean(same[quiet]) > SELDOM:
+    share = max(float(np.mean(same[quiet])), _BY_CHANCE / quiet.sum()) if quiet.any() else 1.0
+    least = (_LONG - 1) * np.log(SELDOM) / np.log(share) if share <= SELDOM else np.inf
+    if last - first < least or quiet.sum() < _LONG:
         return 0, 0
     noise = float(np.median(np.abs(np.diff(output - fitted)[quiet])))
     passed = float(np.ptp(fitted[first : last + 1])) > _PASSED * np.ptp(fitted)

@@ -24,6 +24,7 @@ MOST_SAMPLES = 4000
 Where their response ends in time all samples are fitted afterwards (`condensed`); where the plant
 is slow means over blocks of samples are fitted, so many of them."""
 
+SOUGHT = 0.25  # of the longest record, up to which a dead time is sought unless a limit is given
 BEYOND = 1.5  # of a first-order model's dead time: no model's dead time is later
 
 _SPARSEST = 20

@@ -58,7 +58,7 @@ from ..result import (
     StructureFit,
     assembled,
 )
-from .data import SampledData
+from .data import SOUGHT, SampledData
 from .window import SampledWindow, fit_windows, simulation_error
 
 LAGS = tuple(ProcessForm(f"P{n}D", n) for n in (1, 2, 3))
@@ -94,7 +94,7 @@ def plain_lags(requested: Requested) -> bool:
 
 def fit_lags(data: SampledData, requested: Requested) -> tuple[SampledWindow, OutputErrorEstimate]:
     """Fit lags and noise in turn; what rules out the lags is told by `others` of the estimate."""
-    limit = 0.25 * data.longest if requested.latest is None else requested.latest
+    limit = SOUGHT * data.longest if requested.latest is None else requested.latest
     within = requested.earliest, max(limit, requested.earliest)
     forms = sorted(requested.forms or LAGS, key=lambda form: form.lags)
     noise, fitted = np.ones(1), list[Candidate]()

@@ -22,7 +22,7 @@ from ...engine.structures import Candidate
 from ...engine.window_fit import WindowFit
 from ..other_structures import Requested
 from .condensed import MOST_LAGS
-from .data import BEYOND, SampledData, cut
+from .data import BEYOND, SOUGHT, SampledData, cut
 from .window import ORDERS, SampledWindow, fit_windows, in_coloured_noise, simulates_worse
 
 FOLLOWS = 36.0
@@ -47,7 +47,7 @@ def fit_stretch(
     data: SampledData, structures: Sequence[Structure], requested: Requested
 ) -> SampledWindow:
     """Fit structures to a part of the records, by default dead times up to a quarter of it."""
-    limit = 0.25 * data.longest if requested.latest is None else requested.latest
+    limit = SOUGHT * data.longest if requested.latest is None else requested.latest
     within = requested.earliest, max(limit, requested.earliest)
     part = fit_windows(data, structures, within, requested.huber, np.ones(1))
     if not (part.fit.correlation > WHITE and requested.whiten and data.complete):

@@ -96,7 +96,10 @@ def fit_windows(
     dt, n, usual = data.step, max(y.size for y in data.outputs), data.spacing * data.dt
     order = noise.size - 1
     alike = (1.0,) * len(data.outputs)
-    data = replace(data, starts=tuple(y.size // 20 for y in data.outputs), scales=alike)
+    # A start of its own motion is left out, but not what an early pulse does.
+    moves = [int(np.argmax(u != u[0])) for u in data.held]
+    starts = tuple(min(y.size // 20, at) for y, at in zip(data.outputs, moves, strict=True))
+    data = replace(data, starts=starts, scales=alike)
     filtered = data.whitened(noise, residual)
     rough = _first_order(filtered.problem, n, dt, usual, within, _seen(filtered, within[1]))
     lag = float(-1.0 / rough.poles[0].real)
