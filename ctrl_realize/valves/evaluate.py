@@ -66,7 +66,7 @@ def valve_report(
         of your specification.
     fit : bool, default True
         False: Do not fit the dead time of each size and direction with `identify` (about 0.3 s for
-        each).
+        each, and up to 3 s where the rate is limited).
 
     Returns
     -------

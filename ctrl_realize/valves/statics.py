@@ -261,7 +261,9 @@ def hysteresis_and_linearity(
     hysteresis = width = unknown
     single = np.where(np.isfinite(curve.opening), curve.opening, curve.closing)
     middle = np.where(both, 0.5 * (curve.opening + curve.closing), single)
-    known = np.isfinite(middle)
+    # Beside levels of both ways one that was reached from one side is half a dead band off.
+    mixed = curve.origin == "levels" and np.isfinite([curve.opening, curve.closing]).any(1).all()
+    known = both if mixed else np.isfinite(middle)
     covered = float(np.ptp(curve.command[known])) if known.any() else 0.0
     if enough:
         apart = curve.closing[both] - curve.opening[both]

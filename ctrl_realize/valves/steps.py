@@ -185,6 +185,9 @@ def _measured(
     drift = abs(float(np.mean(tail[half:]) - np.mean(tail[: max(half, 1)])))
     drift_error = noise.of_mean(max(half, 1)) * np.sqrt(2)
     settled = drift <= max(3 * drift_error, _STILL_MOVING * abs(change), noise.quantum)
+    if drift > 3 * drift_error:  # the level that it creeps to is that uncertain
+        after = Estimate(after.value, float(np.hypot(after.std, drift)))
+        error = float(np.hypot(before.std, after.std))
     size = 100 * edge.amplitude / ranges.command_span
     travel = 100 / ranges.travel_span
     estimates = dict.fromkeys(STEP_METRICS, UNKNOWN)
