@@ -436,3 +436,13 @@ def test_a_command_that_makes_no_sense_is_a_sentence_and_changes_nothing(fitted,
     before = json.dumps(session.state)
     assert session.apply(command)["error"]
     assert json.dumps(session.state) == before
+
+
+@pytest.mark.parametrize("first", [-5.0, 0.0])
+def test_the_time_of_a_step_has_a_handle_also_where_time_counts_from_it(first):
+    k = np.arange(400)
+    noise = 0.01 * np.random.default_rng(0).standard_normal(400)
+    own = Session()
+    own.add_record(cr.Record(first + 0.1 * k, np.where(k < 50, 20.0, 30.0), (k >= 57) + noise))
+    driven = own.apply({"do": "view"})["view"]["data"]["panels"][1]
+    assert [one["name"] for one in driven["handles"]] == ["step"]

@@ -81,5 +81,5 @@ def _panels(
     more: JSON = {"strike": True, "units": units, "rest_input": level, "step_time": at}
     return [
         panel("record-output", "Output", across, y, layers, handles, **more),
-        panel("record-input", "Input", across, u, below, driven if at else [], short=True),
+        panel("record-input", "Input", across, u, below, [] if at is None else driven, short=True),
     ]
