@@ -21,6 +21,7 @@ from ..delayed import DelayedStateSpace
 from ..errors import DataError, NoStepError
 from ..frequency.comparison import FRFComparison
 from ..identification.campaign.campaign import Campaign
+from ..identification.joint.result import JointFit
 from ..identification.output_error.result import OutputErrorFit
 from ..identification.realization.delay_scan_result import DelayScan
 from ..identification.realization.result import Realization
@@ -179,7 +180,9 @@ def frf_sketches(
     if frf is None:
         return [sketch("frf.model", plots.frf_plot, systems, size=(6.2, 4.8))]
     tall = 5.4 if isinstance(frf, MeasuredFRF) and frf.coherence is not None else 4.8
-    sketches = [sketch("frf", plots.frf_plot, [frf, *systems], size=(6.2, tall))]
+    fitted = any(isinstance(getattr(system, "fit", None), JointFit) for system in systems)
+    name = "frf.joint" if fitted else "frf"
+    sketches = [sketch(name, plots.frf_plot, [frf, *systems], size=(6.2, tall))]
     if comparison is not None:
         sketches.append(sketch("frf_error", plots.comparison_plot, comparison, size=(6.2, 4.6)))
     return sketches

@@ -12,6 +12,7 @@ from scipy.optimize import least_squares
 import ctrl_realize as cr
 from ctrl_realize.errors import DataError, OptionError, UnsuitableSystemError
 from ctrl_realize.identification import fit_joint
+from ctrl_realize.report.sketches import frf_sketches
 
 DT = 0.01
 TIME = DT * np.arange(500)
@@ -91,6 +92,14 @@ def test_the_interval_is_narrower_than_either_alone_and_contains_the_truth():
         assert not fit.agreement.contradicts
         assert fit.interval_kind == "conditional"  # the structure is given
     assert inside >= 5  # 95 % intervals
+
+
+def test_a_report_says_whether_the_frequency_response_was_fitted():
+    together = fit_joint(step(), response(), structures=ONE_LAG)
+    alone = cr.identify(step(), structures=ONE_LAG)
+    captions = [frf_sketches([one], response())[0].caption for one in (together, alone)]
+    assert "fitted together with the records" in captions[0]
+    assert "not used for the fit" in captions[1]
 
 
 def test_another_dead_time_of_the_frequency_response_is_found():
