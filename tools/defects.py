@@ -162,7 +162,7 @@ DEFECTS = (
        "_HOLDS = 0.2", "_HOLDS = 1e3", "step_fit any_input decisions", FITS),
     # --- flags
     _d("delay at its bound", "a delay at max_delay is not flagged",
-       "if reached and fit.high >= 0.98 * fit.latest:", "if False:",
+       "if reached and fit.high >= AT_BOUND * fit.latest:", "if False:",
        "test_flags step_fit unmodelled", FITS),
     _d("no delay at all", "that no dead time fits as well is not flagged",
        "return fit.low <= _SAMPLES_BESIDE_NOTHING * dt and not stated", "return False",

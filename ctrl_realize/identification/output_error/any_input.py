@@ -91,17 +91,19 @@ def _fit(
         _check_moves(record)
     outputs, inputs = zip(*signals, strict=True)
     found = fit_sampled(outputs, inputs, dt, requested)
-    limit = SOUGHT * found.data.longest
-    beyond = found.explained < FOLLOWS or found.fit.high >= AT_BOUND * limit
-    if requested.latest is None and beyond:
-        wider = fit_sampled(outputs, inputs, dt, replace(requested, latest=_SOUGHT_THEN * limit))
-        found = found if wider.explained < FOLLOWS <= found.explained else wider
+    latest, follows = SOUGHT * found.data.longest, found.explained >= FOLLOWS
+    if requested.latest is None and not (follows and found.fit.high < AT_BOUND * latest):
+        latest *= _SOUGHT_THEN
+        wider = fit_sampled(outputs, inputs, dt, replace(requested, latest=latest))
+        # What explains little is no response for being sought for longer: it must lie inside.
+        inside = follows or wider.fit.high < AT_BOUND * latest
+        found = wider if wider.explained >= FOLLOWS and inside else found
     if refuses and found.explained < FOLLOWS:
         codes = [str(code) for y in found.data.measured if (code := missing_code(y))]
         raise UnrelatedError(
             f"{_named(records)}: the output does not respond to the input, which explains nothing "
             f"beyond the noise (test value {found.explained:.3g}, needed {FOLLOWS:g}), with dead "
-            f"times up to {in_time(found.fit.latest)}; "
+            f"times up to {in_time(requested.latest or latest)}; "
             + (codes[0] if codes else _advice(records, found.data.measured))
         )
     return found

@@ -92,7 +92,8 @@ def fit_output_error(
         reported as an apparent one.
     max_delay : float, optional
         Largest dead time in samples. Default: the visible onset of the output, which the dead time
-        cannot exceed.
+        cannot exceed; for inputs other than steps a quarter of the longest record, and half of it
+        where that explains nothing or is reached.
     known : control.TransferFunction or control.StateSpace, optional
         Known continuous dynamics between plant and record (sensor, anti-aliasing filter,
         converter). They are part of the fit, but not of the returned model.
