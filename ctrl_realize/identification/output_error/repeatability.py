@@ -239,7 +239,7 @@ def _compared(
         gain_alone_errors=alone_errors,
         chi_square=chi_square,
         p_value=p_value,
-        gain_test=homogeneity(gains[kept], gain_errors[kept]),
+        gain_test=homogeneity(alone[kept], alone_errors[kept]),
         lag_test=homogeneity(np.log(lags[kept]), lag_errors[kept]),
         trend=trend,
         trend_error=trend_error,
@@ -254,7 +254,7 @@ def delay_outliers(found: Repeatability) -> list[int]:
 
 def gain_outliers(found: Repeatability) -> list[int]:
     """Positions of records with an outlying gain: another plant, or no response."""
-    return _far(found, found.gains, found.gain_errors)
+    return _far(found, found.gains_alone, found.gain_alone_errors)
 
 
 def _far(found: Repeatability, values: FloatArray, errors: FloatArray) -> list[int]:

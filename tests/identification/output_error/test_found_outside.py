@@ -122,3 +122,17 @@ def test_one_pair_an_array_of_dead_times_and_a_generator_are_taken():
     assert len(several.records) == 2
     with pytest.raises(cr.errors.OptionError, match=r"structures=5; expected \(order"):
         cr.identify(record, structures=5)
+
+
+@pytest.mark.parametrize("gains", [(2.0, 0.0), (2.0, 2.0, 0.0)])
+def test_a_record_without_response_beside_others_is_told(gains):
+    """Its shift ran away, and its own gain with it: 1.33 was good for 2, 2 and 0."""
+    u = np.where(TIME[:300] >= 40, 1.0, 0.0)
+    y = response(u, 7.3, [20, 6], 1.0, t=TIME[:300])
+    for seed in (0, 1, 2, 3, 21, 23):
+        records = [
+            cr.Record(TIME[:300], u, gain * y + noise(100 * seed + i, 0.02, 300), name=f"r{i}")
+            for i, gain in enumerate(gains)
+        ]
+        told = codes(cr.identify(records, structures="P2D"))
+        assert told & {"gains_differ", "no_common_gain", "outlying_records"}
