@@ -160,7 +160,7 @@ _CALLS = {row["python"]: row["option"] for row in facts("cli/advice.toml")["advi
 
 _ARGUMENT = re.compile(
     r"(?<![\w'\"/.\-%])(?P<name>" + "|".join(sorted(ARGUMENTS, key=len, reverse=True)) + r")="
-    r"(?P<value>'[^']*'|\"[^\"]*\"|[\w.+\-]*[\w])?"
+    r"(?P<value>'[^']*'|\"[^\"]*\"|\([-+.\w, ]+\)|[\w.+\-]*[\w])?"
 )
 
 
@@ -176,6 +176,8 @@ def as_options(message: str) -> str:
     >>> from ctrl_realize.cli.options import as_options
     >>> print(as_options("a.csv: give time_unit='ms', or dt= to ignore the column"))
     a.csv: give --time-unit ms, or --dt to ignore the column
+    >>> print(as_options("dead_time=(80.0, 20.0); expected two times"))
+    --dead-time 80.0 20.0; expected two times
     """
     for call, option in _CALLS.items():
         message = message.replace(call, option)
@@ -186,6 +188,8 @@ def _spelled(found: re.Match[str]) -> str:
     option, value = option_of(found["name"]), found["value"]
     if value is None or value in ("True", "False"):
         return option
+    if value[0] == "(":
+        return f"{option} {value[1:-1].replace(',', '')}"
     plain = value[1:-1] if value[0] in "'\"" else value
     return f"{option} {plain if _BARE.fullmatch(plain) else value}"
 
