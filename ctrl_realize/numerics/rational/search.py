@@ -93,7 +93,7 @@ def fit_structures(
                 fits[Structure(n, r)] = _fit_one(data, ladder, fits, Structure(n, r))
     if orders is None:
         _with_larger_orders(data, ladder, fits, degrees)
-    # One zero more is never worse: what is was caught beside the minimum.
+    # One zero more is never worse: if it is, it was caught beside the minimum.
     for structure in sorted(fits, key=lambda one: -one.relative_degree):
         fewer = fits.get(Structure(structure.order, structure.relative_degree + 1))
         if fewer is not None and fewer.cost < fits[structure].cost:
