@@ -369,7 +369,7 @@ class OutputErrorFit(FractionalDelayFit):
 
     @property
     def _answered_noise(self) -> bool:  # type: ignore[override]
-        in_loop = any(flag.code == "closed_loop" for flag in self.flags)
+        in_loop = "closed_loop" in [flag.code for flag in self.flags]
         return in_loop and self.estimate.residual.noise_lags > 0
 
     @property
