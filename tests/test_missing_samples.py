@@ -202,6 +202,13 @@ def test_a_code_in_the_input_of_a_file_is_named(tmp_path, rows):
         cr.read_record(path)
 
 
+def test_an_input_of_which_nothing_is_known_is_read_without_a_warning_of_numpy(tmp_path):
+    path = tmp_path / "a.csv"
+    path.write_text("t,u,y\n" + "".join(f"{k},,{k % 5}\n" for k in range(60)))
+    record = cr.read_record(path, missing="keep")
+    assert np.isnan(record.input).all()
+
+
 def test_a_response_that_begins_in_a_gap_is_named_and_the_interval_holds():
     rng = np.random.default_rng(4)
     time = DT * np.arange(400)

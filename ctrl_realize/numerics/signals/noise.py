@@ -283,8 +283,9 @@ def spikes(output: FloatArray, fitted: FloatArray) -> BoolArray:
 
 def far_value(values: FloatArray) -> IntArray:
     """Samples of a single value far beyond all others, as loggers write for missing samples."""
-    for end in (np.nanmin(values), np.nanmax(values)):
-        others = values[(values != end) & np.isfinite(values)]
+    there = values[np.isfinite(values)]
+    for end in np.unique(there)[[0, -1]] if there.size else ():
+        others = there[there != end]
         if others.size and np.abs(others - end).min() > BEYOND * np.ptp(others) > 0:
             return np.flatnonzero(values == end)
     return np.empty(0, dtype=np.int64)
