@@ -86,12 +86,15 @@ def updates(output: FloatArray, inputs: FloatArray) -> BoolArray:
 def _static(output: FloatArray, inputs: FloatArray, at: IntArray, rounding: float) -> bool:
     """Whether the first changes are those of a gain behind a dead time, which may saturate.
 
-    It changes at half of the input's moves at least: one that is held moves at more of them.
+    It changes at half of the input's moves at least, the first time after one of them or with one
+    before the record: one that is held moves at more of them.
     """
-    if np.count_nonzero(np.diff(inputs).any(axis=0)) > 2 * at.size:
+    moves = np.append(0, 1 + np.flatnonzero(np.diff(inputs).any(axis=0)))
+    if moves.size > 2 * at.size:
         return False
     some = at[:_FEWEST_UPDATES]
-    levels = inputs[:, some - np.arange(some[0] + 1)[:, None]]  # inputs, dead times, changes
+    late = some[0] - moves[moves <= some[0]]
+    levels = inputs[:, some - late[:, None]]  # inputs, dead times, changes
     order = np.argsort(levels, axis=-1, kind="stable")
     way = np.diff(output[some][order])
     same = np.diff(np.take_along_axis(levels, order, axis=-1)) == 0
