@@ -39,13 +39,22 @@ def test_exact_model_has_no_error_with_the_hold_taken_out():
 @pytest.mark.parametrize("dead_time", [0.0, 0.3, 0.33])
 @pytest.mark.parametrize("core", [[[2], [1, 1]], [[1], [1, 0]], [[1, 2], [1, 0.4, 4]]])
 def test_aliases_of_a_sampled_model_are_no_error_of_it(core, dead_time):
-    """A lag was 12 % off at a quarter of the sample rate, and 65 % near half of it."""
+    """A lag behind a fraction of a sample was 12 % off at a quarter of the sample rate."""
     plant = ct.tf(*core)
     s = 2j * np.pi * np.geomspace(0.01, 9.5, 60)
     frf = cr.MeasuredFRF(plant(s) * np.exp(-dead_time * s), s.imag / (2 * np.pi))
     compared = cr.compare_frf(cr.delayed_ss(plant, dead_time=dead_time, dt=0.05), frf)
     assert compared.max_relative_error < 1e-8
     assert not compared.flags
+
+
+def test_dividing_out_the_hold_alone_would_leave_aliases():
+    """The figures of the docstring, for a lag of twenty samples."""
+    lag, dt = ct.tf([1], [1, 1]), 0.05
+    s = 2j * np.pi * np.array([0.1, 0.25]) / dt
+    z = np.exp(s * dt)
+    divided = ct.sample_system(lag, dt, "zoh")(z) / ((1 - 1 / z) / (s * dt))
+    assert_allclose(np.abs(divided / lag(s) - 1), [0.034, 0.234], atol=5e-4)
 
 
 def test_without_a_continuous_counterpart_the_hold_is_divided_out():
