@@ -71,7 +71,7 @@ from ..engine.structures import ALL_STRUCTURES, SIMPLE_STRUCTURES, Candidate, Sc
 from ..engine.window_fit import WindowFit, among, fit_window, with_noise_of_residual
 from ..families.equal_lags import LagChain
 from ..families.flow import DispersedFlow
-from ..signals.edges import difference_noise
+from ..signals.edges import difference_noise, level_error
 from ..signals.noise import rounding_of_level
 from ..signals.noise_model import continues
 from .before_the_step import fitted_from_rest
@@ -148,15 +148,10 @@ def fit_step_record(
 
 
 def _input_error(data: StepData) -> float:
-    """Standard error of the height of steps, over that height, from noise of the recorded input.
-
-    Levels are medians of normal noise.
-    """
+    """Standard error of the height of steps, over that height, from noise of the recorded input."""
     first, (last, samples) = data.edges[0][0], data.edges[-1]
-    noise = difference_noise(data.input)
-    after = max(data.input.size - last - samples, 1)
-    shares = 1 / max(first, 1) + 1 / after
-    return float(np.sqrt(np.pi / 2 * shares)) * noise / float(np.ptp(data.input))
+    after = data.input.size - last - samples
+    return level_error(difference_noise(data.input), first, after) / float(np.ptp(data.input))
 
 
 def _given_structures(

@@ -53,6 +53,11 @@ def difference_noise(values: FloatArray) -> float:
     return float(np.median(steps, overwrite_input=True) / (0.6745 * np.sqrt(2)))
 
 
+def level_error(noise: float, first: int, second: int) -> float:
+    """Standard error of the difference of two levels, medians of so many samples with noise."""
+    return float(noise * np.sqrt(np.pi / 2 * (1 / max(first, 1) + 1 / max(second, 1))))
+
+
 def despike(values: FloatArray, spike_samples: int) -> FloatArray:
     """Remove spikes of at most `spike_samples` samples; levels and edges are not changed.
 

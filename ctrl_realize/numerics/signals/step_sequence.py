@@ -9,7 +9,7 @@ import numpy as np
 from scipy.ndimage import median_filter
 
 from ..arrays import FloatArray, IntArray
-from .edges import difference_noise
+from .edges import difference_noise, level_error
 
 MOST_MOVES = 24  # of an exact input: each costs a response
 _ALIKE = 3.0  # standard errors of the difference of two medians, up to which levels are one
@@ -91,7 +91,7 @@ def _steady(values: FloatArray, noise: float, grow: bool) -> FloatArray:
 def _known(known: list[tuple[float, int]], level: float, count: int, noise: float) -> float:
     """Level of so many samples: an earlier one within its error, or a new one, which is kept."""
     for other, samples in known:
-        if abs(level - other) <= _ALIKE * noise * np.sqrt(np.pi / 2 * (1 / count + 1 / samples)):
+        if abs(level - other) <= _ALIKE * level_error(noise, count, samples):
             return other
     known.append((level, count))
     return level

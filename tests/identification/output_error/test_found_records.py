@@ -1,29 +1,14 @@
-"""Records by which wrong answers were found from outside; closed-form responses (simulated)."""
+"""Records that had a wrong answer; exact responses of known plants (simulated)."""
 
 import numpy as np
 import pytest
 
 import ctrl_realize as cr
+from tests.io.plant_files import response
 from tests.rigs import codes
 
 TIME = np.arange(400.0)
 STEP = np.where(TIME >= 50, 1.0, 0.0)
-
-
-def response(u, dead_time, lags, gain=2.0, lead=0.0, t=TIME):
-    """Response of gain, distinct lags, a lead and dead time to an input that is held."""
-    level, lags = np.zeros(t.size), np.asarray(lags, dtype=float)
-    shares = [
-        (one - lead) * one ** (lags.size - 2) / np.prod(one - np.delete(lags, k))
-        for k, one in enumerate(lags)
-    ]
-    for at in np.flatnonzero(np.diff(u, prepend=0.0)):
-        after = np.maximum(t - t[at] - dead_time, 0.0)
-        rise = 1.0 - sum(
-            share * np.exp(-after / lag) for share, lag in zip(shares, lags, strict=True)
-        )
-        level += np.diff(u, prepend=0.0)[at] * np.where(t - t[at] >= dead_time, rise, 0.0)
-    return gain * level
 
 
 def noise(seed, size=0.01, count=TIME.size):
@@ -34,14 +19,16 @@ def noise(seed, size=0.01, count=TIME.size):
 def test_a_dead_time_beyond_a_quarter_of_any_input_is_found(dead_time):
     """It was 100 s, with an interval that missed, called good and not said to be a bound."""
     u = np.random.default_rng(1).integers(0, 2, 80).repeat(5) * 1.0
-    fit = cr.identify(cr.Record(TIME, u, response(u, dead_time, [10]) + noise(1, 0.02))).fit
+    fit = cr.identify(
+        cr.Record(TIME, u, response(TIME, u, 2.0, dead_time, [10]) + noise(1, 0.02))
+    ).fit
     assert fit.interval[0] <= dead_time <= fit.interval[1]
     assert fit.interval[1] - fit.interval[0] < 3.0
 
 
 def test_the_bound_of_a_default_search_is_told():
     u = np.random.default_rng(1).integers(0, 2, 80).repeat(5) * 1.0
-    fit = cr.identify(cr.Record(TIME, u, response(u, 210.0, [10]) + noise(1, 0.02))).fit
+    fit = cr.identify(cr.Record(TIME, u, response(TIME, u, 2.0, 200.5, [10]) + noise(1, 0.02))).fit
     assert "delay_at_bound" in codes(fit)
     assert fit.verdicts[0].level == "no"
     with pytest.raises(cr.errors.DataError, match="with dead times up to 200 s"):
@@ -50,7 +37,7 @@ def test_the_bound_of_a_default_search_is_told():
 
 @pytest.mark.parametrize(("first", "last"), [(52, 66), (57, 80)])
 def test_a_sensor_that_is_stuck_over_the_onset_leaves_no_good_dead_time(first, last):
-    y = response(STEP, 7.3, [20, 6]) + noise(0)
+    y = response(TIME, STEP, 2.0, 7.3, [20, 6]) + noise(0)
     stuck = np.where((first < TIME) & (last > TIME), y[first], y)
     fit = cr.identify(cr.Record(TIME, STEP, stuck)).fit
     assert "stuck_output" in codes(fit)
@@ -62,7 +49,7 @@ def test_a_noisy_recorded_input_has_its_part_of_the_error_of_the_gain():
     held = 0
     for seed in range(12):
         rng = np.random.default_rng(seed)
-        y = response(STEP, 7.3, [20, 6]) + 0.01 * rng.standard_normal(TIME.size)
+        y = response(TIME, STEP, 2.0, 7.3, [20, 6]) + 0.01 * rng.standard_normal(TIME.size)
         u = STEP + 0.02 * rng.standard_normal(TIME.size)
         low, high = cr.identify(cr.Record(TIME, u, y), structures=[(2, 2)]).fit.gain_interval
         assert high - low < 0.05
@@ -74,14 +61,15 @@ def test_a_noisy_recorded_input_has_its_part_of_the_error_of_the_gain():
 def test_a_step_and_its_way_back_under_input_noise_are_no_integrator(seed):
     rng = np.random.default_rng(seed)
     u = STEP * (TIME < 200)
-    y = response(u, 7.3, [20, 6]) + 0.01 * rng.standard_normal(TIME.size)
+    y = response(TIME, u, 2.0, 7.3, [20, 6]) + 0.01 * rng.standard_normal(TIME.size)
     fit = cr.identify(cr.Record(TIME, u + 0.02 * rng.standard_normal(TIME.size), y)).fit
     assert fit.gain == pytest.approx(2.0, abs=0.03)
     assert fit.gain_interval[1] - fit.gain_interval[0] < 0.06
 
 
 def test_a_lead_that_is_longer_than_the_lags_has_a_negative_total_delay():
-    y = response(STEP, 2.0, [20, 15], gain=1.0, lead=60.0) + noise(0)
+    y = sum(response(TIME, STEP, share, 2.0, [lag]) for share, lag in ((-8.0, 20), (9.0, 15)))
+    y += noise(0)  # (1 + 60 s) / (1 + 20 s) / (1 + 15 s) in partial fractions
     fit = cr.identify(cr.Record(TIME, STEP, y), structures="P2DZ").fit
     low, high = fit.total_delay_interval
     assert low < -23.0 < high < 0.0
@@ -89,7 +77,9 @@ def test_a_lead_that_is_longer_than_the_lags_has_a_negative_total_delay():
 
 
 def test_a_load_with_the_response_leaves_the_total_delay_open_as_the_gain():
-    y = response(STEP, 7.3, [20, 6]) + response(np.where(TIME >= 100, 1.0, 0.0), 0.0, [20], -0.7)
+    y = response(TIME, STEP, 2.0, 7.3, [20, 6]) + response(
+        TIME, np.where(TIME >= 100, 1.0, 0.0), -0.7, 0.0, [20]
+    )
     fit = cr.identify(cr.Record(TIME, STEP, y + noise(0))).fit
     assert fit.gain_interval == (-np.inf, np.inf)
     assert fit.total_delay_interval[1] == np.inf
@@ -112,7 +102,7 @@ def test_an_early_pulse_into_an_integrator_is_used():
 
 
 def test_one_pair_an_array_of_dead_times_and_a_generator_are_taken():
-    record = cr.Record(TIME, STEP, response(STEP, 7.3, [20, 6]) + noise(0))
+    record = cr.Record(TIME, STEP, response(TIME, STEP, 2.0, 7.3, [20, 6]) + noise(0))
     one = cr.identify(record, structures=(2, 2)).fit
     assert one.dead_time == cr.identify(record, structures=[(2, 2)]).fit.dead_time
     bounded = cr.identify(record, structures=[(2, 2)], dead_time=np.array([5.0, 10.0])).fit
@@ -127,7 +117,7 @@ def test_one_pair_an_array_of_dead_times_and_a_generator_are_taken():
 def test_a_record_without_response_beside_others_is_told(gains):
     """Its shift ran away, and its own gain with it: 1.33 was good for 2, 2 and 0."""
     u = np.where(TIME[:300] >= 40, 1.0, 0.0)
-    y = response(u, 7.3, [20, 6], 1.0, t=TIME[:300])
+    y = response(TIME[:300], u, 1.0, 7.3, [20, 6])
     for seed in (0, 1, 2, 3, 21, 23):
         records = [
             cr.Record(TIME[:300], u, gain * y + noise(100 * seed + i, 0.02, 300), name=f"r{i}")
