@@ -188,7 +188,9 @@ class FRFFit(FractionalDelayFit):
         if not self.noise_known:
             size = f"{100 * self.weighted_rms:.3g} % of"
         hold, unknown = [], ""
-        if np.any(Z_95 * self.pole_std[:1] > np.abs(self.poles[:1])):
+        slow = np.abs(self.poles) < 2 * np.pi * self.frequency_hz[0]
+        slow[:1] = True
+        if np.any(slow & (Z_95 * self.pole_std > np.abs(self.poles))):
             unknown = f"not determined from {self.frequency_hz[0]:.4g} Hz on"
         if self.hold_time is not None:
             hold.append(("hold", f"zero-order hold of {in_time(self.hold_time)}, divided out"))

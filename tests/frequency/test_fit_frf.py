@@ -1,5 +1,6 @@
 """Transfer function with dead time from a frequency response."""
 
+import re
 from functools import cache
 
 import control as ct
@@ -251,6 +252,31 @@ def test_what_an_unstable_plant_does_is_left_and_that_is_said():
     frf = cr.MeasuredFRF(2 * np.exp(-3 * s) / (20 * s + 1) * loud, s.imag / (2 * np.pi))
     flags = cr.fit_frf(frf, (1, 2, 3)).fit.flags
     assert "structured_misfit" not in [flag.code for flag in flags]
+
+
+@pytest.mark.parametrize(("lowest", "others"), [(0.1, (1.0,)), (0.1, ()), (0.5, (1.0,))])
+def test_an_unstable_plant_that_a_stable_model_imitates_is_named(lowest, others):
+    """2 exp(-0.3 s) / (s - 0.7) with further lags; orders 9 and 10 leave only its noise."""
+    omega = np.geomspace(lowest, 20, 60)
+    s, rng = 1j * omega, np.random.default_rng(0)
+    plant = 2 * np.exp(-0.3 * s) / (s - 0.7) / np.prod([lag * s + 1 for lag in others], axis=0)
+    noise = 0.01 * (rng.standard_normal(60) + 1j * rng.standard_normal(60))
+    fit = cr.fit_frf(cr.MeasuredFRF(plant * (1 + noise), omega / (2 * np.pi))).fit
+    told = [str(flag) for flag in fit.flags if flag.code == "unstable"]
+    number = r"([\d.]+)"
+    found = re.search(rf"pole at \+{number} rad/s and a dead time of {number} ms", told[0])
+    assert_allclose([float(found[1]), float(found[2])], [0.7, 300], rtol=0.03)
+
+
+def test_a_stable_plant_of_high_order_is_not_taken_for_an_unstable_one():
+    rng, omega = np.random.default_rng(1), np.geomspace(0.1, 20, 70)
+    s = 1j * omega
+    pairs = [s**2 / w**2 + 0.2 * s / w + 1 for w in (0.5, 2.0, 8.0)]
+    noise = 0.01 * (rng.standard_normal(70) + 1j * rng.standard_normal(70))
+    plant = np.exp(-0.3 * s) * (1 - s) / np.prod(pairs, axis=0)
+    fit = cr.fit_frf(cr.MeasuredFRF(plant * (1 + noise), omega / (2 * np.pi))).fit
+    assert fit.order == 6
+    assert "unstable" not in {flag.code for flag in fit.flags}
 
 
 def test_resonances_over_three_decades_are_found_in_noise():

@@ -130,19 +130,26 @@ def _with_larger_orders(
 
 
 def information_criteria(data: FRFData, fits: dict[Structure, Candidate]) -> dict[Structure, float]:
-    """Return the Bayesian information criterion of each structure, for unknown noise variance.
+    """Return the Bayesian information criterion of each structure, for unknown noise variance."""
+    count = independent_points(data, fits)
+    return {key: information_criterion(data, fit, count) for key, fit in fits.items()}
 
-    The residuals of the best fit may be correlated along frequency, for instance for a slightly
-    nonlinear plant; the number of points is then reduced. Otherwise every higher order would be
-    accepted.
+
+def independent_points(data: FRFData, fits: dict[Structure, Candidate]) -> float:
+    """Return how many real numbers the residual of the best fit counts for.
+
+    It may be correlated along frequency, for instance for a slightly nonlinear plant; otherwise
+    every higher order would be accepted.
     """
     best = min(fits.values(), key=lambda fit: fit.cost)
-    count = 2 * data.s.size / correlation_cost(data, best)
+    return 2 * data.s.size / correlation_cost(data, best)
+
+
+def information_criterion(data: FRFData, fit: Candidate, count: float, others: int = 0) -> float:
+    """Return the criterion of a fit, which has so many other parameters than those of its own."""
     # Schwarz (1978), noise variance eliminated: N log(cost) + parameters log N.
-    return {
-        key: float(count * np.log(smallest_cost(data, fit)) + parameters(fit) * np.log(count))
-        for key, fit in fits.items()
-    }
+    charge = (parameters(fit) + others) * np.log(count)
+    return float(count * np.log(smallest_cost(data, fit)) + charge)
 
 
 def parameters(fit: Candidate) -> int:
