@@ -1,5 +1,6 @@
 """The command line: what it writes, what it says, and how it ends."""
 
+import hashlib
 import html
 import json
 import subprocess
@@ -69,6 +70,9 @@ def test_one_record_gives_model_report_and_figures(folder, first):
     loaded = cr.load_model(out / "model.json")
     assert loaded.delay == direct.delay
     np.testing.assert_array_equal(loaded.delay_free.A, direct.delay_free.A)
+    report = (out / "report.html").read_text(encoding="utf-8")
+    for name in ("step_0.csv", "frf.csv"):
+        assert hashlib.sha256((folder / name).read_bytes()).hexdigest() in report
     assert direct.fit.report() in said
     assert cr.compare_frf(direct, cr.read_frf(folder / "frf.csv")).report() in said
     assert str(out) in said
@@ -97,6 +101,22 @@ def test_tune_tells_the_numbers_of_the_same_calls_in_python(tmp_path, capsys):
     assert files_in(tmp_path) == {"heater.csv"}
     assert main(["tune", *words, "--closed-loop-time", "1", "--rule", "amigo"]) == 2
     assert "--closed-loop-time is an argument of simc" in capsys.readouterr().err
+
+
+def test_tune_tells_the_same_numbers_for_a_saved_model(tmp_path, capsys):
+    file = save(step_record(), tmp_path / "heater.csv")
+    fit = [str(file), "--structures", "FOPDT"]
+    assert main(["tune", *fit, "--form", "siemens_pid_compact", "--require", "tuning"]) == 0
+    of_the_record = capsys.readouterr().out
+    assert main(["identify", *fit, "-o", str(tmp_path / "out"), "--no-report"]) == 0
+    capsys.readouterr()
+    model = str(tmp_path / "out" / "model.json")
+    assert main(["tune", model, "--form", "siemens_pid_compact", "--require", "tuning"]) == 0
+    first, rest = capsys.readouterr().out.split("\n", 1)
+    assert first.startswith(f"{model}: <DelayedStateSpace")
+    assert of_the_record.endswith(rest)
+    assert main(["tune", model, "--structures", "FOPDT"]) == 2
+    assert "is a saved model" in capsys.readouterr().err
 
 
 def test_tune_tells_a_doubtful_verdict_beside_the_numbers(tmp_path, capsys):

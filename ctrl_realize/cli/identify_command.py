@@ -15,7 +15,7 @@ from ..frequency import FRFComparison, compare_frf
 from ..identification.campaign.campaign import Campaign
 from ..identification.campaign.run import identify_campaign
 from ..identification.methods import identify as identify_record
-from ..io import read_frf
+from ..io import load_model, read_frf
 from ..results import ModelFit
 from .inputs import Reading, Settings, Source, calls_again
 from .machine import Told, told_as_json
@@ -60,8 +60,20 @@ def run_tune(
     entered: Mapping[str, Any],
     **given: Any,
 ) -> int:
-    """Identify one model of all records, tune, and return the exit code."""
-    return identified(files, folder, joint=True, tuning=Tuning(tuned, entered), **given)
+    """Tune for one model of all records, or for a saved one, and return the exit code."""
+    tuning = Tuning(tuned, entered)
+    if [file.suffix for file in files] != [".json"]:
+        return identified(files, folder, joint=True, tuning=tuning, **given)
+    unused = [name for name in ("chosen", "tests", "record") if given[name]]
+    if unused or folder is not None:
+        raise OptionError(
+            f"{files[0]} is a saved model: expected options of the controller and --require only, "
+            "got --output or options of records; give the records to have these"
+        )
+    system = load_model(files[0])
+    say(printable(f"{files[0]}: {system!r}"))
+    tuning.of(system)
+    return _judged(system, _required(given["require"]))
 
 
 def identified(
@@ -87,13 +99,14 @@ def identified(
         raise OptionError("expected --joint or --separate, got both")
     if len(tests) > 1:
         raise OptionError("expected --by or --split, got both")
-    required = [one_of(name, "require", tuple(_QUESTIONS)) for name in require or ()]
+    required = _required(require)
     settings = Settings(chosen, joint)
     how = Reading(record, tests)
     response = response or {}
     measured = None if frf is None else read_frf(frf, **response)
     calls = calls_again(files, settings, how, run.typed, None if frf is None else (frf, response))
-    sources, task = how.sources(files), _Task(settings, measured, required, run, tuning, told)
+    sources = how.sources(files)
+    task = _Task(settings, measured, frf, required, run, tuning, told)
     if told is not None and len(sources) > 1 and not joint:
         raise OptionError(
             f"--json is for one model: expected one record or --joint, got {len(sources)}"
@@ -117,6 +130,7 @@ class _Task:
 
     settings: Settings
     frf: MeasuredFRF | None
+    frf_file: Path | None
     required: list[str]
     run: Run
     tuning: Tuning | None = None
@@ -140,17 +154,22 @@ class _Task:
                 complain(f"no controller: {one_line(error)}")
             terminal, (name, lines) = calls
             calls = [terminal, (name, f"{lines}\n{self.tuning.in_python()}")]
-        report = self.run.report
-        return Provenance(files, self.frf, comparison, self.settings.given, calls, report, tuned)
+        given, report = self.settings.given, self.run.report
+        return Provenance(files, self.frf, self.frf_file, comparison, given, calls, report, tuned)
 
-    def judged(self, system: DelayedStateSpace) -> int:
-        """Exit code by the verdicts that are required."""
-        levels = {one.question: one.level for one in fit_of(system, ModelFit).verdicts}
-        missed = [name for name in self.required if levels.get(_QUESTIONS[name]) != "good"]
-        for name in missed:
-            level = levels.get(_QUESTIONS[name], "not judged by this method")
-            complain(f"--require {name}: the verdict is {level!r}")
-        return 4 if missed else 0
+
+def _required(require: Sequence[str] | None) -> list[str]:
+    return [one_of(name, "require", tuple(_QUESTIONS)) for name in require or ()]
+
+
+def _judged(system: DelayedStateSpace, required: Sequence[str]) -> int:
+    """Exit code by the verdicts that are required."""
+    levels = {one.question: one.level for one in fit_of(system, ModelFit).verdicts}
+    missed = [name for name in required if levels.get(_QUESTIONS[name]) != "good"]
+    for name in missed:
+        level = levels.get(_QUESTIONS[name], "not judged by this method")
+        complain(f"--require {name}: the verdict is {level!r}")
+    return 4 if missed else 0
 
 
 def _one(
@@ -174,9 +193,9 @@ def _one(
     if task.told is not None:
         task.told.append({"system": system, "records": records, **provenance.tuned})
     if folder is None:
-        return task.judged(system)
+        return _judged(system, task.required)
     written = write_record_files(folder, system, records[0], provenance)
-    return task.judged(system) if written else 1
+    return _judged(system, task.required) if written else 1
 
 
 def _say_what_is_written(output: Path, names: list[str], reported: bool) -> None:
@@ -211,7 +230,7 @@ def _many(
             written = write_campaign_files(folder, campaign, provenance)
     names = ["model.json", "records.csv", "models/"]
     _say_what_is_written(output, names, task.run.report and written)
-    return 1 if campaign.failed or not written else task.judged(campaign.system)
+    return 1 if campaign.failed or not written else _judged(campaign.system, task.required)
 
 
 def _refuse_useless(campaign: Campaign) -> None:

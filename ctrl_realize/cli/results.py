@@ -31,6 +31,7 @@ class Provenance(NamedTuple):
 
     files: Sequence[Path]
     frf: ct.FrequencyResponseData | None
+    frf_file: Path | None
     comparison: FRFComparison | None
     settings: Mapping[str, Any]
     calls: Sequence[tuple[str, str]]
@@ -69,6 +70,8 @@ def _write_files(folder: Path, write: Callable[..., Path], provenance: Provenanc
     if not provenance.with_report:
         return True
     files = list(dict.fromkeys(provenance.files))  # several tests may be in one
+    if provenance.frf_file is not None:
+        files.append(provenance.frf_file)
     with told_if_it_fails(folder, "the model") as written:
         shown = {name: getattr(provenance, name) for name in _SHOWN}
         shown |= provenance.tuned

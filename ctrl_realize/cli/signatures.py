@@ -90,13 +90,15 @@ def tune(
 ) -> None:
     """Tune a PID controller from records of its plant, and tell what to enter.
 
-    One model is identified from all records. The controller is checked on it and on the models that
-    fit the records as well; what would make the loop unstable is listed. With an output folder, the
-    report shows the closed loop with the output of the controller for all of these models.
+    One model is identified from all records, or was saved before (model.json). The controller is
+    checked on it and on the models that fit the records as well; what would make the loop unstable
+    is listed. With an output folder, the report shows the closed loop with the output of the
+    controller for all of these models.
 
     \b
     Examples:
       ctrl-realize tune step.csv --form siemens_pid_compact
+      ctrl-realize tune model.json --form siemens_pid_compact
       ctrl-realize tune step.csv --form emerson_deltav_series --measured-range 0 400 --kind PID
       ctrl-realize tune tests.csv -o out --by test --rule lambda --closed-loop-time 120
     """  # noqa: D301  # \b keeps the lines of the examples apart
