@@ -171,6 +171,18 @@ def test_several_records_stand_each_beside_the_model_with_the_scatter_of_their_g
     assert verdict_of(system, comparison=comparison).level == "poor"
 
 
+@pytest.mark.parametrize("every", [1, 10])
+def test_the_start_of_a_response_is_drawn_where_every_sample_is_an_update(tmp_path, every):
+    t = np.arange(400.0)
+    noise = 0.01 * np.random.default_rng(3).standard_normal(400)
+    y = np.where(t > 72, -2 * np.expm1(-np.clip(t - 72, 0, None) / 20), 0.0) + noise
+    record = cr.Record(t, np.where(t < 60, 0.0, 1.0), y[(np.arange(400) // every) * every])
+    model = cr.identify(record, structures=["FOPDT"])
+    page = report.write_identification(tmp_path / "report.html", model, record)
+    drawn = "Start of the response" in page.read_text(encoding="utf-8")
+    assert drawn == (every == 1)
+
+
 def test_hostile_names_stay_text(tmp_path, record, fitted):
     hostile = cr.Record(
         record.time, record.input, record.output, name=HOSTILE, input_labels=[HOSTILE],
