@@ -193,7 +193,8 @@ def _step_record(plant: DelayedStateSpace) -> tuple[FloatArray, FloatArray, bool
     integrating = bool(at_one.any())
     slowest = float(np.abs(poles[~at_one]).max(initial=0.0))
     settling = 10 / -np.log(slowest) if slowest > 0 else 4.0
-    count = int(min(MOST_SAMPLES, plant.delay * 1.5 + settling + 20))
+    # rounded, because lags in whole samples settle at one, from which rounding errors lead away
+    count = min(MOST_SAMPLES, 3 * plant.delay // 2 + round(settling) + 20)
     step = plant.step(count)
     gain = _slope(core) if integrating else float(np.real(core.dcgain()))
     reached = abs(gain) * (count * dt if integrating else 1.0)
