@@ -192,10 +192,11 @@ def _unstable_pole(
         return
     order = tried[best][1].structure.order
     ends = poles[max(best - 1, 0)], poles[min(best + 1, poles.size - 1)]
-    options = {"maxiter": 15, "xatol": 0.01}
-    pole = minimize_scalar(
-        lambda at: fitted(at, (order,))[0], bounds=ends, method="bounded", options=options
-    ).x
+    closest = minimize_scalar(
+        lambda at: fitted(float(at), (order,))[0], bounds=ends, method="bounded",
+        options={"xatol": 0.01},
+    )  # fmt: skip
+    pole = float(closest.x)
     criterion, fit = fitted(pole, (order,))
     if criterion < information_criterion(data, chosen, count) - _EVIDENCE:
         yield flagged(
