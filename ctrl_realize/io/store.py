@@ -163,8 +163,9 @@ class CampaignStore:
         try:
             # rows may be taken by other threads, one at a time
             database = self._database or sqlite3.connect(
-                address, _WAIT, uri=True, isolation_level="IMMEDIATE", check_same_thread=False
-            )
+                address, timeout=_WAIT, uri=True, isolation_level="IMMEDIATE",
+                check_same_thread=False,
+            )  # fmt: skip
             with nullcontext() if self._database else closing(database):
                 yield database
         except sqlite3.OperationalError as error:

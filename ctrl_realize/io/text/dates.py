@@ -100,7 +100,7 @@ def in_utc(stamps: Stamps, zone: str) -> Stamps:
         ) from error
     turned = direction(stamps)
     ordered = stamps[::turned]
-    back = np.flatnonzero(np.diff(ordered) < np.timedelta64(0))
+    back = np.flatnonzero(np.diff(ordered) < np.timedelta64(0, "ns"))
     # equal stamps: an hour apart in a table of hours, or those of several signals at one time
     once = np.r_[True, ordered[1:] != ordered[:-1]][: stamps.size]
     tries: list[tuple[Any, Any]] = [(np.ones_like(once), "infer"), (once, "infer")]
@@ -122,7 +122,7 @@ def in_utc(stamps: Stamps, zone: str) -> Stamps:
 
 def direction(stamps: Stamps) -> int:
     """1 for stamps in order, -1 for the newest first; a clock may be set in between."""
-    return -1 if np.sum(np.diff(stamps) < np.timedelta64(0)) > stamps.size / 2 else 1
+    return -1 if np.sum(np.diff(stamps) < np.timedelta64(0, "ns")) > stamps.size / 2 else 1
 
 
 def have_offset(cell: str) -> bool:
