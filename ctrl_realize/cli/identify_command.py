@@ -154,8 +154,8 @@ class _Task:
                 complain(f"no controller: {one_line(error)}")
             terminal, (name, lines) = calls
             calls = [terminal, (name, f"{lines}\n{self.tuning.in_python()}")]
-        given, report = self.settings.given, self.run.report
-        return Provenance(files, self.frf, self.frf_file, comparison, given, calls, report, tuned)
+        shown = self.settings.given, calls, self.run.report, tuned, self.frf_file
+        return Provenance(files, self.frf, comparison, *shown)
 
 
 def _required(require: Sequence[str] | None) -> list[str]:

@@ -31,12 +31,12 @@ class Provenance(NamedTuple):
 
     files: Sequence[Path]
     frf: ct.FrequencyResponseData | None
-    frf_file: Path | None
     comparison: FRFComparison | None
     settings: Mapping[str, Any]
     calls: Sequence[tuple[str, str]]
     with_report: bool = True
     tuned: Mapping[str, Any] = MappingProxyType({})
+    frf_file: Path | None = None
 
 
 def write_record_files(
