@@ -39,7 +39,7 @@ def judged(one: Case) -> dict[str, object]:
     fit = cr.fit_output_error(one.record).fit
     said = {verdict.question: verdict for verdict in fit.verdicts}
     plant, low, high = one.plant, *fit.interval
-    latest = min(fit.onset, high)
+    latest = float(np.fmin(fit.onset, high))  # any input has no onset
     reach = max(0.2 * latest, 2 * fit.dt, 0.1 * fit.total_delay)
     row: dict[str, object] = {
         "kind": one.kind,
