@@ -16,8 +16,10 @@ from .impulse import ImpulseResponse
 class ImpulseEstimate(ImpulseResponse, Result):
     """Estimated unit-pulse response: an `ImpulseResponse` with standard deviations.
 
-    ``markov +- 2 std`` is the 95 % band of each Markov parameter, for white output noise; the
-    errors of neighbouring parameters are correlated. `noise_std` is the noise in the outputs.
+    ``markov +- 2 std`` is the 95 % band of a Markov parameter, for white output noise, on average
+    over the response: a regularised estimate is smoother than its first step after a dead time, and
+    one of OKID has nothing beyond its order, so that there fewer are within. The errors of
+    neighbouring parameters are correlated. `noise_std` is the noise in the outputs.
 
     Attributes
     ----------

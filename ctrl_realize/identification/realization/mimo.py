@@ -154,7 +154,9 @@ def delay_matrix(
         raise OptionError(f"level={level!r}; expected a part of the largest value, 0 <= level < 1")
     size = np.abs(channels(data))
     top = size.max(axis=-1, keepdims=True)
-    limit = np.maximum(share * top, 1e-12 * size.max())
+    # Outputs, and inputs, have units of their own.
+    rounding = 1e-12 * np.minimum(top.max(axis=0, keepdims=True), top.max(axis=1, keepdims=True))
+    limit = np.maximum(share * top, rounding)
     if isinstance(data, ImpulseEstimate):
         noise = np.reshape(data.std, size.shape)
     else:

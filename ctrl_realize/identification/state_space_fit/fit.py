@@ -79,8 +79,10 @@ def fit_state_space(
     Of records with more than 100 000 samples in total only that many are fitted, from where the
     inputs move (flag "cut").
 
-    The model is consistent for coloured noise as well, but BIC assumes white noise: with strongly
-    correlated noise the order may be slightly too high. The delays are whole samples; delays that
+    An output for whose drift there is very strong evidence has one that is estimated with the model
+    (flag "drift"). The model is consistent for coloured noise as well, but BIC assumes white noise:
+    with strongly correlated noise the order is too high, and gains at frequency zero may be wrong
+    (flags "coloured_residual", "highest_order"). The delays are whole samples; delays that
     cannot be split into those of inputs and outputs are modelled by states.
 
     References

@@ -2,23 +2,25 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import control as ct
 import numpy as np
 
 from ..._flags import Flag, flagged
-from ..._wording import in_percent, in_time, interval_in_time, time_within
+from ..._wording import in_percent, in_time, interval_in_time, rate_in_time, time_within
 from ...data import Record
 from ...delayed import DelayedStateSpace
 from ...numerics.arrays import FloatArray, read_only
+from ...numerics.constants import SMALLEST
 from ...numerics.state_space.balancing import balanced_truncation
 from ...results import IntervalKind, ModelFit
 from ..output_error.loop_flags import unstable_flags
 from ..output_error.result import OutputErrorFit
 from ..validation.residuals import analyse_residuals
 from ..validation.residuals_result import ResidualAnalysis
-from .search import Candidate
+from .search import Candidate, level
 
 COLOURED, WANDERING = 0.5, 0.97
 """Correlation of neighbouring residuals above which they are called coloured, with a drift like
@@ -67,7 +69,7 @@ class StateSpaceFit(ModelFit):
         Automatic choices, with reasons.
     flags : tuple of Flag
         Those of the checks, and ``"highest_order"``, ``"no_response"``,
-        ``"coloured_residual"``, ``"unstable"``.
+        ``"coloured_residual"``, ``"drift"``, ``"unstable"``.
 
     Examples
     --------
@@ -168,7 +170,7 @@ def fitted_system(
     A, B, C, _ = balanced_truncation(A, B, C, best.order)
     core = ct.ss(A, B, C, D, group[0].dt)
     system = DelayedStateSpace(core, best.inputs, output_delay=best.outputs)
-    complete = [r for r in group if not r.n_missing]
+    complete, drift = _without_drifts(best, group)
     checks = tuple(
         analyse_residuals(system, r, lags=max(min(LAGS, r.n_samples // 3), 1)) for r in complete
     )
@@ -207,9 +209,32 @@ def fitted_system(
         checks=checks,
         records=group,
         choices=choices,
-        flags=(*flags, *seen.values(), *loop),
+        flags=(*flags, *drift, *seen.values(), *loop),
     )
     first = group[0]
     labels = {"inputs": list(first.input_labels), "outputs": list(first.output_labels)}
     name = {"name": first.name} if first.name else {}
     return system.replace(fit=fit, **labels, **name)
+
+
+def _without_drifts(best: Candidate, group: Sequence[Record]) -> tuple[list[Record], list[Flag]]:
+    """Complete records from which the drifts of a fit are taken, and a flag for the largest."""
+    late = max(best.inputs)
+    known = [r for r in group if r.n_samples - late > 1]
+    found, told = [], dict[float, Flag]()
+    for record, change in zip(known, best.found.drifts, strict=True):
+        slope, count = change / (record.n_samples - late - 1), record.n_samples
+        output = np.atleast_2d(record.output)
+        shares = (
+            count
+            * np.abs(slope)
+            / np.fmax(np.nanmax(output, axis=1) - np.nanmin(output, axis=1), SMALLEST)
+        )
+        if change.any():
+            a = int(np.argmax(shares))
+            share = f"{100 * shares[a]:.2g} % of the range of output {a}"
+            rate = rate_in_time(float(slope[a]) / record.dt)
+            told[float(shares[a])] = flagged("drift", rate=rate, share=share)
+        if not record.n_missing:
+            found.append(level(record, slope))
+    return found, [told[max(told)]] if told else []

@@ -6,14 +6,16 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 
 from ...data import Record
 from ...errors import DataError, OrderError
 from ...numerics.arrays import FloatArray
-from ...numerics.constants import VERY_STRONG
+from ...numerics.constants import SMALLEST, VERY_STRONG
 from ...numerics.hankel.delay_models import OneModel, realize_at
 from ...numerics.regression.arx import excited_directions
 from ...numerics.regression.normal_equations import normal_equations
+from ...numerics.signals.noise import correlation_time
 from ...numerics.state_space.section_fit import MOST_STEPS, Experiment, SectionFit, fit_sections
 from ...numerics.state_space.sections import Sections, in_sections
 
@@ -37,6 +39,9 @@ NEARBY = 10
 FARTHEST = 200
 """Largest number of changes of the delays."""
 
+MEMORY = 100
+"""Number of samples of the inputs beside whose response a drift is looked for."""
+
 FARTHEST_PLAUSIBLE = 12
 """Number of delays around the estimate that are tried."""
 
@@ -57,7 +62,7 @@ class Candidate:
 
 
 def experiments(
-    group: Sequence[Record], shares: Shares, most: int | None = None
+    group: Sequence[Record], shares: Shares, most: int | None = None, *, drift: bool = False
 ) -> list[Experiment]:
     """Align inputs and outputs by their delays, up to `most` samples of all records together.
 
@@ -78,7 +83,7 @@ def experiments(
         for row, mine, d in zip(late, y, outputs, strict=True):
             row[: max(count - d, 0)] = mine[first + d : samples]
         level = np.nanmean(y[:, :samples], axis=1, keepdims=True)
-        found.append(Experiment(v - v.mean(axis=1, keepdims=True), late - level))
+        found.append(Experiment(v - v.mean(axis=1, keepdims=True), late - level, drift))
         if left is not None:
             left -= samples
     if not found:
@@ -91,13 +96,19 @@ class Search:
 
     `markov` (p, m, N) is the starting point of the fits; channels are scaled to the same size
     first, otherwise the smallest would be modelled last. All fits but the last use `enough`
-    samples.
+    samples. With `drift` every output may have one.
     """
 
     def __init__(
-        self, group: Sequence[Record], markov: FloatArray, top: int, enough: int = ENOUGH_SAMPLES
+        self,
+        group: Sequence[Record],
+        markov: FloatArray,
+        top: int,
+        enough: int = ENOUGH_SAMPLES,
+        *,
+        drift: bool = False,
     ) -> None:
-        self._group = group
+        self._group, self._drift = group, drift
         self._enough = enough
         self._markov = markov
         self._top = top
@@ -139,7 +150,7 @@ class Search:
         self, order: int, shares: Shares, *, feedthrough: bool, start: Candidate | None = None
     ) -> Candidate:
         """Fit one structure, starting from another fit or from Kung's realization."""
-        data = experiments(self._group, shares, self._enough)
+        data = self._experiments(shares, self._enough)
         sections = start.found.model if start is not None else self._kung(order, shares)
         most = MOST_STEPS if start is None else NEARBY
         found = fit_sections(data, sections, feedthrough=feedthrough, enough=ROUGHLY, most=most)
@@ -167,7 +178,7 @@ class Search:
 
     def _minimum(self, one: Candidate) -> Candidate:
         shares = one.inputs, one.outputs
-        data, model = experiments(self._group, shares, self._enough), one.found.model
+        data, model = self._experiments(shares, self._enough), one.found.model
         fit = fit_sections(
             data, model, feedthrough=one.feedthrough, enough=CONVERGED, most=MOST_TURNS
         )
@@ -178,7 +189,7 @@ class Search:
     def finish(self, best: Candidate) -> Candidate:
         """Final fit to all samples."""
         shares = best.inputs, best.outputs
-        data = experiments(self._group, shares)
+        data = self._experiments(shares)
         found = fit_sections(data, best.found.model, feedthrough=best.feedthrough)
         return replace(best, found=found)
 
@@ -265,6 +276,9 @@ class Search:
                         low, high, missed = min(low, first), max(high, end), 0
         return low, high
 
+    def _experiments(self, shares: Shares, most: int | None = None) -> list[Experiment]:
+        return experiments(self._group, shares, most, drift=self._drift)
+
     def _excites(self, order: int) -> bool:
         lags = order + 1
         parts = [np.atleast_2d(r.input) for r in self._group if r.n_samples > lags]
@@ -298,9 +312,46 @@ class Search:
         values = found.counts.sum() / p
         used = min(self._samples, self._enough)
         count = order * (p + m) + (p * m if feedthrough else 0)
-        # As if the same number of samples remained for all delays.
-        bic = 2 * found.loss * used / values + count * np.log(used)
+        # As if the same number of samples remained for all delays, and in units of the outputs.
+        loss = found.loss - float(found.counts @ np.log(self._size_out))
+        bic = 2 * loss * used / values + count * np.log(used)
         return Candidate(found, order, *shares, feedthrough, float(bic))
+
+
+def slopes_of(record: Record) -> FloatArray:
+    """Drift (p,) of every output by sample, 0 where the evidence for one is not very strong.
+
+    Beside a level and the response to the last `MEMORY` samples of the inputs, by least squares.
+    """
+    u, y = np.atleast_2d(record.input), np.atleast_2d(record.output)
+    lags = min(MEMORY, u.shape[1] // (PER_PARAMETER * (1 + len(u))))
+    found = np.zeros(len(y))
+    if lags < 2:
+        return found
+    past = sliding_window_view(u[:, :ENOUGH_SAMPLES], lags, axis=1)
+    rows = np.hstack([*past, np.ones((past.shape[1], 1))])
+    for a, late in enumerate(y[:, lags - 1 :][:, : len(rows)]):
+        seen = np.isfinite(late)
+        ramp = np.flatnonzero(seen) - 0.5 * (late.size - 1)
+        basis, size, _ = np.linalg.svd(rows[seen], full_matrices=False)
+        basis = basis[:, size > 1e-10 * size[0]]
+        own, left = (x - basis @ (basis.T @ x) for x in (ramp, late[seen]))
+        slope = float(own @ left) / float(own @ own)
+        rest = left - slope * own
+        count = (rest.size - basis.shape[1] - 1) / correlation_time(rest)
+        before, after = float(left @ left), max(float(rest @ rest), SMALLEST)
+        if count > 1 and count * np.log(before / after) - np.log(count) > VERY_STRONG:
+            found[a] = slope
+    return found
+
+
+def level(record: Record, slope: FloatArray) -> Record:
+    """Record without the drift (p,) of its outputs by sample."""
+    if not slope.any():
+        return record
+    away = np.outer(slope, np.arange(record.n_samples) - (record.n_samples - 1) / 2)
+    output = record.output - away.reshape(np.shape(record.output))
+    return record.__replace__(output=output, missing="keep" if record.n_missing else "refuse")
 
 
 def _within(found: Candidate) -> tuple[float, float]:

@@ -20,7 +20,7 @@ from ...numerics.state_space.delay_split import split_delays
 from ..impulse.from_io import Method, Start, impulse_from_io
 from ..realization.mimo import delay_matrix
 from .result import StateSpaceFit, fitted_system
-from .search import ENOUGH_SAMPLES, ORDERS, Candidate, Search, Shares
+from .search import ENOUGH_SAMPLES, ORDERS, Candidate, Search, Shares, level, slopes_of
 
 LEVEL = 0.02
 """Threshold for a response when delays are to be found, relative to a channel's largest Markov
@@ -97,14 +97,17 @@ def _from_start(
     with warnings.catch_warnings():
         # Directions determined by the prior are used for starting only.
         warnings.simplefilter("ignore", DataWarning)
-        impulse = impulse_from_io(group, method=method, start=start)
+        slopes = [slopes_of(record) for record in group]
+        still = [level(record, slope) for record, slope in zip(group, slopes, strict=True)]
+        impulse = impulse_from_io(still, method=method, start=start)
     markov = np.reshape(impulse.markov, (group[0].noutputs, group[0].ninputs, -1))
     unseen = sum(flag.code == "no_response" for flag in impulse.flags)
     if unseen == group[0].noutputs:
         raise DataError(
             "no output shows a response to the inputs above the noise level; check the columns"
         )
-    search = Search(group, markov, max(asked or ORDERS), enough)
+    drift = any(slope.any() for slope in slopes)
+    search = Search(group, markov, max(asked or ORDERS), enough, drift=drift)
     orders = search.orders(asked)
     found = delay_matrix(impulse, level=LEVEL) if delays is None else _given_delays(delays, markov)
     shares = _split(found)

@@ -1,7 +1,7 @@
 """Output-error fit of a model with several channels, from an approximate initial model.
 
 The misfit is the likelihood of white noise of unknown variance in every output, ``sum_a n_a
-log(rss_a / n_a) / 2``. The level of every output and the initial state of every record enter
+log(rss_a / n_a) / 2``. Level and drift of every output and the initial state of every record enter
 linearly and are eliminated (variable projection); the other parameters are optimised by damped
 Gauss-Newton steps. Each section has two directions in which B and C cancel; the damping prevents
 steps along them.
@@ -54,10 +54,11 @@ _EXACT = 1e-12
 
 @dataclass(frozen=True, eq=False)
 class Experiment:
-    """Inputs `v` (m, T) and outputs `y` (p, T); NaN in y is a missing sample."""
+    """Inputs `v` (m, T) and outputs `y` (p, T), which may drift; NaN in y is a missing sample."""
 
     v: FloatArray
     y: FloatArray
+    drift: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,7 +67,7 @@ class SectionFit:
 
     `variance` and `spread` (p,) are the variances of the residuals and of the outputs,
     `counts` the numbers of samples. ``loss`` is minus the log likelihood up to a constant;
-    `steps` is the number of Gauss-Newton steps.
+    `steps` is the number of Gauss-Newton steps, `drifts` (p,) are changes over each experiment.
     """
 
     model: Sections
@@ -75,6 +76,7 @@ class SectionFit:
     counts: FloatArray
     loss: float
     steps: int
+    drifts: tuple[FloatArray, ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,13 +85,14 @@ class _Point:
 
     The residuals of missing samples are zero.
 
-    `initial` (2 q,) are the initial states of the experiments.
+    `initial` (2 q,) are the initial states of the experiments, `drifts` (p,) their drifts.
     """
 
     model: Sections
     moved: tuple[Motion, ...]
     left: tuple[FloatArray, ...]
     initial: tuple[FloatArray, ...]
+    drifts: tuple[FloatArray, ...]
     variance: FloatArray
     cost: float
 
@@ -130,12 +133,11 @@ def fit_sections(
             _residual(candidate, m, one, k, weights)
             for m, one, k in zip(moved, data, known, strict=True)
         ]
-        left, initial = (tuple(parts) for parts in zip(*solved, strict=True))
+        left, initial, drifts = (tuple(parts) for parts in zip(*solved, strict=True))
         squares = np.sum([(r**2).sum(axis=1) for r in left], axis=0)
         variance = np.maximum(squares / counts, floor)
-        return _Point(
-            candidate, moved, left, initial, variance, float(counts @ np.log(variance)) / 2
-        )
+        cost = float(counts @ np.log(variance)) / 2
+        return _Point(candidate, moved, left, initial, drifts, variance, cost)
 
     here = at(model, 1 / spread)
     mask = model.free(feedthrough=feedthrough, poles=False)
@@ -161,7 +163,7 @@ def fit_sections(
         damping = max(damping / _FACTOR, _LEAST_DAMPING)
         if gain < enough:
             break
-    return SectionFit(here.model, here.variance, spread, counts, here.cost, done)
+    return SectionFit(here.model, here.variance, spread, counts, here.cost, done, here.drifts)
 
 
 def _damped_step(gram: FloatArray, slope: FloatArray, damping: float) -> FloatArray:
@@ -222,24 +224,24 @@ def _stepped(model: Sections, mask: NDArray[np.bool_], step: FloatArray) -> Sect
     return model.moved(full)
 
 
-def _linear(model: Sections, moved: Motion, p: int) -> FloatArray:
-    """Responses (p, columns, T) to the initial state and the levels."""
-    free = moved.starts(model)
-    levels = np.broadcast_to(np.eye(p)[:, :, None], (p, p, free.shape[-1]))
-    return np.concatenate([free, levels], axis=1)
+def _linear(model: Sections, moved: Motion, one: Experiment) -> FloatArray:
+    """Responses (p, columns, T) to the initial state; levels, and drifts by 1 of all outputs."""
+    p, T = one.y.shape
+    shapes = np.stack([np.ones(T), np.linspace(-0.5, 0.5, T)][: 1 + one.drift])
+    own = np.eye(p)[:, None, :, None] * shapes[:, None]
+    return np.concatenate([moved.starts(model), own.reshape(p, -1, T)], axis=1)
 
 
 def _basis(
-    model: Sections, moved: Motion, known: NDArray[np.bool_], weights: FloatArray
+    model: Sections, moved: Motion, one: Experiment, known: NDArray[np.bool_], weights: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     """Orthonormal columns (p T, k) that span the weighted responses of `_linear`.
 
-    And (columns, k), by which their coefficients become initial states and levels. Normal equations
+    And (columns, k), by which their coefficients become those of `_linear`. Normal equations
     would square the condition number: for slow poles, whose responses are similar, the minimum
     would not be found accurately.
     """
-    p = known.shape[0]
-    columns = _linear(model, moved, p) * known[:, None]
+    columns = _linear(model, moved, one) * known[:, None]
     columns *= np.sqrt(weights)[:, None, None]
     wide = np.swapaxes(columns, 1, 2).reshape(-1, columns.shape[1])
     size = np.sqrt(np.einsum("tk,tk->k", wide, wide))
@@ -253,16 +255,20 @@ def _basis(
 
 def _residual(
     model: Sections, moved: Motion, one: Experiment, known: NDArray[np.bool_], weights: FloatArray
-) -> tuple[FloatArray, FloatArray]:
-    """Residual of the outputs with the best initial state and levels, and that state (2 q,)."""
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Residual of the outputs with the best initial state, levels and drifts.
+
+    And that state (2 q,), and the changes (p,) by the drifts.
+    """
     root = np.sqrt(weights)[:, None]
     rest = (np.where(known, one.y - moved.output(model, one.v), 0.0) * root).ravel()
-    basis, back = _basis(model, moved, known, weights)
+    basis, back = _basis(model, moved, one, known, weights)
     parts = rest @ basis
     left = rest - basis @ parts
     left -= basis @ (left @ basis)  # repeated, for the digits lost the first time
-    initial = (back @ parts)[: model.a.size]
-    return np.asarray(left.reshape(known.shape) / root), np.asarray(initial)
+    terms, p = back @ parts, len(known)
+    drifts = terms[model.a.size + p :] if one.drift else np.zeros(p)
+    return np.asarray(left.reshape(known.shape) / root), terms[: model.a.size], drifts
 
 
 def _normal(
@@ -280,7 +286,7 @@ def _normal(
     ):
         moved = rest.started(here.model, initial)
         p, T = one.y.shape
-        linear = _basis(here.model, moved, seen, weights)[0].reshape(p, T, -1)
+        linear = _basis(here.model, moved, one, seen, weights)[0].reshape(p, T, -1)
         sums = np.zeros((count + linear.shape[2] + 1,) * 2)
         for begin in range(0, T, _ROWS):
             part = slice(begin, begin + _ROWS)

@@ -1,3 +1,5 @@
+import re
+
 import control as ct
 import numpy as np
 import pytest
@@ -47,6 +49,38 @@ def test_order_delays_and_direct_term_are_found(model):
     assert_allclose(fit.fit_percent, 100 * (1 - 0.1 / np.sqrt(1.01)), rtol=0, atol=0.9)
 
 
+@pytest.mark.parametrize("missing", [False, True])
+def test_a_drift_of_an_output_leaves_its_gains(missing):
+    """Of ten records nine had a pole at 1 in place of the drift, and gains of -2400 to 15 500."""
+    time = np.arange(800.0)
+    plants = [
+        cr.delayed_ss(ct.tf([1.0], [5, 1]), dead_time=3, dt=1.0),
+        cr.delayed_ss(ct.tf([0.5], [8, 1]), dead_time=6, dt=1.0),
+    ]
+    rng = np.random.default_rng(14)
+    u = np.repeat(rng.choice([-1.0, 1.0], (2, 200)), 4, axis=1)
+    y = sum(one.simulate(row) for one, row in zip(plants, u, strict=True)) + time / 800
+    y += 0.05 * rng.standard_normal(800)
+    y[300:340] = np.nan if missing else y[300:340]
+    sys = cr.fit_state_space(cr.Record(time, u, y, missing="keep" if missing else "refuse"))
+    assert_allclose(np.ravel(sys.dcgain()), [1.0, 0.5], rtol=0, atol=0.03)  # 3 standard errors
+    told = [str(flag) for flag in sys.fit.flags if flag.code == "drift"]
+    rate = float(re.search(r"a drift of (\S+) per s", told[0])[1])
+    assert rate == pytest.approx(1 / 800, rel=0.05)
+    assert all(check.independent and check.white for check in sys.fit.checks)
+
+
+@pytest.mark.parametrize("units", [(1e-6, 1e6), (1e6, 1e-6), (1e-9, 1e9)])
+def test_units_of_the_outputs_change_nothing_else(model, units):
+    """Orders were 2 for 5, and delays (0, 2) and (0, 11) for (3, 5) and (0, 7)."""
+    data = record()
+    scaled = cr.Record(data.time, data.input, np.reshape(units, (2, 1)) * data.output)
+    found = cr.fit_state_space(scaled)
+    assert (found.fit.order, found.fit.input_delays, found.fit.output_delays) == (3, (2, 5), (0, 7))
+    same = found.markov(40) / np.reshape(units, (2, 1, 1))
+    assert_allclose(same, model.markov(40), rtol=0, atol=1e-4)  # where the fits end
+
+
 def test_several_records_and_missing_outputs_are_used():
     first, second = record(2, 300), record(3, 300)
     y = second.output + 40.0
@@ -80,18 +114,16 @@ def test_another_start_is_tried_where_the_first_leads_nowhere():
     assert (found.fit.order, found.delay) == (1, 20)
 
 
-def test_an_integrator_that_is_not_found_is_told_with_what_finds_it():
+def test_an_integrator_beside_a_lag_that_is_left_out_is_told_with_what_finds_it():
     rng = np.random.default_rng(0)
-    u = np.repeat(rng.choice([-1.0, 1.0], 120), 5)
-    level = 0.1 * np.cumsum(np.concatenate([np.zeros(4), u[:-4]]))
-    data = cr.Record(np.arange(600.0), u, level + 0.05 * rng.standard_normal(600))
-    (flag,) = (
-        f for f in cr.fit_state_space(data, [1, 2]).fit.flags if f.code == "coloured_residual"
-    )
+    u = np.repeat(rng.choice([-1.0, 1.0], 60), 10)
+    plant = cr.delayed_ss(ct.tf([0.1], [10, 1, 0]), dead_time=3, dt=1.0)
+    data = cr.Record(np.arange(600.0), u, plant.simulate(u) + 0.05 * rng.standard_normal(600))
+    (flag,) = (f for f in cr.fit_state_space(data, 1).fit.flags if f.code == "coloured_residual")
     assert "use fit_output_error" in str(flag)
     found = cr.identify(data)
-    assert found.fit.delay_interval[0] <= 3 <= found.fit.delay_interval[1]
-    assert_allclose(np.ravel(found.markov(30))[5:], 0.1, rtol=0.05)
+    assert found.fit.interval[0] <= 3 <= found.fit.interval[1]
+    assert_allclose(np.ravel(found.markov(100))[-1], 0.1, rtol=0.05)
 
 
 @pytest.mark.parametrize("constant", [True, False])
