@@ -9,6 +9,7 @@ from contextlib import redirect_stderr, redirect_stdout
 from io import StringIO
 from pathlib import Path
 
+import control as ct
 import numpy as np
 import pandas as pd
 import pytest
@@ -117,6 +118,20 @@ def test_tune_tells_the_same_numbers_for_a_saved_model(tmp_path, capsys):
     assert of_the_record.endswith(rest)
     assert main(["tune", model, "--structures", "FOPDT"]) == 2
     assert "is a saved model" in capsys.readouterr().err
+
+
+def test_tune_takes_any_saved_plant_and_no_loop(tmp_path, capsys):
+    plant = cr.delayed_ss(ct.tf([2], [3, 1]), dead_time=1.25, dt=0.1)
+    cr.save_model(tmp_path / "plant.json", plant)
+    cr.save_model(tmp_path / "loop.json", ct.feedback(0.3 * plant))
+    assert main(["tune", str(tmp_path / "plant.json")]) == 0
+    expected = cr.design.pid(plant, closed_loop_time="robust").report()
+    assert expected in capsys.readouterr().out
+    for words in (["loop.json"], ["plant.json", "--require", "gain"]):
+        assert main(["tune", str(tmp_path / words[0]), *words[1:]]) == 2
+        said = capsys.readouterr()
+        assert said.out == ""
+        assert "no model of a plant that was identified" in said.err
 
 
 def test_tune_tells_a_doubtful_verdict_beside_the_numbers(tmp_path, capsys):

@@ -144,6 +144,8 @@ ERRORS = {
         (lambda: LATE * DISCRETE, "continuous and dt = 0.1|dt = 0.1 s and continuous"),
         (lambda: 1 / cr.delayed_ss(LAG, 3, dt=0.1), "not proper"),
         (lambda: LATE**-1, "not proper"),
+        (lambda: cr.delay(1.0) / ct.tf([0.7], [0.2, 1]), "not proper"),
+        (lambda: ct.tf([2], [3, 1]) * cr.delay(1.3) / ct.ss(-1, 1, 1, 0), "not proper"),
         (lambda: VALVE + ct.tf([1, 0], [1], 0.1), "more zeros than poles"),
         (lambda: ct.tf([1, 0], [1]) * cr.delay(1.0), "proper"),
         (lambda: VALVE + np.nan, "non-finite"),

@@ -70,10 +70,15 @@ def run_tune(
             f"{files[0]} is a saved model: expected options of the controller and --require only, "
             "got --output or options of records; give the records to have these"
         )
-    system = load_model(files[0])
+    system, required = load_model(files[0]), _required(given["require"])
+    if not isinstance(system, DelayedStateSpace) or (required and system.fit is None):
+        raise UnsuitableSystemError(
+            f"{files[0]} holds no model of a plant that was identified; expected one written by "
+            "identify, or without --require a DelayedStateSpace"
+        )
     say(printable(f"{files[0]}: {system!r}"))
     tuning.of(system)
-    return _judged(system, _required(given["require"]))
+    return _judged(system, required) if required else 0
 
 
 def identified(

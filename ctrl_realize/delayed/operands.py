@@ -74,6 +74,31 @@ def check_proper(system: ct.TransferFunction, purpose: str) -> None:
                 )
 
 
+def check_divisor(system: Any) -> None:
+    """Check that the inverse of a divisor without delay is proper.
+
+    Raises
+    ------
+    UnsuitableSystemError
+    """
+    lower = False
+    if isinstance(system, ct.TransferFunction) and system.issiso():
+        num, den = (np.trim_zeros(part[0][0], "f") for part in (system.num, system.den))
+        lower = num.size < den.size
+    elif isinstance(system, ct.StateSpace) and not isinstance(system, DeferredMatrices):
+        lower = np.linalg.matrix_rank(system.D) < len(system.D)
+    if lower:
+        raise UnsuitableSystemError(improper_inverse(system.name))
+
+
+def improper_inverse(name: str) -> str:
+    """Message about a system whose inverse no state-space model has."""
+    return (
+        f"the inverse of {name!r} is not proper: nothing of the input is seen at the output at "
+        "once. Close the loop with ct.feedback instead of dividing"
+    )
+
+
 def common_dt(first: Any, second: Any) -> float | None:
     """Common time base of two systems; numbers and systems without one adopt the other.
 

@@ -15,10 +15,12 @@ from ..numerics.internal_delays.merging import ends_apart, merged
 from .deferred import DeferredMatrices
 from .operands import (
     Numbers,
+    check_divisor,
     common_dt,
     core_states,
     everywhere,
     form_of,
+    improper_inverse,
     is_linear,
     is_single,
     labels_of,
@@ -137,6 +139,11 @@ class DelayOperators(DeferredMatrices):
         states = core_states(before, first) + core_states(after, second)
         return self._joined(product(second, first), common_dt(self, other), inputs, outputs, states)
 
+    def __truediv__(self, other: Any) -> Any:
+        """Series with the inverse of `other`, if that is proper."""
+        check_divisor(other)
+        return super().__truediv__(other)
+
     def __pow__(self, power: Any) -> Any:
         """Power; -1 is the inverse, if that is proper."""
         if power != -1 or isinstance(power, bool):
@@ -144,10 +151,7 @@ class DelayOperators(DeferredMatrices):
         try:
             form = forms.inverse(self._form())
         except np.linalg.LinAlgError:
-            raise UnsuitableSystemError(
-                f"the inverse of {self.name!r} is not proper: nothing of the input is seen at the "
-                "output at once. Close the loop with ct.feedback instead of dividing"
-            ) from None
+            raise UnsuitableSystemError(improper_inverse(self.name)) from None
         return self._joined(form, self.dt, self.output_labels, self.input_labels)
 
     def feedback(self, other: Any = 1, sign: float = -1) -> Any:

@@ -35,7 +35,7 @@ class FRFComparison(Result):
         Points inside the band.
     band_hz : tuple of float
         Lowest and highest frequency of the trusted band.
-    band_from : {"coherence", "std", "all"}
+    band_from : {"coherence", "std", "all", "given"}
         Criterion of the band.
     coherence, std : ndarray or None
         Coherence and standard deviation of the measurement.
@@ -69,7 +69,7 @@ class FRFComparison(Result):
     model_phase_deg: FloatArray
     trusted: BoolArray
     band_hz: tuple[float, float]
-    band_from: Literal["coherence", "std", "all"]
+    band_from: Literal["coherence", "std", "all", "given"]
     coherence: FloatArray | None
     std: FloatArray | None
     hold: Literal["zoh"] | None
@@ -134,6 +134,7 @@ class FRFComparison(Result):
             "coherence": "high coherence",
             "std": "small standard deviation",
             "all": "all points: no coherence or std given",
+            "given": "as given",
         }[self.band_from]
         rows = [
             ("trusted band", f"{hertz(self.band_hz[0])} to {hertz(self.band_hz[1])} ({source})"),

@@ -17,7 +17,7 @@ DEFAULT_MIN_COHERENCE = 0.95
 DEFAULT_MAX_RELATIVE_STD = 0.1
 _SMOOTHED_POINTS = 5
 
-Source = Literal["coherence", "std", "all"]
+Source = Literal["coherence", "std", "all", "given"]
 
 
 def trusted_points(
@@ -31,7 +31,7 @@ def trusted_points(
                 "min_coherence is given, but the FRF has no coherence; pass band_hz=(low, high)"
             )
     if band_hz is not None:
-        return _inside(points, band_hz), "all"
+        return _inside(points, band_hz), "given"
     if points.coherence is not None:
         limit = DEFAULT_MIN_COHERENCE if min_coherence is None else min_coherence
         good = running_median(points.coherence, _SMOOTHED_POINTS) >= limit

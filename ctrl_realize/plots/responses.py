@@ -184,8 +184,8 @@ def system_plot(
     ----------
     system : DelayedStateSpace
     until : float, optional
-        End of the plot in s; default: when the response has settled, as in `control.step_response`
-        for the core, after the longest dead time.
+        End of the plot in s; default: when the response has settled, as in `step_response` of
+        `system`.
     **kwargs
         Line properties.
 
@@ -206,7 +206,10 @@ def system_plot(
     'time after the step [s]'
     """
     check_type(system, DelayedStateSpace, "system", "a DelayedStateSpace")
-    end = _settling_time(system) if until is None else positive(until, "until", "time in s")
+    if until is None:
+        end = float(np.ravel(system.step_response().time)[-1])
+    else:
+        end = positive(until, "until", "time in s")
     count = max(int(np.ceil(end / system.dt)) + 1, 2)
     response = np.reshape(system.step(count), (-1, count))
     with style.canvas(ax, title=title, default_title=str(system.name)) as (axes,):
@@ -229,9 +232,3 @@ def _settled(density: FloatArray) -> int:
         return int(density.shape[1])
     enough = int(np.searchsorted(area, 0.95 * float(area[-1])))
     return int(1.33 * enough) + 1
-
-
-def _settling_time(system: DelayedStateSpace) -> float:
-    longest = max(system.input_delays) + max(system.output_delays)
-    core = ct.step_response(system.delay_free)
-    return float(np.ravel(core.time)[-1]) + longest * float(system.dt)

@@ -105,6 +105,9 @@ def test_band_ends_where_the_coherence_falls_and_not_at_one_bad_point():
     assert comparison.band_from == "coherence"
     assert comparison.band_hz == (F[0], F[F < 13][-1])
     assert comparison.trusted.sum() == (F < 13).sum()
+    given = cr.compare_frf(PLANT, measured(coherence=coherence), band_hz=(F[0], 13.0))
+    assert given.band_from == "given"
+    assert "(as given)" in given.report()
 
 
 def test_simulated_valve_agrees_with_its_measured_frf_down_to_the_noise(valve_frf):
