@@ -164,6 +164,9 @@ _ARGUMENT = re.compile(
 )
 
 
+_PID = re.compile(r"design\.pid\(sys, '([\w-]+)'(?:, '(\w+)')?([^()]*)\)")
+"""A call with rule, kind and other arguments."""
+
 _BARE = re.compile(r"[\w.,;+-]+", re.ASCII)
 """A value that needs no quotes on a command line."""
 
@@ -178,10 +181,18 @@ def as_options(message: str) -> str:
     a.csv: give --time-unit ms, or --dt to ignore the column
     >>> print(as_options("dead_time=(80.0, 20.0); expected two times"))
     --dead-time 80.0 20.0; expected two times
+    >>> print(as_options("Try design.pid(sys, 'lambda', reduction='half_rule'): Ms 1.35"))
+    Try --rule lambda --reduction half_rule: Ms 1.35
     """
+    message = _PID.sub(_tuned, message)
     for call, option in _CALLS.items():
         message = message.replace(call, option)
     return _ARGUMENT.sub(_spelled, message)
+
+
+def _tuned(found: re.Match[str]) -> str:
+    rule, kind, rest = found.groups()
+    return f"rule={rule}{f' kind={kind}' if kind else ''}{rest.replace(',', '')}"
 
 
 def _spelled(found: re.Match[str]) -> str:
