@@ -20,7 +20,7 @@ from ..output_error.loop_flags import unstable_flags
 from ..output_error.result import OutputErrorFit
 from ..validation.residuals import analyse_residuals
 from ..validation.residuals_result import ResidualAnalysis
-from .search import Candidate, level
+from .search import Candidate, without_drift
 
 COLOURED, WANDERING = 0.5, 0.97
 """Correlation of neighbouring residuals above which they are called coloured, with a drift like
@@ -225,16 +225,13 @@ def _without_drifts(best: Candidate, group: Sequence[Record]) -> tuple[list[Reco
     for record, change in zip(known, best.found.drifts, strict=True):
         slope, count = change / (record.n_samples - late - 1), record.n_samples
         output = np.atleast_2d(record.output)
-        shares = (
-            count
-            * np.abs(slope)
-            / np.fmax(np.nanmax(output, axis=1) - np.nanmin(output, axis=1), SMALLEST)
-        )
+        size = np.nanmax(output, axis=1) - np.nanmin(output, axis=1)
+        shares = count * np.abs(slope) / np.fmax(size, SMALLEST)
         if change.any():
             a = int(np.argmax(shares))
             share = f"{100 * shares[a]:.2g} % of the range of output {a}"
             rate = rate_in_time(float(slope[a]) / record.dt)
             told[float(shares[a])] = flagged("drift", rate=rate, share=share)
         if not record.n_missing:
-            found.append(level(record, slope))
+            found.append(without_drift(record, slope))
     return found, [told[max(told)]] if told else []

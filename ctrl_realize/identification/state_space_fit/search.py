@@ -331,21 +331,22 @@ def slopes_of(record: Record) -> FloatArray:
     past = sliding_window_view(u[:, :ENOUGH_SAMPLES], lags, axis=1)
     rows = np.hstack([*past, np.ones((past.shape[1], 1))])
     for a, late in enumerate(y[:, lags - 1 :][:, : len(rows)]):
-        seen = np.isfinite(late)
-        ramp = np.flatnonzero(seen) - 0.5 * (late.size - 1)
-        basis, size, _ = np.linalg.svd(rows[seen], full_matrices=False)
-        basis = basis[:, size > 1e-10 * size[0]]
-        own, left = (x - basis @ (basis.T @ x) for x in (ramp, late[seen]))
-        slope = float(own @ left) / float(own @ own)
+        place = np.flatnonzero(np.isfinite(late))
+        if place.size < 2 * rows.shape[1]:
+            continue
+        both = np.stack([place - 0.5 * (late.size - 1), late[place]], axis=1)
+        weights, _, rank, _ = np.linalg.lstsq(rows[place], both, rcond=None)
+        own, left = (both - rows[place] @ weights).T
+        slope = float(own @ left) / max(float(own @ own), SMALLEST)
         rest = left - slope * own
-        count = (rest.size - basis.shape[1] - 1) / correlation_time(rest)
-        before, after = float(left @ left), max(float(rest @ rest), SMALLEST)
+        count = (rest.size - rank - 1) / correlation_time(rest)
+        before, after = (max(float(one @ one), SMALLEST) for one in (left, rest))
         if count > 1 and count * np.log(before / after) - np.log(count) > VERY_STRONG:
             found[a] = slope
     return found
 
 
-def level(record: Record, slope: FloatArray) -> Record:
+def without_drift(record: Record, slope: FloatArray) -> Record:
     """Record without the drift (p,) of its outputs by sample."""
     if not slope.any():
         return record

@@ -20,7 +20,7 @@ from ...numerics.state_space.delay_split import split_delays
 from ..impulse.from_io import Method, Start, impulse_from_io
 from ..realization.mimo import delay_matrix
 from .result import StateSpaceFit, fitted_system
-from .search import ENOUGH_SAMPLES, ORDERS, Candidate, Search, Shares, level, slopes_of
+from .search import ENOUGH_SAMPLES, ORDERS, Candidate, Search, Shares, slopes_of, without_drift
 
 LEVEL = 0.02
 """Threshold for a response when delays are to be found, relative to a channel's largest Markov
@@ -66,10 +66,11 @@ def from_starts(
     best: Outcome | None = None
     refused: list[DataError] = []
     at_rest = all(np.ptp(r.input[..., :STILL], axis=-1).max() == 0 for r in group)
+    still = [without_drift(record, slopes_of(record)) for record in group]
     starts = sorted(STARTS, key=lambda way: way[0] != "rest") if at_rest else list(STARTS)
     for tried, way in enumerate(starts[:most_starts], start=1):
         try:
-            found = _from_start(group, way, asked, delays, feedthrough, enough)
+            found = _from_start(group, still, way, asked, delays, feedthrough, enough)
         except DataError as error:
             refused.append(error)
             continue
@@ -86,19 +87,18 @@ def from_starts(
 
 def _from_start(
     group: tuple[Record, ...],
+    still: Sequence[Record],
     way: tuple[Start, Method],
     asked: tuple[int, ...] | None,
     delays: ArrayLike | None,
     feedthrough: bool | None,
     enough: int,
 ) -> Outcome:
-    """Fit from one estimate of the impulse response."""
+    """Fit from one estimate of the impulse response, that of records that stand still."""
     start, method = way
     with warnings.catch_warnings():
         # Directions determined by the prior are used for starting only.
         warnings.simplefilter("ignore", DataWarning)
-        slopes = [slopes_of(record) for record in group]
-        still = [level(record, slope) for record, slope in zip(group, slopes, strict=True)]
         impulse = impulse_from_io(still, method=method, start=start)
     markov = np.reshape(impulse.markov, (group[0].noutputs, group[0].ninputs, -1))
     unseen = sum(flag.code == "no_response" for flag in impulse.flags)
@@ -106,7 +106,7 @@ def _from_start(
         raise DataError(
             "no output shows a response to the inputs above the noise level; check the columns"
         )
-    drift = any(slope.any() for slope in slopes)
+    drift = any(one is not record for one, record in zip(still, group, strict=True))
     search = Search(group, markov, max(asked or ORDERS), enough, drift=drift)
     orders = search.orders(asked)
     found = delay_matrix(impulse, level=LEVEL) if delays is None else _given_delays(delays, markov)

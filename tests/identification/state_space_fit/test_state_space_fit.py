@@ -70,6 +70,13 @@ def test_a_drift_of_an_output_leaves_its_gains(missing):
     assert all(check.independent and check.white for check in sys.fit.checks)
 
 
+def test_an_output_without_samples_is_refused():
+    data = record()
+    y = np.stack([data.output[0], np.full(data.n_samples, np.nan)])
+    with pytest.raises(DataError, match="0 samples have a complete past"):
+        cr.fit_state_space(cr.Record(data.time, data.input, y, missing="keep"))
+
+
 @pytest.mark.parametrize("units", [(1e-6, 1e6), (1e6, 1e-6), (1e-9, 1e9)])
 def test_units_of_the_outputs_change_nothing_else(model, units):
     """Orders were 2 for 5, and delays (0, 2) and (0, 11) for (3, 5) and (0, 7)."""
