@@ -20,7 +20,8 @@ from ..output_error.loop_flags import unstable_flags
 from ..output_error.result import OutputErrorFit
 from ..validation.residuals import analyse_residuals
 from ..validation.residuals_result import ResidualAnalysis
-from .search import Candidate, without_drift
+from .drift import without_drift
+from .search import Candidate
 
 COLOURED, WANDERING = 0.5, 0.97
 """Correlation of neighbouring residuals above which they are called coloured, with a drift like
@@ -221,17 +222,17 @@ def _without_drifts(best: Candidate, group: Sequence[Record]) -> tuple[list[Reco
     """Complete records from which the drifts of a fit are taken, and a flag for the largest."""
     late = max(best.inputs)
     known = [r for r in group if r.n_samples - late > 1]
-    found, told = [], dict[float, Flag]()
+    found, told, most = [], list[Flag](), 0.0
     for record, change in zip(known, best.found.drifts, strict=True):
         slope, count = change / (record.n_samples - late - 1), record.n_samples
         output = np.atleast_2d(record.output)
         size = np.nanmax(output, axis=1) - np.nanmin(output, axis=1)
         shares = count * np.abs(slope) / np.fmax(size, SMALLEST)
-        if change.any():
-            a = int(np.argmax(shares))
+        a = int(np.argmax(shares))
+        if shares[a] > most:
             share = f"{100 * shares[a]:.2g} % of the range of output {a}"
             rate = rate_in_time(float(slope[a]) / record.dt)
-            told[float(shares[a])] = flagged("drift", rate=rate, share=share)
+            told, most = [flagged("drift", rate=rate, share=share)], float(shares[a])
         if not record.n_missing:
             found.append(without_drift(record, slope))
-    return found, [told[max(told)]] if told else []
+    return found, told

@@ -6,16 +6,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.lib.stride_tricks import sliding_window_view
 
 from ...data import Record
 from ...errors import DataError, OrderError
 from ...numerics.arrays import FloatArray
-from ...numerics.constants import SMALLEST, VERY_STRONG
+from ...numerics.constants import VERY_STRONG
 from ...numerics.hankel.delay_models import OneModel, realize_at
 from ...numerics.regression.arx import excited_directions
 from ...numerics.regression.normal_equations import normal_equations
-from ...numerics.signals.noise import correlation_time
 from ...numerics.state_space.section_fit import MOST_STEPS, Experiment, SectionFit, fit_sections
 from ...numerics.state_space.sections import Sections, in_sections
 
@@ -38,9 +36,6 @@ NEARBY = 10
 """Iterations after which a neighbour of a fitted model is compared with it."""
 FARTHEST = 200
 """Largest number of changes of the delays."""
-
-MEMORY = 100
-"""Number of samples of the inputs beside whose response a drift is looked for."""
 
 FARTHEST_PLAUSIBLE = 12
 """Number of delays around the estimate that are tried."""
@@ -316,43 +311,6 @@ class Search:
         loss = found.loss - float(found.counts @ np.log(self._size_out))
         bic = 2 * loss * used / values + count * np.log(used)
         return Candidate(found, order, *shares, feedthrough, float(bic))
-
-
-def slopes_of(record: Record) -> FloatArray:
-    """Drift (p,) of every output by sample, 0 where the evidence for one is not very strong.
-
-    Beside a level and the response to the last `MEMORY` samples of the inputs, by least squares.
-    """
-    u, y = np.atleast_2d(record.input), np.atleast_2d(record.output)
-    lags = min(MEMORY, u.shape[1] // (PER_PARAMETER * (1 + len(u))))
-    found = np.zeros(len(y))
-    if lags < 2:
-        return found
-    past = sliding_window_view(u[:, :ENOUGH_SAMPLES], lags, axis=1)
-    rows = np.hstack([*past, np.ones((past.shape[1], 1))])
-    for a, late in enumerate(y[:, lags - 1 :][:, : len(rows)]):
-        place = np.flatnonzero(np.isfinite(late))
-        if place.size < 2 * rows.shape[1]:
-            continue
-        both = np.stack([place - 0.5 * (late.size - 1), late[place]], axis=1)
-        weights, _, rank, _ = np.linalg.lstsq(rows[place], both, rcond=None)
-        own, left = (both - rows[place] @ weights).T
-        slope = float(own @ left) / max(float(own @ own), SMALLEST)
-        rest = left - slope * own
-        count = (rest.size - rank - 1) / correlation_time(rest)
-        before, after = (max(float(one @ one), SMALLEST) for one in (left, rest))
-        if count > 1 and count * np.log(before / after) - np.log(count) > VERY_STRONG:
-            found[a] = slope
-    return found
-
-
-def without_drift(record: Record, slope: FloatArray) -> Record:
-    """Record without the drift (p,) of its outputs by sample."""
-    if not slope.any():
-        return record
-    away = np.outer(slope, np.arange(record.n_samples) - (record.n_samples - 1) / 2)
-    output = record.output - away.reshape(np.shape(record.output))
-    return record.__replace__(output=output, missing="keep" if record.n_missing else "refuse")
 
 
 def _within(found: Candidate) -> tuple[float, float]:

@@ -19,8 +19,9 @@ from ...numerics.output_error.margins import CLOSE
 from ...numerics.state_space.delay_split import split_delays
 from ..impulse.from_io import Method, Start, impulse_from_io
 from ..realization.mimo import delay_matrix
+from .drift import slopes_of, without_drift
 from .result import StateSpaceFit, fitted_system
-from .search import ENOUGH_SAMPLES, ORDERS, Candidate, Search, Shares, slopes_of, without_drift
+from .search import ENOUGH_SAMPLES, ORDERS, Candidate, Search, Shares
 
 LEVEL = 0.02
 """Threshold for a response when delays are to be found, relative to a channel's largest Markov
