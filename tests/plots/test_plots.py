@@ -92,6 +92,13 @@ def test_plots_draw_into_what_they_are_given_and_make_no_figure_of_their_own(eve
     assert plt.get_fignums() == []
 
 
+def test_a_response_is_drawn_until_it_has_settled():
+    lags = np.polymul([180.0, 1.0], [41.0, 1.0])
+    plant = cr.delayed_ss(ct.tf([0.8], lags), dead_time=45.0, dt=0.5)
+    drawn = plots.system_plot(plant).lines.ravel()[0][0].get_ydata()
+    assert drawn[-1] == pytest.approx(0.8, rel=0.02)  # it was 0.1 of that
+
+
 def test_all_that_was_measured_is_shown_and_the_trusted_band_is_marked(valve):
     frequency = np.geomspace(0.1, 50.0, 300)
     truth = valve.truth.frf(frequency)
