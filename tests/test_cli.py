@@ -120,6 +120,16 @@ def test_tune_tells_the_same_numbers_for_a_saved_model(tmp_path, capsys):
     assert "is a saved model" in capsys.readouterr().err
 
 
+def test_a_record_is_told_from_a_saved_model_by_what_it_holds(tmp_path, capsys):
+    words = ["--structures", "FOPDT", "--rule", "amigo"]
+    said = []
+    for name in ("heater.csv", "heater.json"):
+        file = save(step_record(), tmp_path / name)
+        assert main(["tune", str(file), *words]) == 0
+        said.append(capsys.readouterr().out.replace(str(file), ""))
+    assert said[0] == said[1]
+
+
 def test_tune_takes_any_saved_plant_and_no_loop(tmp_path, capsys):
     plant = cr.delayed_ss(ct.tf([2], [3, 1]), dead_time=1.25, dt=0.1)
     cr.save_model(tmp_path / "plant.json", plant)

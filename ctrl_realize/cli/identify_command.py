@@ -16,6 +16,7 @@ from ..identification.campaign.campaign import Campaign
 from ..identification.campaign.run import identify_campaign
 from ..identification.methods import identify as identify_record
 from ..io import load_model, read_frf
+from ..io.models import holds_model
 from ..results import ModelFit
 from .inputs import Reading, Settings, Source, calls_again
 from .machine import Told, told_as_json
@@ -62,7 +63,7 @@ def run_tune(
 ) -> int:
     """Tune for one model of all records, or for a saved one, and return the exit code."""
     tuning = Tuning(tuned, entered)
-    if [file.suffix for file in files] != [".json"]:
+    if len(files) > 1 or not holds_model(files[0]):
         return identified(files, folder, joint=True, tuning=tuning, **given)
     unused = [name for name in ("chosen", "tests", "record") if given[name]]
     if unused or folder is not None:

@@ -22,6 +22,7 @@ from .json_content import boolean_free, field, finite_numbers, matrix, parsed, t
 from .stored_fit import summary_from_json, summary_of, summary_to_json
 
 FORMAT = "ctrl_realize model"
+_HEAD = 200  # bytes, in which the format of a file stands
 SCHEMA = 1
 MAX_MODEL_BYTES = 64 * 2**20
 Model: TypeAlias = DelayedStateSpace | DelaySystem
@@ -123,6 +124,12 @@ def load_model(path: str | os.PathLike[str]) -> Model:
         return model_from_text(text)
     except FileFormatError as error:
         raise FileFormatError(f"{file}: {error}") from error
+
+
+def holds_model(path: str | os.PathLike[str]) -> bool:
+    """Whether a file begins as those of `save_model` do, whatever its name is."""
+    with open(path, "rb") as opened:
+        return FORMAT.encode() in opened.read(_HEAD)
 
 
 def model_to_text(
