@@ -144,7 +144,11 @@ def _tuning(
     omega = grid(model, fit.dt)
     controller = controller_response(*robust_pi(model, fit.dt), omega, fit.dt)
     responses = np.stack([model_response(one, omega) for one in (model, *others)])
-    own, *found = largest_sensitivity(controller * responses)
+    loops = controller * responses
+    if abs(loops[0, 0]) < 1:
+        said = f"a PI of this model crosses over below {omega[0]:.3g} rad/s"
+        return Verdict("tuning", "no", said, float("inf"))
+    own, *found = largest_sensitivity(loops)
     worst = float(np.sort(found)[-1 - _SELDOM])
     level, why = _level(fit.flags, "tuning", worst <= _ROBUST, worst <= _TOO_MUCH)
     there = f"at most {worst:.3g}" if np.isfinite(worst) else "is unstable"

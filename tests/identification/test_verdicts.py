@@ -93,3 +93,13 @@ def test_the_band_of_an_integrating_plant_has_axes_of_its_record():
     axes = fit.plausible_models.plot().figure.axes
     assert axes[0].get_xlim()[1] < 1e3
     assert axes[1].get_xlim()[0] > 1e-4
+
+
+def test_an_unstable_plant_is_not_judged_by_a_controller_that_does_nothing():
+    # 2 exp(-6.3 s) / (1 - 100 s) is fitted with four poles far slower than the record: the loop of
+    # SIMC's PI crosses over below the frequencies that are looked at, where its Ms is 1
+    rng = np.random.default_rng(11)
+    t = np.arange(200.0)
+    y = 2 - 2 * np.exp(np.maximum(t - 16.3, 0) / 100) + 0.02 * rng.standard_normal(t.size)
+    fit = cr.fit_output_error(cr.Record(t, (t >= 10) * 1.0, y)).fit
+    assert levels(fit)["tuning"] == levels(fit)["gain"] == "no"

@@ -66,8 +66,13 @@ class StaticGain:
 
     @property
     def significant(self) -> bool:
-        """Whether the gain is significant, and has the sign of the observed response."""
-        return abs(self.gain) > SIGNIFICANT * self.gain_std and self.reached * self.gain > 0
+        """Whether the gain is significant, and has the sign of the observed response.
+
+        Several slow poles are integrators where they bend no more than one that is taken for one.
+        """
+        seen = np.inf if self.integrates else abs(self.reached)
+        known = SIGNIFICANT * self.gain_std < abs(self.gain) < seen / INTEGRATOR
+        return known and self.reached * self.gain > 0
 
     @property
     def resolved(self) -> bool:
