@@ -20,7 +20,7 @@ from scipy.special import ndtr, ndtri
 
 from ..arrays import BoolArray, ComplexArray, FloatArray, unit_columns
 from ..constants import PIECE, SMALLEST, Z_95
-from .eliminate import eliminate
+from .eliminate import eliminate, evaluate
 from .modal import partial_fractions, responses
 from .poles import lag_sum, poles_from_parameters
 from .problem import Family, Problem
@@ -211,7 +211,15 @@ def local_errors(
     slopes = (ahead - behind).T / (2 * moves.diagonal())
     columns = problem.weighted(np.concatenate([slopes, problem.regressors], axis=1))
     if problem.segments is not None:
-        columns = problem.local_terms(candidate.poles[None]).without(columns[None])[0]
+        # The free response that the records are fitted with moves with the poles as well.
+        poles, turned = poles_from_parameters(theta[None, 1:])
+        local = problem.local_terms(poles)
+        model = responses(*setting, numerator[None], theta[None])[0]
+        weights = evaluate(problem, candidate.structure, candidate.parameters[None]).regression[0]
+        model += problem.regressors @ weights
+        left = problem.weighted_data - problem.weighted(model[:, None])[:, 0]
+        columns[:, 1 : theta.size] += local.moved(left[None], turned)[0]
+        columns = local.without(columns[None])[0]
     count = moves.shape[0]
     return LocalErrors(columns[:, :count], columns[:, count:])
 

@@ -83,15 +83,17 @@ def _most_evident(ways: list[tuple[StepData, WindowFit]]) -> StepData:
 def _takes_the_gain(data: StepData, fits: WindowFit) -> bool:
     """Whether a motion before the step takes the place of the response to it.
 
-    Together with a slow pole, which is its opposite, it leaves the gain without a value or with the
-    wrong sign. Ablation: motion that takes the gain.
+    Together with a slow pole, which is its opposite, a drift leaves the gain without a value, and
+    both motions one of the wrong sign: poles of a free response are also those of the response,
+    whose errors tell what is left open. Ablation: motion that takes the gain.
     """
     if not (data.drift or data.relaxing):
         return False
     if data.relaxing and not _dies_away(data, fits):
         return True
     static = fits.static(fits.best)
-    return not static.resolved or static.reached * static.gain < 0
+    unresolved = bool(data.drift) and not static.resolved
+    return unresolved or static.reached * static.gain < 0
 
 
 def _dies_away(data: StepData, fits: WindowFit) -> bool:

@@ -126,3 +126,24 @@ def test_a_record_without_response_beside_others_is_told(gains):
         ]
         told = codes(cr.identify(records, structures="P2D"))
         assert told & {"gains_differ", "no_common_gain", "outlying_records"}
+
+
+def test_the_errors_of_a_ramp_are_those_of_the_cramer_rao_bound():
+    """The mean of an input is made up for by a free response, which moves with the lag as well."""
+    time, truth = np.arange(500.0), np.array([2.0, 8.0, 20.0])
+    ramp = np.clip(time - 50, 0, 150) / 30
+
+    def plant(gain, dead_time, lag):
+        return response(time, ramp, gain, dead_time, [lag])
+
+    fit = cr.fit_output_error(
+        cr.Record(time, ramp, plant(*truth) + noise(500, 0.05, 500)), structures="FOPDT"
+    ).fit
+    steps = 1e-3 * np.eye(3)
+    slopes = [(plant(*truth + step) - plant(*truth - step)) / 2e-3 for step in steps]
+    own = [np.ones(500), time, np.exp(-time / truth[2])]
+    columns = np.stack([*slopes, *own], axis=1)[20:]  # the first samples depend on the past
+    bound = 0.05 * np.sqrt(np.diag(np.linalg.inv(columns.T @ columns)))
+    stated = {parameter.name: parameter.std for parameter in fit.parameters}
+    assert stated["gain"] == pytest.approx(bound[0], rel=0.1)
+    assert stated["lag_1"] == pytest.approx(bound[2], rel=0.1)
