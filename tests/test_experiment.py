@@ -257,6 +257,45 @@ def test_missing_samples_tell_nothing():
     assert again.curve.first[1] == pytest.approx(found[1].std)
 
 
+def test_samples_that_are_seen_are_those_of_a_record_at_their_rate():
+    # An input that moves with every other sample, which alone are seen, in coloured noise.
+    signal, noise = one_step(300, 900), NoiseModel(np.array([0.7]), SIGMA, 0.1)
+    fine = Experiment(np.repeat(signal, 2), noise, np.arange(2400) % 2 == 0, 0.05)
+    bound = Bound(FIRST_ORDER, 0.1)
+    gradient = bound.gradient(["dead_time", "gain", "Ms"])
+    expected = bound.errors([Experiment(signal, noise)], gradient)
+    np.testing.assert_allclose(bound.errors([fine], gradient), expected, rtol=1e-6)
+
+
+def test_irregular_stamps_have_the_error_of_their_fit():
+    rng = np.random.default_rng(2)
+    time = 0.5 * np.arange(240) + 0.05 * rng.integers(-2, 3, 240)
+    time[0] = 0.0
+    moves = 30.0 * np.arange(4)
+    passed = np.maximum(time[:, None] - moves[1:] - 3.03, 0)
+    output = 2.0 * -np.expm1(-passed / 10) @ (-1.0) ** np.arange(3)
+    output += 0.03 * rng.standard_normal(240)
+    record = cr.Record.from_samples(time, np.arange(4) % 2, output, input_time=moves)
+    assert record.sample_time == pytest.approx(10 * record.dt)
+    system = cr.identify(record, structures=[(1, 1)])
+    errors = {"dead_time": system.fit.std_given_structure}
+    errors["gain"] = system.fit.gain_std_given_structure
+    for want, expected in errors.items():
+        plan = cr.experiment.plan(system, want=want)
+        assert plan.dt == pytest.approx(record.sample_time)
+        assert plan.curve.first == pytest.approx((120.0, expected), rel=0.25)
+
+
+def test_a_record_at_another_rate_keeps_its_information():
+    record = simulated(ONE_STEP, PLAN, 0)
+    plan, twice = (
+        of_one_step(),
+        cr.experiment.plan(record, rate=4.0, time=40.0, structures=[(1, 1)]),
+    )
+    assert twice.curve.first == pytest.approx(plan.curve.first)
+    assert twice.chosen.together < twice.std
+
+
 def test_estimates_of_the_benchmark_are_those_of_identify():
     case = Case("first order", 0.0, best=True, way="given")
     record = simulated(case, planned(case), 3)

@@ -79,10 +79,10 @@ def known_from_fit(fit: OutputErrorFit) -> Known:
     residuals = [fit.measured - fit.fitted]
     if len(inputs) > 1:
         # Step records are scaled and averaged before they are fitted.
-        followed = [Bound(model, fit.dt).response(signal) for signal in inputs]
+        followed = [Bound(model, fit.data.dt).response(signal) for signal in inputs]
         residuals = [_left(*each) for each in zip(fit.records, followed, strict=True)]
     tests = [
-        Experiment(signal, _noise_of(residual, fit.dt), 1.0 * np.isfinite(np.ravel(record.output)))
+        Experiment(signal, _noise_of(residual, fit.dt), record.seen, record.dt)
         for signal, residual, record in zip(inputs, residuals, fit.records, strict=True)
     ]
     plausible = tuple(one for one in others if np.sum(one.poles == 0) <= 1)

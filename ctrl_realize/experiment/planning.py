@@ -147,7 +147,7 @@ def plan(
     """
     known = known_from(first, options)
     wanted = one_of(want, "want", WANTED)
-    longest = max((one.input.size for one in known.tests), default=0) * (known.dt or 0.0)
+    longest = max((one.input.size * one.dt for one in known.tests), default=0.0)
     length = _given(time, longest, "time", "length of the test in s")
     dt = 1 / _given(rate, known.dt and 1 / known.dt, "rate", "samples per second")
     move = largest_move(known.tests) if amplitude is None else amplitude
@@ -163,13 +163,11 @@ def plan(
     heard = _noise(known, noise, noise_pole, resolution, dt)
     judged = [Bound(model, dt) for model in (known.model, *known.others[::_OTHERS])]
     limited = () if output_limit is None else [Bound(model, dt) for model in known.others]
-    # A record at another rate has its own information, but not in samples of this one.
-    records = known.tests if known.dt and abs(dt / known.dt - 1) < 1e-6 else ()
     setting = _Setting(
         [*judged, *limited], [bound.gradient([wanted]) for bound in judged], heard,
         _limits(move, bool(np.any(known.model.poles == 0))),
         np.inf if output_limit is None else positive(output_limit, "output_limit", "deviation"),
-        records, dt,
+        known.tests, dt,
     )  # fmt: skip
     candidates = _candidates(setting, count)
     best = candidates[0]
@@ -184,7 +182,7 @@ def plan(
         level=rest,
         model=known.model,
         noise=heard,
-        tests=records,
+        tests=known.tests,
         kind=best.kind,
         choices=(
             f"errors by the Cramer-Rao bound of the model, ranked over it and {len(judged) - 1} "
@@ -319,7 +317,7 @@ def _curve(setting: _Setting, count: int, kind: str) -> ErrorCurve:
     first = None
     if setting.records:
         today = setting.bounds[0].errors(setting.records, setting.gradients[0])[0]
-        first = sum(one.input.size for one in setting.records) * setting.dt, float(today)
+        first = sum(one.input.size * one.dt for one in setting.records), float(today)
     step = "up and down" if setting.returns else "one step"
     return ErrorCurve(
         setting.dt * np.array(lengths, dtype=np.float64),

@@ -20,7 +20,7 @@ from scipy.linalg import block_diag
 from scipy.signal import lfilter
 
 from ..errors import UnsuitableSystemError
-from ..numerics.arrays import FloatArray
+from ..numerics.arrays import BoolArray, FloatArray
 from ..numerics.engine.modal import respond
 from ..numerics.engine.plausible_models import PlausibleModel
 from ..numerics.engine.poles import parameters_from_poles, poles_from_parameters
@@ -42,14 +42,16 @@ WANTED: tuple[Wanted, ...] = ("dead_time", "gain", "phase", "Ms")
 
 
 class Experiment(NamedTuple):
-    """Input (N,), from rest, the noise that its record will have, and 0 where a sample is missing.
+    """Input (N,), from rest, the noise of its record, the samples that are seen, and sample time.
 
-    In coloured noise, what is seen counts as if nothing before were missing.
+    The noise is that of the samples that are seen, as if they were neighbours. The sample time is
+    that of the input in s, 0 if it is that of the bound.
     """
 
     input: FloatArray
     noise: NoiseModel
-    seen: FloatArray = np.ones(1)
+    seen: BoolArray | slice = slice(None)
+    dt: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,7 +71,10 @@ class Bound:
 
     def errors(self, tests: Sequence[Experiment], gradient: FloatArray) -> FloatArray:
         """Standard errors (k,) of quantities with gradients (k, p) after all tests together."""
-        white = [[_white(part, test) for part in self.slopes(test.input)] for test in tests]
+        white = [
+            [_white(part, one) for part in replace(self, dt=one.dt or self.dt).slopes(one.input)]
+            for one in tests
+        ]
         slopes, own = zip(*white, strict=True)
         together = LocalErrors(np.concatenate(slopes), block_diag(*own))
         # The parameters themselves are asked for as well: all of them are unknown.
@@ -129,7 +134,7 @@ class Bound:
 
 def _white(columns: FloatArray, test: Experiment) -> FloatArray:
     """Columns (N, k) in units of the noise, without those that its filter does not reach."""
-    left = lfilter([1.0, *-test.noise.coefficients], [1.0], columns, axis=0) * test.seen[:, None]
+    left = lfilter([1.0, *-test.noise.coefficients], [1.0], columns[test.seen], axis=0)
     return np.asarray(left[test.noise.coefficients.size :] / test.noise.std)
 
 
