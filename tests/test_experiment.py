@@ -222,6 +222,50 @@ def test_two_step_records_have_the_noise_and_the_information_of_both():
     assert both.curve.first[1] == pytest.approx(alone.curve.first[1] / np.sqrt(2), rel=0.2)
 
 
+def of_three_records(edges, factors=(1.0, 1.0, 1.0), starts=(0.0, 0.0, 0.0), **options):
+    """Plan from three records of a first-order plant, each with its gain and its free response."""
+    time = 0.5 * np.arange(200)
+    command = np.searchsorted(edges, time, side="right") % 2.0
+    plant = cr.design.ProcessModel(gain=2.0, lag=10.0, dead_time=3.03).system(0.5)
+    rng = np.random.default_rng(4)
+    records = [
+        cr.Record(
+            time,
+            command,
+            plant.simulate(gain * command)
+            + start * np.exp(-time / 10)
+            + 0.03 * rng.standard_normal(time.size),
+        )
+        for gain, start in zip(factors, starts, strict=True)
+    ]
+    return cr.experiment.plan(records, time=40.0, structures=[(1, 1)], **options)
+
+
+@pytest.mark.parametrize("edges", [[60], [20, 50, 75]])
+def test_several_records_have_their_noise_with_own_gains_and_free_responses(edges):
+    plain = of_three_records(edges)
+    moving = of_three_records(edges, starts=(1.0, -1.0, 0.5))
+    own = of_three_records(edges, factors=(0.5, 1.0, 2.0), gains="own")
+    for plan in (plain, moving, own):
+        sigmas = [one.noise.sigma for one in plan.tests]
+        assert sigmas == pytest.approx([0.03] * 3, rel=0.2)
+        assert np.abs(plan.chosen.input).max() == 1  # as in the records
+    # Information grows with the square of the gain: 0.25 + 1 + 4 in place of 3.
+    today = plain.curve.first[1]
+    assert moving.curve.first[1] == pytest.approx(today, rel=0.1)
+    assert own.curve.first[1] == pytest.approx(today * np.sqrt(3 / 5.25), rel=0.1)
+
+
+def test_noise_of_a_long_record_is_not_that_of_the_means_that_are_fitted():
+    count, rng = 6000, np.random.default_rng(5)
+    command = np.repeat(rng.standard_normal(10), 600) * (np.arange(count) >= 100)
+    plant = cr.design.ProcessModel(gain=2.0, lag=400.0, dead_time=60.2).system(0.5)
+    output = plant.simulate(command) + 0.03 * rng.standard_normal(count)
+    record = cr.Record(0.5 * np.arange(count), command, output)
+    plan = cr.experiment.plan(record, time=1000.0, rate=0.2, structures=[(1, 1)])
+    assert plan.noise.sigma == pytest.approx(0.03, rel=0.05)
+
+
 def test_achieved_beside_predicted():
     case = Case("first order", 0.0, best=True, way="given")
     plan = planned(case)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -16,6 +15,7 @@ from ..errors import UnsuitableSystemError
 from ..identification import OutputErrorFit, identify
 from ..identification.bound import Bound, Experiment
 from ..identification.noise import NoiseModel, noise_of
+from ..identification.output_error.own_gains import at_model_gain
 from ..numerics.arrays import FloatArray
 from ..numerics.engine.plausible_models import PlausibleModel
 from ..numerics.engine.static_gain import INTEGRATOR
@@ -32,6 +32,7 @@ class Known:
     noise: NoiseModel | None = None
     tests: tuple[Experiment, ...] = ()
     level: float = 0.0
+    move: float | None = None
 
 
 def known_from(given: Any, options: dict[str, Any]) -> Known:
@@ -74,19 +75,18 @@ def known_from_fit(fit: OutputErrorFit) -> Known:
     drawn = () if fit.plausible_models is None else fit.plausible_models.models
     others = [_integrating(one, length) for one in drawn]
     model = PlausibleModel(fit.dead_time, fit.poles, fit.estimate.numerator)
-    held = [np.ravel(record.input) for record in fit.records]
-    inputs = [signal - signal[0] for signal in held]
-    residuals = [fit.measured - fit.fitted]
-    if len(inputs) > 1:
-        # Step records are scaled and averaged before they are fitted.
-        followed = [Bound(model, fit.data.dt).response(signal) for signal in inputs]
-        residuals = [_left(*each) for each in zip(fit.records, followed, strict=True)]
+    records, residuals = at_model_gain(fit), [fit.measured - fit.fitted]
+    if len(fit.records) > 1 or fit.data.every > 1:
+        # Means were fitted: of step records, or of samples.
+        residuals = [_left(record, model) for record in records]
     tests = [
-        Experiment(signal, _noise_of(residual, fit.dt), record.seen, record.dt)
-        for signal, residual, record in zip(inputs, residuals, fit.records, strict=True)
+        Experiment(_moved(record), _noise_of(residual, fit.dt), record.seen, record.dt)
+        for record, residual in zip(records, residuals, strict=True)
     ]
     plausible = tuple(one for one in others if np.sum(one.poles == 0) <= 1)
-    return Known(model, plausible, fit.dt, tests[-1].noise, tuple(tests), float(held[0][0]))
+    move = float(max(np.concatenate([_moved(record) for record in fit.records]), key=abs))
+    level = float(fit.records[0].input.flat[0])
+    return Known(model, plausible, fit.dt, tests[-1].noise, tuple(tests), level, move)
 
 
 def _noise_of(residual: FloatArray, dt: float) -> NoiseModel:
@@ -96,18 +96,22 @@ def _noise_of(residual: FloatArray, dt: float) -> NoiseModel:
     return NoiseModel(np.empty(0), winsorised_sigma(residual, 0.0), dt)
 
 
-def _left(record: Record, followed: FloatArray) -> FloatArray:
-    """What a model leaves of a record, beside its level and a drift."""
-    left = np.ravel(record.output) - followed
-    seen = np.isfinite(left)
-    left, time = left[seen], record.time[seen] - record.time[0]
-    return np.asarray(left - np.polyval(np.polyfit(time, left, 1), time))
+def _moved(record: Record) -> FloatArray:
+    """Deviation of the input (N,) from that at the start."""
+    return np.asarray(np.ravel(record.input) - record.input.flat[0])
 
 
-def largest_move(records: Sequence[Experiment]) -> float | None:
-    """Farthest deviation of the input in the records, with its sign."""
-    moved = np.concatenate([one.input for one in records]) if records else np.zeros(1)
-    return float(moved[np.argmax(np.abs(moved))]) or None
+def _left(record: Record, model: PlausibleModel) -> FloatArray:
+    """What a model leaves of a record, beside its level, a drift and the free response.
+
+    The latter begins after the dead time: until then the output depends on the input before.
+    """
+    time = record.time - record.time[0]
+    rows = record.seen & (time >= min(model.dead_time, time[-1] / 2))
+    left = (np.ravel(record.output) - Bound(model, record.dt).response(_moved(record)))[rows]
+    free = np.exp(np.outer(time, model.poles))
+    columns = np.column_stack([time**0, time, free.real, free.imag])[rows]
+    return np.asarray(left - columns @ np.linalg.lstsq(columns, left, rcond=None)[0])
 
 
 def _integrating(model: PlausibleModel, length: float) -> PlausibleModel:

@@ -24,7 +24,7 @@ from ..numerics.engine.plausible_models import PlausibleModel
 from ..numerics.engine.poles import lag_sum
 from ..numerics.loops.relay import relay_loop
 from ..numerics.state_space.sampling import sample_with_dead_time
-from .first import Known, known_from, largest_move
+from .first import Known, known_from
 from .result import ErrorCurve, ExperimentPlan, PlannedTest
 from .signals import KINDS, shapes
 
@@ -150,7 +150,7 @@ def plan(
     longest = max((one.input.size * one.dt for one in known.tests), default=0.0)
     length = _given(time, longest, "time", "length of the test in s")
     dt = 1 / _given(rate, known.dt and 1 / known.dt, "rate", "samples per second")
-    move = largest_move(known.tests) if amplitude is None else amplitude
+    move = known.move if amplitude is None else amplitude
     if move is None:
         raise OptionError("amplitude=None; expected the largest move of the input")
     count = round(length / dt)
