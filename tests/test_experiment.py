@@ -256,6 +256,23 @@ def test_several_records_have_their_noise_with_own_gains_and_free_responses(edge
     assert own.curve.first[1] == pytest.approx(today * np.sqrt(3 / 5.25), rel=0.1)
 
 
+def test_rounding_of_a_record_is_noise_of_its_test_too():
+    # Both levels are levels of the sensor, whose step is 3.3 and 40 standard deviations.
+    step, sigma, time = 0.1, 0.03, 0.5 * np.arange(300)
+    plant = cr.design.ProcessModel(gain=2.0, lag=10.0, dead_time=3.03).system(0.5)
+    command = (time >= 60) * 1.0
+    output = plant.simulate(command) + sigma * np.random.default_rng(6).standard_normal(300)
+    still = plant.simulate(command) + (output - plant.simulate(command)) / 12
+    plain, coarse, coarsest = (
+        cr.experiment.plan(cr.Record(time, command, values), time=40.0, structures=[(1, 1)])
+        for values in (output, step * np.round(output / step), step * np.round(still / step))
+    )
+    expected = np.hypot(sigma, step / np.sqrt(12)) / sigma
+    for found in (coarse.noise.sigma / plain.noise.sigma, coarse.std / plain.std):
+        assert found == pytest.approx(expected, rel=0.35)
+    assert step / np.sqrt(12) <= coarsest.noise.sigma < 2 * step / np.sqrt(12)
+
+
 def test_noise_of_a_long_record_is_not_that_of_the_means_that_are_fitted():
     count, rng = 6000, np.random.default_rng(5)
     command = np.repeat(rng.standard_normal(10), 600) * (np.arange(count) >= 100)

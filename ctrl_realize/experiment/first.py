@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -19,7 +19,7 @@ from ..identification.output_error.own_gains import at_model_gain
 from ..numerics.arrays import FloatArray
 from ..numerics.engine.plausible_models import PlausibleModel
 from ..numerics.engine.static_gain import INTEGRATOR
-from ..numerics.signals.noise import correlation_time, winsorised_sigma
+from ..numerics.signals.noise import correlation_time, quantisation_step, winsorised_sigma
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,7 +80,7 @@ def known_from_fit(fit: OutputErrorFit) -> Known:
         # Means were fitted: of step records, or of samples.
         residuals = [_left(record, model) for record in records]
     tests = [
-        Experiment(_moved(record), _noise_of(residual, fit.dt), record.seen, record.dt)
+        Experiment(_moved(record), _noise_of(residual, record, fit.dt), record.seen, record.dt)
         for record, residual in zip(records, residuals, strict=True)
     ]
     plausible = tuple(one for one in others if np.sum(one.poles == 0) <= 1)
@@ -89,11 +89,16 @@ def known_from_fit(fit: OutputErrorFit) -> Known:
     return Known(model, plausible, fit.dt, tests[-1].noise, tuple(tests), level, move)
 
 
-def _noise_of(residual: FloatArray, dt: float) -> NoiseModel:
-    """Noise of a residual; coloured where it is more so than white noise scatters to."""
+def _noise_of(residual: FloatArray, record: Record, dt: float) -> NoiseModel:
+    """Noise of a residual; coloured where it is more so than white noise scatters to.
+
+    No less than that of rounding: a rounded output may stand still.
+    """
+    quantum = quantisation_step(np.ravel(record.output)[record.seen])
+    noise = NoiseModel(np.empty(0), winsorised_sigma(residual, quantum), dt)
     if correlation_time(residual) > 1:
-        return noise_of(residual, dt)
-    return NoiseModel(np.empty(0), winsorised_sigma(residual, 0.0), dt)
+        noise = noise_of(residual, dt)
+    return replace(noise, std=max(noise.std, quantum / np.sqrt(12)))
 
 
 def _moved(record: Record) -> FloatArray:
