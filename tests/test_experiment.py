@@ -273,6 +273,21 @@ def test_rounding_of_a_record_is_noise_of_its_test_too():
     assert step / np.sqrt(12) <= coarsest.noise.sigma < 2 * step / np.sqrt(12)
 
 
+@pytest.mark.parametrize(
+    ("lag", "seed", "simplest"), [(1e4, 0, "one step"), (1e6, 2, "up and down")]
+)
+def test_errors_of_static_gains_and_of_slopes_are_not_mixed(lag, seed, simplest):
+    # The record does not tell an integrator from a lag of a hundred times its length.
+    time = 0.5 * np.arange(240)
+    output = 0.02 * lag * -np.expm1(-np.maximum(time - 23.03, 0) / lag)
+    output += 0.03 * np.random.default_rng(seed).standard_normal(240)
+    system = cr.identify(cr.Record(time, (time >= 20) * 1.0, output), structures=[(1, 1)])
+    plan = cr.experiment.plan(system, want="gain", time=40.0, amplitude=(-1, 1))
+    assert plan.step.kind == simplest  # as the model integrates or not
+    low, high = plan.chosen.others
+    assert high < 1e3 * low
+
+
 def test_noise_of_a_long_record_is_not_that_of_the_means_that_are_fitted():
     count, rng = 6000, np.random.default_rng(5)
     command = np.repeat(rng.standard_normal(10), 600) * (np.arange(count) >= 100)

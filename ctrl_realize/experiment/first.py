@@ -71,9 +71,11 @@ def fitted(given: Any, options: dict[str, Any]) -> OutputErrorFit:
 
 def known_from_fit(fit: OutputErrorFit) -> Known:
     """Take model, plausible models, records and their noise from a fit; the last noise is next."""
-    length = min(record.time[-1] - record.time[0] for record in fit.records)
+    slowest = INTEGRATOR / min(record.time[-1] - record.time[0] for record in fit.records)
     drawn = () if fit.plausible_models is None else fit.plausible_models.models
-    others = [_integrating(one, length) for one in drawn]
+    # Poles that the shortest record does not distinguish from an integrator's are 0.
+    poles = [np.where(np.abs(one.poles) < slowest, 0.0, one.poles) for one in drawn]
+    others = [one._replace(poles=own) for one, own in zip(drawn, poles, strict=True)]
     model = PlausibleModel(fit.dead_time, fit.poles, fit.estimate.numerator)
     records, residuals = at_model_gain(fit), [fit.measured - fit.fitted]
     if len(fit.records) > 1 or fit.data.every > 1:
@@ -117,9 +119,3 @@ def _left(record: Record, model: PlausibleModel) -> FloatArray:
     free = np.exp(np.outer(time, model.poles))
     columns = np.column_stack([time**0, time, free.real, free.imag])[rows]
     return np.asarray(left - columns @ np.linalg.lstsq(columns, left, rcond=None)[0])
-
-
-def _integrating(model: PlausibleModel, length: float) -> PlausibleModel:
-    """Poles that the record does not distinguish from an integrator's are 0."""
-    slow = np.abs(model.poles) * length < INTEGRATOR
-    return model._replace(poles=np.where(slow, 0.0, model.poles))

@@ -53,11 +53,8 @@ class _Setting:
     output_limit: float
     records: tuple[Experiment, ...]
     dt: float
-
-    @property
-    def returns(self) -> bool:
-        """Whether the plant integrates, so that the sum of the input must be zero."""
-        return bool(np.any(self.bounds[0].model.poles == 0))
+    returns: bool
+    """Whether the plant integrates, so that the sum of the input must be zero."""
 
 
 def plan(
@@ -125,10 +122,11 @@ def plan(
     Candidates are one step, repeated steps, 3-2-1-1, a pseudo-random binary signal, a multisine of
     small crest factor, a chirp and a relay with hysteresis, each with several periods. Their errors
     are predicted by the Cramer-Rao bound [1]_ of the structure of the model, level included, and
-    ranked by the geometric mean over the model and plausible others [2]_. The bound is local:
-    it is reached where the error is small against the lags. If the plant integrates, the second
-    half of an input is its first with the other sign, so that the output comes back; that of a
-    relay is kept by its feedback.
+    ranked by the geometric mean over the model and plausible others [2]_; for a gain over those
+    that integrate if the model does, since a slope is no static gain. The bound is local: it is
+    reached where the error is small against the lags. If the plant integrates, the second half of
+    an input is its first with the other sign, so that the output comes back; that of a relay is
+    kept by its feedback.
 
     References
     ----------
@@ -161,13 +159,15 @@ def plan(
             f"{_MOST_SAMPLES}, for a rest, the dead time and a response"
         )
     heard = _noise(known, noise, noise_pole, resolution, dt)
-    judged = [Bound(model, dt) for model in (known.model, *known.others[::_OTHERS])]
+    integrates = bool(np.any(known.model.poles == 0))
+    others = [x for x in known.others if want != "gain" or np.any(x.poles == 0) == integrates]
+    judged = [Bound(model, dt) for model in (known.model, *others[::_OTHERS])]
     limited = () if output_limit is None else [Bound(model, dt) for model in known.others]
     setting = _Setting(
         [*judged, *limited], [bound.gradient([wanted]) for bound in judged], heard,
-        _limits(move, bool(np.any(known.model.poles == 0))),
+        _limits(move, integrates),
         np.inf if output_limit is None else positive(output_limit, "output_limit", "deviation"),
-        known.tests, dt,
+        known.tests, dt, integrates,
     )  # fmt: skip
     candidates = _candidates(setting, count)
     best = candidates[0]

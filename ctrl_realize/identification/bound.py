@@ -71,10 +71,7 @@ class Bound:
 
     def errors(self, tests: Sequence[Experiment], gradient: FloatArray) -> FloatArray:
         """Standard errors (k,) of quantities with gradients (k, p) after all tests together."""
-        white = [
-            [_white(part, one) for part in replace(self, dt=one.dt or self.dt).slopes(one.input)]
-            for one in tests
-        ]
+        white = [_white(replace(self, dt=one.dt or self.dt), one) for one in tests]
         slopes, own = zip(*white, strict=True)
         together = LocalErrors(np.concatenate(slopes), block_diag(*own))
         # The parameters themselves are asked for as well: all of them are unknown.
@@ -132,10 +129,11 @@ class Bound:
         return theta, self.model.numerator, KnownFactor(slow)
 
 
-def _white(columns: FloatArray, test: Experiment) -> FloatArray:
-    """Columns (N, k) in units of the noise, without those that its filter does not reach."""
-    left = lfilter([1.0, *-test.noise.coefficients], [1.0], columns[test.seen], axis=0)
-    return np.asarray(left[test.noise.coefficients.size :] / test.noise.std)
+def _white(bound: Bound, test: Experiment) -> list[FloatArray]:
+    """Slopes and level in units of the noise, without those that its filter does not reach."""
+    whitening = [1.0, *-test.noise.coefficients]
+    left = [lfilter(whitening, [1.0], part[test.seen], axis=0) for part in bound.slopes(test.input)]
+    return [np.asarray(part[len(whitening) - 1 :] / test.noise.std) for part in left]
 
 
 def quantities(
