@@ -176,7 +176,7 @@ def each_record_plot(
             model = simulate_record(system, record, "estimate", gaps=True)[output]
             seen = ~np.isnan(measured)
             lines.append(draw_beside(axis, record, output, [(model, {"label": "model", **kwargs})]))
-            fit = float(fit_percent(measured[None, seen], model[None, seen])[0])
+            fit = float(fit_percent(measured[seen], model[seen]))
             axis.set_title(f"{plain(name, 30)}, {fit:.1f} %", loc="left", fontsize=10)
         for axis in axes[len(shown) :]:
             axis.set_visible(False)

@@ -308,12 +308,13 @@ class OutputErrorFit(FractionalDelayFit):
 
         A drift, hum, load or free response that was estimated together with the model is included.
         """
-        return float(fit_percent(self.measured[None], self.fitted[None])[0])
+        return float(fit_percent(self.measured, self.fitted))
 
     @property
     def simulated_percent(self) -> float:
         """`fit_percent` of the model alone, simulated from rest; its level is that of the output.
 
+        An input that is not a step was at its first value or at its mean, whichever follows more.
         Less than `fit_percent` where a drift, hum, or the free response to an earlier input was
         estimated together with the model.
         """

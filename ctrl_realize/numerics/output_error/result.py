@@ -371,15 +371,11 @@ def followed_by(fits: WindowFit, chosen: Candidate, numerator: FloatArray) -> Fo
     closest = min(fits.candidates.values(), key=lambda candidate: candidate.cost)
     alone = respond(window.drive, problem.known, numerator, chosen.theta)
     alone += np.mean(window.output - alone)
-
     # One after the other: a long record takes much memory.
-    def percent(model: FloatArray) -> float:
-        return float(fit_percent(window.output[None], model[None])[0])
-
-    simulated = percent(alone)
+    simulated = float(fit_percent(window.output, alone))
     del alone
-    complete = percent(window.predict(problem, chosen))
-    most = percent(window.predict(problem, closest))
+    complete = float(fit_percent(window.output, window.predict(problem, chosen)))
+    most = float(fit_percent(window.output, window.predict(problem, closest)))
     return Followed(complete, simulated, closest.structure.plain, most)
 
 

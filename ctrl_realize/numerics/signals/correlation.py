@@ -81,8 +81,8 @@ def cross_bound(residual: FloatArray, drive: FloatArray, lags: int, confidence: 
 
 def fit_percent(measured: FloatArray, modelled: FloatArray) -> FloatArray:
     """Return ``100 (1 - |y - model| / |y - mean y|)`` for every row: 100 is perfect, 0 a mean."""
-    spread = np.linalg.norm(measured - measured.mean(axis=1, keepdims=True), axis=1)
-    miss = np.linalg.norm(measured - modelled, axis=1)
+    spread = np.linalg.norm(measured - measured.mean(axis=-1, keepdims=True), axis=-1)
+    miss = np.linalg.norm(measured - modelled, axis=-1)
     with np.errstate(divide="ignore", invalid="ignore"):
         return np.asarray(100.0 * (1.0 - miss / spread))
 

@@ -212,7 +212,7 @@ def matched(
     common = moved(0.0, 1.0)[0]
     alone, errors = _regression(np.column_stack([common, own]), output)
     level = np.linalg.lstsq(beside, output - common, rcond=None)[0]
-    followed = float(fit_percent(output[None], (common + beside @ level)[None])[0])
+    followed = float(fit_percent(output, common + beside @ level))
     return OwnResponse(
         shift * dt,
         max(error, 1e-12) * dt,

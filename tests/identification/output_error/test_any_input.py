@@ -325,3 +325,24 @@ def test_a_small_move_before_the_first_step_is_not_taken_for_its_response():
     fit = cr.identify(record, structures=[(1, 1)]).fit
     assert fit.interval[0] <= 30.0 <= fit.interval[1]
     assert_allclose(fit.dead_time, 30.0, atol=4 * fit.std_given_structure)
+
+
+def test_a_record_that_begins_at_rest_is_simulated_from_its_first_input():
+    values = [4.0, 2.0, 0.5]
+    records = []
+    for seed, level in ((0, 3.0), (1, -2.0)):
+        u = signal("prbs", seed, 400) + 1
+        u[:20] = u[:1]
+        y = respond(u - u[0], values) + 0.01 * np.random.default_rng(seed).standard_normal(u.size)
+        records.append(cr.Record(DT * np.arange(u.size), u, level + y))
+    for given in (records[0], records):
+        fit = cr.identify(given).fit
+        assert fit.simulated_percent == pytest.approx(fit.fit_percent, abs=0.1)
+        assert fit.fit_percent > 95
+        assert "from rest" not in fit.report()
+
+
+def test_noise_as_input_is_simulated_from_its_mean():
+    record, _ = operation("noise", 4, 600, [4.0, 2.0, 2.0])
+    fit = cr.identify(record).fit
+    assert fit.fit_percent - 25 < fit.simulated_percent < fit.fit_percent + 0.1

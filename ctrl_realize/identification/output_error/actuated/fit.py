@@ -201,7 +201,7 @@ def _estimate(result: OutputErrorFit, scales: Scales, found: ActuatedFit) -> Out
     low, high = found.ends[0]
     dead_time = best.dead_time
     low, high = min(low, dead_time), max(high, dead_time)
-    complete = float(fit_percent(measured[None], fitted[None])[0])
+    complete = float(fit_percent(measured, fitted))
     if np.isfinite(result.onset) and len(result.records) == 1:
         free = max(measured.size - family.free - 2, 1)
         normalized_rms = float(np.linalg.norm(found.residual) / np.sqrt(free)) / result.data.sigma
