@@ -111,12 +111,15 @@ def test_every_kind_and_sign_comes_back_from_every_form(form, kind):
     values = values_of(written)
     assert PID(*written.ideal).kind == kind
     assert written.reversed_action == (values[written.values[0].name] > 0)
-    if written.reversed_action:  # a sign for all gains
+    reverse = written.reversed_action
+    back = PID.from_form(form, values, reversed_action=reverse, **RANGES)
+    np.testing.assert_allclose(back.ideal[:3], pid.ideal[:3], rtol=1e-12)
+    if reverse:  # or with a sign for all gains
         parallel = cr.design.pid_forms().set_index("form")["structure"][form] == "parallel"
         gains = written.values if parallel else written.values[:1]
         values |= {each.name: -each.value for each in gains}
-    back = PID.from_form(form, values, **RANGES)
-    np.testing.assert_allclose(back.ideal[:3], pid.ideal[:3], rtol=1e-12)
+        back = PID.from_form(form, values, **RANGES)
+        np.testing.assert_allclose(back.ideal[:3], pid.ideal[:3], rtol=1e-12)
 
 
 def test_units_of_the_record_come_with_the_controller():

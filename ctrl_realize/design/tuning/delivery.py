@@ -124,6 +124,7 @@ class Delivered:
         output_range: tuple[float, float] | None = None,
         time_unit: str | None = None,
         derivative_filter: float = 10.0,
+        reversed_action: bool = False,
         **settings: Any,
     ) -> Self:
         """Make the controller that the entered values of another controller give.
@@ -136,6 +137,9 @@ class Delivered:
             Parameter -> value, with the names that `as_form` lists.
         derivative_filter : float
             td / tf if the form has no filter.
+        reversed_action : bool
+            The block is direct acting: the values are those of a negative gain, entered without
+            sign, as `PIDForm.reversed_action` tells.
         **settings
             Further arguments of `PIDController`: `dt`, `name`.
 
@@ -149,7 +153,7 @@ class Delivered:
         scaling = Scaling(measured_range, output_range, time_unit)
         kp, ti, td, tf = from_form(form, values, scaling)
         ratio = positive(derivative_filter, "derivative_filter", "td / tf")
-        return cls(kp, ti, td, tf or td / ratio, **settings)
+        return cls(-kp if reversed_action else kp, ti, td, tf or td / ratio, **settings)
 
     def algorithm(
         self,

@@ -57,6 +57,7 @@ class PIDForm(Result):
         What to enter; also by name: ``form["Ti"]``.
     reversed_action : bool
         The gain was negative: the output must rise when the measured value rises (direct acting).
+        `PIDController.from_form` takes it together with the values.
     ideal : tuple of float
         kp, ti, td, tf of the ideal form that the values give. It differs in tf from the controller
         if the filter cannot be set.
