@@ -9,11 +9,13 @@ import numpy as np
 
 from ..._wording import named
 from ...data import Record, StepResponse
+from ...data.resampling import MAX_DENSER
 from ...errors import DataError
 from ...numerics.arrays import FloatArray
 from ...numerics.output_error.result import OutputErrorEstimate
 from ...numerics.output_error.step_data import StepData, own_regressors, step_data, step_scales
 from ...numerics.signals.noise import mad_sigma
+from ...numerics.signals.sample_grid import grid_step
 from ...numerics.validation.own_response import OwnResponse, own_step_response
 from ..step.steps import unit_step
 from .repeatability import APART, SAME_AMPLITUDE
@@ -41,10 +43,12 @@ def common_sample_time(records: tuple[Record, ...]) -> float:
     first = records[0].dt
     for record in records:
         if abs(record.dt - first) > 1e-6 * first:
+            # A grid that does not hold all samples moves them, by up to half of its step.
+            step = grid_step(np.cumsum([0.0, *sorted({r.dt for r in records})]), MAX_DENSER)
             raise DataError(
                 f"{named('record', record.name)} has dt={record.dt:g} s, the first has "
                 f"{first:g} s; records fitted together need the same sample time: each as "
-                f"Record.from_samples(time, input, output, dt={min(first, record.dt):g}), which "
+                f"Record.from_samples(time, input, output, dt={step:g}), which "
                 "holds the input and leaves the output missing between its samples"
             )
     return first

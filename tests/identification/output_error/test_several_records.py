@@ -230,18 +230,25 @@ def test_tests_of_several_kinds_add_up_to_one_interval():
     assert both.gain == pytest.approx(0.9, rel=0.01)
 
 
-def test_records_of_two_sample_times_are_fitted_as_the_error_says():
-    """Interpolated, as it once said, a step has a value in between: early by a sample."""
+@pytest.mark.parametrize(("times", "divisor"), [((1.0, 4.0), 1.0), ((2.0, 3.0), 1.0)])
+def test_records_of_two_sample_times_are_fitted_as_the_error_says(times, divisor):
+    """Interpolated, as it once said, a step has a value in between: early by a sample.
+
+    On the grid of the shorter sample time, as it said then, samples of the other are moved.
+    """
 
     def taken(every, make, **options):
         t = every * np.arange(int(360 / every))
-        y = 2 * (t >= 67.3) * (1 - np.exp(-(t - 67.3) / 20))
-        y += 0.005 * np.random.default_rng(int(every)).standard_normal(t.size)
-        return make(t, (t >= 60.0).astype(float), y, **options)
+        move = t[t >= 61.0][0]
+        y = 2 * (t >= move + 7.3) * (1 - np.exp(-(t - move - 7.3) / 20))
+        y += 0.001 * np.random.default_rng(int(every)).standard_normal(t.size)
+        return make(t, (t >= move).astype(float), y, **options)
 
-    with pytest.raises(DataError, match=r"Record.from_samples\(time, input, output, dt=1\)"):
-        cr.identify([taken(1.0, cr.Record), taken(4.0, cr.Record)])
-    again = [taken(every, cr.Record.from_samples, dt=1.0) for every in (1.0, 4.0)]
+    advice = rf"Record.from_samples\(time, input, output, dt={divisor:g}\)"
+    with pytest.raises(DataError, match=advice):
+        cr.identify([taken(every, cr.Record) for every in times])
+    again = [taken(every, cr.Record.from_samples, dt=divisor) for every in times]
     fit = cr.identify(again, structures="FOPDT").fit
     assert fit.interval[0] <= 7.3 <= fit.interval[1]
-    assert fit.dead_time == pytest.approx(7.3, abs=0.1)
+    assert fit.dead_time == pytest.approx(7.3, abs=0.02)
+    assert np.ptp(fit.interval) < 0.05
