@@ -243,3 +243,19 @@ def test_structures_that_differ_in_gain_are_named_under_a_coloured_residual():
     assert {"coloured_residual", "gain_not_resolved"} <= codes(system)
     told = next(flag.message for flag in system.fit.flags if flag.code == "gain_not_resolved")
     assert "structures that the data cannot rule out have gains of" in told
+
+
+@pytest.mark.parametrize("moves", [[30.0], [30.0, 70.0, 110.0, 190.0]])
+def test_a_washout_has_no_total_delay(moves):
+    # s / (20 s + 1): the gain is zero, and the delay at zero frequency a ratio with it
+    time = 0.5 * np.arange(600)
+    rng = np.random.default_rng(1)
+    u, y = np.zeros(time.size), 0.01 * rng.standard_normal(time.size)
+    for height, at in zip([1.0, -1.0, 1.0, -1.0], moves, strict=False):
+        late = time - at - 3.0
+        u += height * (time >= at)
+        y += height * np.where(late >= 0, np.exp(-np.maximum(late, 0) / 20.0), 0.0)
+    fit = cr.identify(cr.Record(time, u, y)).fit
+    assert fit.gain_interval[0] < 0 < fit.gain_interval[1]
+    assert fit.total_delay_interval[1] == np.inf
+    assert "total delay         not determined" in fit.report()

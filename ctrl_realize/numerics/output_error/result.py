@@ -340,9 +340,12 @@ class OutputErrorEstimate:
 
     @property
     def total_ends(self) -> tuple[float, float]:
-        """95 % interval of the total delay, in s, as that of the gain."""
-        early = self.load is not None and self.load.early
-        if self.static is None or early or not self.static.resolved:
+        """95 % interval of the total delay, in s, as that of the gain.
+
+        It is a ratio with the gain for its denominator: without end if that may be zero.
+        """
+        low, high = self.gain_ends
+        if self.static is None or not self.static.resolved or low <= 0 <= high:
             return self.low, np.inf
         every = ((self.static, 1.0), *self.alike)
         low, high = averaged_ends([(one.total, one.total_std, weight) for one, weight in every])
