@@ -120,8 +120,9 @@ class FormFamily(LagFamily):
     def values(self, x: FloatArray) -> tuple[dict[str, float], FloatArray]:
         """Values by name, and their derivatives with respect to x (k,)."""
         unit = np.array([_unit(name, self.scales) for name in self.names])
-        value = np.where(np.isfinite(unit), x * np.where(np.isfinite(unit), unit, 1), np.exp(x))
-        slope = np.where(np.isfinite(unit), unit, value)
+        # The exponential of a dead time of hours in s overflows.
+        value = np.exp(x, out=x * unit, where=unit == 0)
+        slope = np.where(unit == 0, value, unit)
         return dict(zip(self.names, map(float, value), strict=True)), slope
 
 
@@ -164,13 +165,13 @@ def _limits(form: ProcessForm, scales: Scales) -> dict[str, tuple[float, float]]
 
 
 def _unit(name: str, scales: Scales) -> float:
-    """Size of the coordinate of a parameter in s; infinite for a logarithm."""
-    return {"dead_time": 1.0, "lead_1": scales.rise}.get(name, np.inf)
+    """Size of the coordinate of a parameter in s; 0 for a logarithm."""
+    return {"dead_time": 1.0, "lead_1": scales.rise}.get(name, 0.0)
 
 
 def _coordinate(name: str, value: float, scales: Scales) -> float:
     unit = _unit(name, scales)
-    return value / unit if np.isfinite(unit) else float(np.log(value))
+    return value / unit if unit else float(np.log(value))
 
 
 def fit_form(

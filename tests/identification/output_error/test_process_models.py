@@ -157,3 +157,12 @@ def test_a_lag_beside_an_integrator_is_found_where_one_pole_fits_as_a_ramp(kind,
     table = fit.parameter_table()
     for name, value in plant.values.items():
         assert abs(table.loc[name, "value"] - value) < 4 * table.loc[name, "std_given_structure"]
+
+
+@pytest.mark.parametrize("name", ["P1DI", "P1D"])
+def test_hours_as_sample_time_give_the_model_of_seconds(name):
+    # the exponential of a dead time of hours in s overflowed
+    fast = record(INTEGRATOR, count=300)
+    slow = cr.Record(36000 * fast.time, fast.input, fast.output)
+    seconds, hours = (cr.identify(one, structures=name).fit for one in (fast, slow))
+    assert hours.dead_time == pytest.approx(36000 * seconds.dead_time, rel=1e-6)
