@@ -3,6 +3,7 @@
 import hashlib
 import html
 import json
+import re
 import subprocess
 import sys
 from contextlib import redirect_stderr, redirect_stdout
@@ -399,6 +400,42 @@ def test_records_of_different_plants_are_kept_apart_on_request(folder, tmp_path,
     assert "--separate" in capsys.readouterr().err
     assert main(["identify", *files, "-o", str(tmp_path / "out"), "--separate", *FAST]) == 0
     assert {"step_0/model.json", "slow/model.json"} <= files_in(tmp_path / "out")
+
+
+@pytest.mark.filterwarnings("default::ctrl_realize.errors.DataWarning")
+def test_a_valve_test_with_missing_samples_is_refused_with_options_that_there_are(tmp_path, capsys):
+    time = 0.1 * np.arange(300)
+    command = np.where(time < 10, 50.0, 60.0)
+    columns = {"time_s": time, "command": command, "stem": np.roll(command, 5)}
+    assert main(["valve", "--help"]) == 0
+    options = capsys.readouterr().out
+    for name, code in (("stem", 2), ("command", 0)):  # a command holds its value meanwhile
+        columns[name] = np.where(np.arange(300) == 200, np.nan, columns[name])
+        file = tmp_path / f"{name}.csv"
+        pd.DataFrame(columns).to_csv(file, index=False)
+        columns["stem"] = np.roll(command, 5)
+        words = [str(file), "-o", str(tmp_path / name), "--no-report"]
+        assert main(["valve", *words]) == code
+        said = capsys.readouterr().err
+        assert all(option in options for option in re.findall(r"--[a-z-]+", said)), said
+        assert ("--from and --to" in said) == (code == 2)
+
+
+def test_jittering_samples_of_a_loop_are_resampled_on_request(tmp_path):
+    rng = np.random.default_rng(0)
+    time = np.arange(600) + 0.05 * rng.standard_normal(600)
+    swing = np.sin(2 * np.pi * time / 40)
+    columns = {"time_s": time, "op": 50 + 5 * swing, "pv": 20 - 3 * np.roll(swing, 10)}
+    pd.DataFrame(columns).to_csv(tmp_path / "loop.csv", index=False)
+    words = ["loop", str(tmp_path / "loop.csv"), "-o", str(tmp_path / "out"), "--no-report"]
+    assert main([*words, "--input", "op", "--output-column", "pv", "--resample"]) == 0
+
+
+def test_no_process_at_all_is_refused_by_the_name_of_the_option(folder, tmp_path, capsys):
+    files = [str(folder / f"step_{k}.csv") for k in range(2)]
+    assert main(["identify", *files, "-o", str(tmp_path / "out"), "--jobs", "0"]) == 2
+    said = capsys.readouterr().err
+    assert "--jobs 0; expected a number of processes, or -1 for all" in said
 
 
 @pytest.mark.parametrize("command", [[], ["identify"], ["compare"], ["valve"], ["loop"]])

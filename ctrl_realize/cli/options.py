@@ -113,7 +113,6 @@ GROUPS: dict[str, dict[str, Any]] = {
         ],
     },
     "record": _RECORD,
-    "valve_test": {name: option for name, option in _RECORD.items() if name != "missing"},
     "trend": {
         name: option for name, option in _RECORD.items() if name not in ("missing", "rest")
     },

@@ -135,7 +135,7 @@ def valve(
     measured: o.Given,
     limit: o.Limit = None,
     tests: o.Given,
-    valve_test: o.Given,
+    record: o.Given,
     no_report: o.NoReport = False,
     overwrite: o.Overwrite = False,
 ) -> None:

@@ -9,7 +9,7 @@ import numpy as np
 
 from .._flags import Flag, flagged
 from ..data import Record
-from ..data.given import as_record
+from ..data.given import as_record, check_complete
 from ..errors import DataError
 from ..numerics.valve_test.play import slope_of
 from .flags import flags_of
@@ -107,11 +107,7 @@ def valve_report(
     if not given:
         raise DataError("there are no records; expected at least one")
     for record in given:
-        if record.n_missing:
-            raise DataError(
-                f"{record!r}: a valve test needs complete records; cut them, or read them with "
-                "interpolation"
-            )
+        check_complete(record, "a valve test")
     check_limits(limits)
     choices: list[str] = []
     command = _command_range(given, command_range, choices)

@@ -23,18 +23,18 @@ def run_valve(
     measured: Mapping[str, Any],
     limit: Sequence[str] | None,
     tests: Mapping[str, Any],
-    valve_test: Mapping[str, Any],
+    record: Mapping[str, Any],
     run: Run,
 ) -> int:
     """Measure, write the results, and return the exit code."""
-    how = Reading({"missing": "refuse", **valve_test}, tests)
+    how = Reading(record, tests)
     bounds = _limits(limit or ())
     options = {**measured, **({"limits": bounds} if bounds else {})}
     refuse_other_results(folder, run)
     sources = how.sources(files)
     records = [source.record() for source in sources]
-    for source, record in zip(sources, records, strict=True):
-        say(printable(f"{source.file}: {record!r}"))
+    for source, read in zip(sources, records, strict=True):
+        say(printable(f"{source.file}: {read!r}"))
     result = valve_report(records, **options)
     say(result.report())
     lines, name = reading_in_python(files, how)

@@ -30,7 +30,8 @@ def run_loop(
     """Diagnose, write the results, and return the exit code."""
     if len(files) != 1:
         raise OptionError(f"{len(files)} files; expected one record of operation")
-    reading = {**trend, "missing": "keep"}  # the longest complete part is judged
+    # the longest complete part is judged
+    reading = dict(trend) if "resample" in trend else {**trend, "missing": "keep"}
     refuse_other_results(folder, run)
     if set_point is None:
         record = read_record(files[0], **reading)
