@@ -447,6 +447,14 @@ def test_help_has_examples_and_exit_codes(command, capsys):
         assert f"ctrl-realize {command[0]} " in said.split("Examples:")[1]
 
 
+def test_the_page_on_the_command_line_has_the_exit_codes_of_the_help(capsys):
+    assert main(["--help"]) == 0
+    codes = re.findall(r"\d+", capsys.readouterr().out.split("Exit codes:")[1])
+    page = Path(__file__).parents[1] / "docs" / "api" / "command_line.md"
+    said = page.read_text(encoding="utf-8").split("exit code")[1].split("manifest.json")[0]
+    assert sorted(set(re.findall(r"\d+", said)), key=int) == codes
+
+
 @pytest.mark.usefixtures("without_figures")
 def test_names_of_files_reach_terminal_page_table_and_folder_as_names_alone(
     folder, tmp_path, capsys, monkeypatch
