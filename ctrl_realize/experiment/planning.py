@@ -13,6 +13,7 @@ from scipy.linalg import toeplitz
 from .._checks import band, not_negative, one_of, positive, real
 from .._wording import in_time, plainly
 from ..data import Record
+from ..data.shown_units import shown_time_unit
 from ..delayed import DelayedStateSpace
 from ..design import ProcessModel
 from ..errors import OptionError
@@ -189,6 +190,7 @@ def plan(
             "that are plausible",
             f"noise {plainly(heard.sigma, 3)}, {colour}",
         ),
+        time_unit=shown_time_unit(first),
     )
 
 

@@ -114,6 +114,8 @@ class ExperimentPlan(PlannedInput):
     kind : str
         Of the command: that of the best candidate, or the one chosen by `using`.
     choices : tuple of str
+    time_unit : str
+        Of plots: min, h or day of the first record, otherwise s.
 
     Examples
     --------
@@ -135,6 +137,7 @@ class ExperimentPlan(PlannedInput):
     tests: tuple[Experiment, ...]
     kind: str
     choices: tuple[str, ...] = field(default=())
+    time_unit: str = "s"
 
     @property
     def _afterwards(self) -> float:

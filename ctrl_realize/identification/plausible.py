@@ -46,6 +46,8 @@ class PlausibleModels(Result):
         Dead time in s, poles in rad/s, and numerator, lowest power first, of each.
     dt : float
         In s.
+    time_unit : str
+        Of plots: min, h or day of the record, otherwise s.
 
     Examples
     --------
@@ -60,6 +62,7 @@ class PlausibleModels(Result):
 
     models: tuple[PlausibleModel, ...]
     dt: float
+    time_unit: str = "s"
 
     def __len__(self) -> int:
         return len(self.models)

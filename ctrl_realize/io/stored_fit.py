@@ -117,7 +117,7 @@ def _read(summary: FitSummary, key: str) -> Any:
     try:
         found = of_kind(value, _KEPT[key])
         if key == "plausible_models":
-            return _drawn(*found)
+            return _drawn(summary.time_unit, *found)
     except (TypeError, ValueError) as error:
         if key == "actuator":  # without it the model would be simulated as another one
             raise FileFormatError(f"'actuator' of 'fit': {error}; save the model again") from error
@@ -129,13 +129,13 @@ def _read(summary: FitSummary, key: str) -> Any:
     return found
 
 
-def _drawn(dt: float, models: tuple[tuple[float, Numbers, Numbers, Numbers], ...]) -> Any:
+def _drawn(time_unit: str, dt: float, models: tuple[tuple[Any, ...], ...]) -> Any:
     """Models of dead time, poles (real and imaginary parts) and numerator."""
     every = [
         PlausibleModel(dead_time, np.array(real) + 1j * np.array(imag), np.array(numerator))
         for dead_time, real, imag, numerator in models
     ]
-    return PlausibleModels(tuple(every), dt)
+    return PlausibleModels(tuple(every), dt, time_unit)
 
 
 def _stored(key: str) -> property:

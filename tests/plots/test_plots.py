@@ -161,3 +161,26 @@ def test_residual_plot_shows_data_model_and_correlations(random_record):
     assert drawn.axes[0, 0].get_ylabel() == "level"
     with pytest.raises(OptionError, match="output"):
         plots.residual_plot(check, output=1)
+
+
+def test_times_of_a_record_in_minutes_are_in_minutes_on_plots_of_what_comes_of_it(tmp_path):
+    time = 20.0 * np.arange(300)
+    u = np.where(time < 1000, 0.0, 10.0)
+    y = cr.design.ProcessModel(gain=2.0, lag=600.0, dead_time=140.0).system(20.0).simulate(u)
+    y += 0.05 * np.random.default_rng(0).standard_normal(time.size)
+    system = cr.identify(cr.Record(time, u, y, units={"time": "min"}), structures=[(1, 1)])
+    cr.save_model(tmp_path / "model.json", system)
+    pid = cr.design.pid(system, "simc")
+    drawn = [
+        system.fit.plausible_models.plot(),
+        cr.load_model(tmp_path / "model.json").fit.plausible_models.plot(),
+        cr.experiment.plan(system).using("one step").plot(),
+        cr.design.delay_robustness(system, pid).plot(),
+    ]
+    for each in drawn:
+        assert each.figure.axes[0].get_xlabel().endswith("[min]")
+    # the interval is shaded where its numbers are
+    low, high = system.fit.interval
+    shaded = drawn[-1].figure.axes[0].patches[0].get_extents()
+    ends = drawn[-1].figure.axes[0].transData.inverted().transform(shaded)[:, 0]
+    assert_allclose(ends, [low / 60, high / 60])

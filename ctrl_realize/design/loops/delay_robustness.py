@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from ...data.shown_units import shown_time_unit
 from ...delayed import DelayedStateSpace
 from ...errors import OptionError
 from ...numerics.arrays import locked, read_only
@@ -105,7 +106,7 @@ def _continuous(system: Any, controller: Any, given: tuple[float, float] | None)
     interval = _interval(system, given)
     loop = open_loop(core, controller, nominal)
     delays = np.unique([*np.linspace(*interval, MAX_DELAYS), nominal])
-    return _tried(loop, loop_margins(loop), delays, interval, nominal)
+    return _tried(system, loop, loop_margins(loop), delays, interval, nominal)
 
 
 def over_interval(
@@ -121,10 +122,11 @@ def over_interval(
     last = int(np.ceil((high + held) / dt - 1e-9))
     step = max(1, -(-(last - first) // (most - 1)))
     delays = np.unique([*range(first, last, step), last, nominal]).astype(np.int64)
-    return _tried(loop, found, delays, interval, nominal, held)
+    return _tried(plant, loop, found, delays, interval, nominal, held)
 
 
 def _tried(
+    system: Any,
     loop: Loop,
     found: Margins,
     delays: Any,
@@ -148,6 +150,7 @@ def _tried(
         stable_from=float(np.maximum(0.0, unit * (nominal - earlier) - held)),
         stable_to=unit * (nominal + later) - held,
         fractional_time=held,
+        time_unit=shown_time_unit(system),
     )
 
 

@@ -41,6 +41,8 @@ class DelayRobustness(Result):
     fractional_time : float
         Time in s by which the delay exceeds the dead time, if the core contains a fraction of a
         sample: ``dead_times = delays * dt - fractional_time``.
+    time_unit : str
+        Of plots: min, h or day of the record of the plant, otherwise s.
 
     Examples
     --------
@@ -64,6 +66,7 @@ class DelayRobustness(Result):
     stable_from: float
     stable_to: float
     fractional_time: float = 0.0
+    time_unit: str = "s"
 
     @property
     def stable(self) -> bool:

@@ -366,7 +366,7 @@ class OutputErrorFit(FractionalDelayFit):
     def plausible_models(self) -> PlausibleModels | None:
         """Models that the data do not rule out; None beside an actuator."""
         models = self.estimate.plausible
-        return PlausibleModels(models, self.dt) if models else None
+        return PlausibleModels(models, self.dt, self.time_unit) if models else None
 
     @property
     def _answered_noise(self) -> bool:  # type: ignore[override]
