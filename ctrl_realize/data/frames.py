@@ -84,7 +84,8 @@ def _numbers(column: pd.Series[Any], label: str) -> FloatArray:
     except (ValueError, TypeError) as error:
         raise DataError(
             f"column {label!r} holds {column.dtype} values that are not numbers ({error}); convert "
-            "it, for instance with pandas.to_numeric(column, errors='coerce')"
+            "it, for instance with pandas.to_numeric(column, errors='coerce'), or column == 'ON' "
+            "of a switch"
         ) from error
 
 

@@ -185,6 +185,7 @@ class Table:
             advice = f"; thousands={min(',.', key=text.find)!r} if it separates thousands"
         if not advice and not any(letter.isdigit() for letter in text):
             advice = f"; na_values={text[:60]!r} if it stands for a missing value"
+            advice += "; expected ON and OFF, or 1 and 0, in a column of a switch"
         what = f"{text[:60]!r}: is not a number{advice}"
         if infinite:
             what = f"{text[:60]} is not finite (or too large for double precision)"

@@ -273,6 +273,27 @@ def test_percent_signs_and_switches_are_numbers(tmp_path):
         cr.read_record(written(tmp_path, "t,y,u", rows))
 
 
+@pytest.mark.parametrize("temperature", ["temperature", "pv"])
+def test_a_heater_that_is_on_or_off_is_the_input(tmp_path, temperature):
+    on = np.repeat([0, 1, 0, 1], [10, 20, 25, 15])
+    alarm = ["no"] * on.size  # a switch that does not move is no signal
+    rising = 20 + np.cumsum(on) - 0.3 * np.arange(on.size)
+    rows = [
+        f"{k},{'ON' if u else 'OFF'},{y:.1f},{word}"
+        for k, (u, y, word) in enumerate(zip(on, rising, alarm, strict=True))
+    ]
+    path = written(tmp_path, f"t,heater,{temperature},alarm", rows)
+    guessed = pytest.warns(DataWarning, match="'heater' is taken as input")
+    with nullcontext() if temperature == "pv" else guessed:
+        record = cr.read_record(path)
+    assert_array_equal(record.input, on)
+    assert_array_equal(record.output, np.round(rising, 1))
+    rows[5] = rows[5].replace("OFF", "starting")
+    path = written(tmp_path, f"t,heater,{temperature},alarm", rows)
+    with pytest.raises(DataError, match="expected ON and OFF, or 1 and 0, in a column of a switch"):
+        cr.read_record(path, input="heater", output=temperature)
+
+
 def test_a_column_in_percent_has_a_percent_sign_in_every_cell(tmp_path):
     """What Excel shows as 50 % is stored as 0.5: cells of two formats are no signal."""
     rows = [f"{k},1,{'100%' if k in (3, 4) else '1.0'}" for k in range(6)]

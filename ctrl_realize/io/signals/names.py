@@ -96,6 +96,9 @@ def choose_columns(
     ]
     if not inputs and not outputs and not has_header(table) and len(rest) == 2:
         inputs, outputs, rest = rest[:1], rest[1:], []
+    if not inputs and len(rest) == (not outputs):  # words of a switch, such as ON and OFF
+        unread = set(range(len(table.columns))) - {*known, *outputs, *rest}
+        rest += [k for k in sorted(unread) if _moves(table, k)]
     if len(rest) > 1:
         rest = [k for k in rest if k not in setpoints and _moves(table, k)]
     if not inputs and len(rest) > 1:
