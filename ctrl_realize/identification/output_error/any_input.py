@@ -176,13 +176,23 @@ def _summary(
         )
     if fit.averaged:
         reasons += loop_choices(records[0])
+        moved = [
+            f"{load.size:.3g} seen from {in_time(at, 4)} on"
+            for load in found.loads
+            for at in [
+                float(used[load.record].time[data.offsets[load.record] + data.every * load.row])
+            ]
+        ]
+        if moved:
+            reasons.append(chosen("loop.load", moved=", ".join(moved)))
     choices = (*reasons, *choices_of(fit))
     return OutputErrorFit(fit, shown, time, records, repeats, choices=choices, flags=tuple(flags))
 
 
 def _from_first_input(data: SampledData, fit: OutputErrorEstimate) -> float:
     """Per cent of the output that the model follows, at rest at the first input, not its mean."""
-    problem = replace(data, inputs=tuple(u - u[0] for u in data.inputs)).problem
+    rest = tuple(u - u[0] for u in data.inputs)
+    problem = replace(data.without_loads, inputs=rest).problem
     parameters = np.append(fit.dead_time, parameters_from_poles(fit.poles))
     left = problem.data - respond(problem.drive, data.known, fit.numerator, parameters)
     for part in np.split(left, data.edges[1:-1]):

@@ -1,15 +1,17 @@
 """Records of running loops whose set point is known (simulated)."""
 
+import re
 from dataclasses import replace
 
 import control as ct
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose
 from scipy.signal import lfilter
 
 import ctrl_realize as cr
 from benchmarks.accuracy import factors
-from benchmarks.closed_loop.cases import CASES, GAIN, PLANTS, record
+from benchmarks.closed_loop.cases import CASES, GAIN, PLANTS, looped, record
 from benchmarks.worlds.judge import judged
 from benchmarks.worlds.loops import relay_with_load
 from tests.rigs import codes
@@ -267,3 +269,38 @@ def test_a_loop_about_an_analyser_is_told_though_repeats_are_left_out(seed):
     assert {"repeats_left_out", "closed_loop"} <= codes(fit)
     assert fit.interval[0] <= 12 <= fit.interval[1]
     assert fit.gain_interval[0] <= 2 <= fit.gain_interval[1]
+
+
+def beside(*loads, noise=0.03, seed=7):
+    """Record of a loop with three moves of 1, and steps of loads (s, size) at its input."""
+    case = replace(CASES["white"], noise=noise)
+    rng = np.random.default_rng(seed)
+    wanted = record(PLANT, case, "three", seed)[0]
+    load = sum(size * (at <= TIME) for at, size in loads) + np.zeros(TIME.size)
+    y = looped(PLANT, wanted, noise * rng.standard_normal(TIME.size), case, load)
+    return cr.Record(TIME, *y, reference=wanted)
+
+
+def test_a_load_soon_after_a_move_is_no_part_of_the_gain():
+    """It was: a tenth of the gain, outside of an interval that was called good."""
+    fits = [cr.identify(beside((at, 0.2), seed=seed)).fit for at in (380, 640) for seed in (8, 9)]
+    for fit in fits:
+        assert fit.gain == pytest.approx(GAIN, rel=0.02)
+        assert fit.interval[0] <= PLANT.dead_time <= fit.interval[1]
+    # 95 % each
+    assert sum(low <= GAIN <= high for low, high in (fit.gain_interval for fit in fits)) >= 3
+
+
+def test_loads_are_told_with_their_sizes_and_times():
+    fit = cr.identify([beside((420, -0.3), (160, 0.2)), beside((510, 0.4), seed=8)]).fit
+    (said,) = [reason for reason in fit.choices if reason.startswith("loads at")]
+    told = re.findall(r"(-?[.0-9]+) seen from ([.0-9]+) s on", said)
+    sizes, times = np.array(sorted(told, key=lambda pair: float(pair[1])), dtype=float).T
+    assert_allclose(times, PLANT.dead_time + np.array([160, 420, 510]), atol=5.0)
+    assert_allclose(sizes, [0.2, -0.3, 0.4], rtol=0.1)
+
+
+@pytest.mark.parametrize("case", ["white", "AR(0.97)"])
+def test_noise_is_not_taken_for_a_load(case):
+    fits = [cr.identify(loop(case, seed=seed)).fit for seed in range(2)]
+    assert not [reason for fit in fits for reason in fit.choices if "loads at" in reason]

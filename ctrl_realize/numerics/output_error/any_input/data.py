@@ -64,6 +64,9 @@ class SampledData:
         Dynamics in cascade that are not part of the plant.
     past : tuple of ndarray
         Of every record, columns (N, order) that are estimated with level and drift: see `whitened`.
+    steps, loads : tuple of ndarray
+        Of every record, steps of loads that are added to the input, and columns (N, k) by which
+        their sizes and times are estimated further.
     """
 
     inputs: tuple[FloatArray, ...]
@@ -76,6 +79,13 @@ class SampledData:
     width: int
     known: KnownFactor
     past: tuple[FloatArray, ...] = ()
+    steps: tuple[FloatArray, ...] = ()
+    loads: tuple[FloatArray, ...] = ()
+
+    @property
+    def without_loads(self) -> SampledData:
+        """The records as they are."""
+        return replace(self, steps=(), loads=())
 
     @property
     def step(self) -> float:
@@ -98,6 +108,8 @@ class SampledData:
     def _input(self, i: int) -> tuple[HeldInput, IntArray]:
         """Input of a record, and the rows of its response that are fitted."""
         rows, signal = self.rows[i], self.inputs[i] / self.scales[i]
+        if self.steps:
+            signal = signal + self.steps[i] / self.scales[i]
         if self.every > 1:
             return AveragedInput(signal, self.dt, self.every, self.width), rows
         moves = np.flatnonzero(np.diff(signal, prepend=0.0))
@@ -169,6 +181,8 @@ class SampledData:
             outputs=tuple(lfilter(noise, [1.0], y) for y in self.outputs),
             starts=tuple(start + order for start in self.starts),
             past=tuple(_earlier(left, order) for left in residual),
+            steps=tuple(_filtered(noise, step, self.every) for step in self.steps),
+            loads=tuple(lfilter(noise, [1.0], load, axis=0) for load in self.loads),
         )
 
     @cached_property
@@ -179,8 +193,8 @@ class SampledData:
             for rows, start in zip(self.rows, self.starts, strict=True)
         ]
         shapes = [_own_shapes(clock, self.known) for clock in clocks]
-        if self.past:
-            own = [past[rows] for past, rows in zip(self.past, self.rows, strict=True)]
+        for more in filter(None, (self.past, self.loads)):
+            own = [columns[rows] for columns, rows in zip(more, self.rows, strict=True)]
             shapes = [np.hstack(both) for both in zip(shapes, own, strict=True)]
         m = int(self.edges[-1])
         inputs = [self._input(i) for i in range(len(self.inputs))]

@@ -46,6 +46,7 @@ from ..selection import chains_of
 from .condensed import MOST_LAGS, Condensed, condensed
 from .data import BEYOND, MOST_SAMPLES, SampledData, cut
 from .lags import fit_lags, plain_lags
+from .loads import Load
 from .stretch import DIED_AWAY, WHITE, explained, fit_stretch, response_samples, samples_in_a_block
 from .window import ORDERS, SampledWindow, modelled, window_of
 
@@ -64,10 +65,10 @@ _CLEARLY = 4.0  # standard deviations of a chi-square: 3e-5 by chance
 class SampledFit:
     """Fit of records with any input.
 
-    `explained` is the decrease of the
-    sum of squares due to the input, divided by the residual variance: a chi-square. If the records
-    are longer than `data`, `condensed` contains the data that were fitted. `noise` is the
-    polynomial that makes the noise white, 1 for white noise.
+    `explained` is the decrease of the sum of squares due to the input, divided by the residual
+    variance: a chi-square. If the records are longer than `data`, `condensed` contains the data
+    that were fitted. `noise` is the polynomial that makes the noise white, 1 for white noise;
+    `loads` are those of loops.
     """
 
     fit: OutputErrorEstimate
@@ -75,6 +76,7 @@ class SampledFit:
     explained: float
     noise: FloatArray
     condensed: Condensed | None
+    loads: tuple[Load, ...] = ()
 
     def own_delay(self, output: FloatArray, signal: FloatArray) -> OwnResponse:
         """Shift and scale the common model to fit one record best, whether it was fitted or not."""
@@ -132,10 +134,10 @@ def fit_sampled(
     complete = not any(np.isnan(y).any() for y in outputs)
     if requested.loop and complete and plain_lags(requested):
         every = -(-max(y.size for y in outputs) // MOST_SAMPLES)
-        found, fit = fit_lags(cut(outputs, inputs, dt, every, requested.known), requested)
+        found, fit, loads = fit_lags(cut(outputs, inputs, dt, every, requested.known), requested)
         if requested.forms or fit.better is None:
             fit = _of_measured(found, fit, found.noise.size - 1)
-            return SampledFit(fit, found.data, explained(found.fit), found.noise, None)
+            return SampledFit(fit, found.data, explained(found.fit), found.noise, None, loads)
     structures, tried = requested.structures, requested
     every, part = samples_in_a_block(outputs, inputs, dt, requested)
     if part is None or structures is not None:
@@ -202,7 +204,7 @@ def _of_measured(
     part: SampledWindow, fit: OutputErrorEstimate, noise_lags: int
 ) -> OutputErrorEstimate:
     """Describe a fit of filtered or condensed records in terms of those that were measured."""
-    window = window_of(part.data)
+    window = window_of(part.data.without_loads)
     parameters = np.append(fit.dead_time, parameters_from_poles(fit.poles))
     fitted = modelled(part.data, parameters, fit.numerator)
     measured = replace(part.fit, window=window, problem=window.problem)

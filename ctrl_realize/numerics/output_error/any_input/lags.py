@@ -27,7 +27,7 @@ References
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import NamedTuple
@@ -36,7 +36,7 @@ import numpy as np
 from scipy.interpolate import PchipInterpolator
 
 from ...arrays import FloatArray
-from ...constants import CHI2_95, SMALLEST
+from ...constants import CHI2_95, SMALLEST, VERY_STRONG
 from ...engine.eliminate import eliminate, evaluate
 from ...engine.plausible_models import CALIBRATED, PlausibleDraw
 from ...engine.problem import Structure
@@ -59,6 +59,7 @@ from ..result import (
     assembled,
 )
 from .data import SOUGHT, SampledData
+from .loads import Lags, Load, sized, sought, with_loads
 from .window import SampledWindow, fit_windows, simulation_error
 
 LAGS = tuple(ProcessForm(f"P{n}D", n) for n in (1, 2, 3))
@@ -69,7 +70,7 @@ _RULED_OUT = 30.0
 """Of the criterion: a zero beside a pole slower than the record reached 11 in loops without one, a
 pair of poles 375 and more where there was one (350 samples)."""
 _TURNS = 5  # of noise model and lags, at most
-_ALIKE = 0.01  # largest difference of coefficients of noise models that are one
+_ALIKE = 0.01  # largest difference of coefficients of noise models, and part of the size of loads
 _BEYOND = 1.5  # total delays of the first fit, up to which a dead time is sought
 _SLOW = np.array([1.0, -0.95])
 """Noise for which the first turn is repeated where it leaves coloured noise: beside a slow load the
@@ -92,30 +93,35 @@ def plain_lags(requested: Requested) -> bool:
     return forms and (bool(requested.forms) or requested.structures is None)
 
 
-def fit_lags(data: SampledData, requested: Requested) -> tuple[SampledWindow, OutputErrorEstimate]:
+def fit_lags(
+    data: SampledData, requested: Requested
+) -> tuple[SampledWindow, OutputErrorEstimate, tuple[Load, ...]]:
     """Fit lags and noise in turn; what rules out the lags is told by `others` of the estimate."""
     limit = SOUGHT * data.longest if requested.latest is None else requested.latest
     within = requested.earliest, max(limit, requested.earliest)
     forms = sorted(requested.forms or LAGS, key=lambda form: form.lags)
-    noise, fitted = np.ones(1), list[Candidate]()
-    left: tuple[FloatArray, ...] = ()
-    early = 0.0
+    early, noise, like, loads, told = 0.0, np.ones(1), None, list[Load](), True
     for turn in range(_TURNS):
-        fit = partial(_turn, data, forms, requested.whiten, within, left, early, fitted)
-        made = fit(noise)
+        fit = partial(_turn, data, forms, requested.whiten, within, early)
+        made = fit(like, loads, noise, like.left if like else ())
         if turn == 0 and made.noise.size > 1:
-            slow = fit(_SLOW)
-            count = min(*made.part.data.counts, *slow.part.data.counts)
-            made = min(made, slow, key=lambda one: _unlikely(one.errors, count))
-        part, fitted, best, errors, following = made
-        alike = following.size == noise.size and np.abs(following - noise).max() <= _ALIKE
+            made = _likelier(made, fit(None, loads, _SLOW))
+        placed, load = sought(data, made.part, made.lags, made.loads)
+        # Where one was not told in noise like the residual, none is in the next turn.
+        trial = load if told or turn < 2 else None
+        more = _beside(data, fit, made, [*placed, trial]) if trial else made
+        # of a load its time and its size
+        told = _gained(made, more) > VERY_STRONG + 2 * np.log(sum(made.part.data.counts))
+        made, placed = (more, more.loads) if told else (made, placed)
+        alike = not told and _alike(loads, placed) and _same(noise, made.noise)
         if (turn and alike) or turn == _TURNS - 1:
             break
-        noise, left = following, _from_the_first(part.data, errors)
+        like, noise, loads = made, made.noise, placed
         # Noise hides how a delay divides, and not the whole of it.
-        total = best.dead_time - float(np.sum(1.0 / best.poles.real))
+        total = made.best.dead_time - float(np.sum(1.0 / made.best.poles.real))
         within = within[0], max(min(within[1], _BEYOND * total), within[0])
         early = min(total, _HIDDEN * data.longest)
+    part, fitted = made.part, made.fitted
     fits = part.fit
     if requested.huber:
         fits, fitted = _robust(fits, forms, fitted)
@@ -158,17 +164,37 @@ def fit_lags(data: SampledData, requested: Requested) -> tuple[SampledWindow, Ou
         found, process=process, points=points, others=others,
         with_moves=partial(_with_moves, fits, profiles),
     )  # fmt: skip
-    return part, replace(found, drawn=PlausibleDraw(plainly, evidence, plain.__getitem__))
+    found = replace(found, drawn=PlausibleDraw(plainly, evidence, plain.__getitem__))
+    return part, found, tuple(made.loads)
 
 
 class _Turn(NamedTuple):
-    """Records with a fit, lags that were fitted, the best, what it leaves, and noise like that."""
+    """Records with a fit, lags that were fitted, the best, what it leaves, its noise, and loads."""
 
     part: SampledWindow
     fitted: list[Candidate]
     best: Candidate
     errors: list[FloatArray]
     noise: FloatArray
+    loads: list[Load]
+
+    @property
+    def lags(self) -> Lags:
+        """The best model with its numerator."""
+        best = self.best
+        state = evaluate(self.part.fit.problem, best.structure, best.parameters[None])
+        return Lags(best, state.numerator[0])
+
+    @property
+    def left(self) -> tuple[FloatArray, ...]:
+        """Residuals of every record from its first sample on, in its unit; 0 before they begin."""
+        data, whole = self.part.data, []
+        for y, rows, error, scale in zip(
+            data.outputs, data.rows, self.errors, data.scales, strict=True
+        ):
+            whole.append(np.zeros(y.size))
+            whole[-1][rows] = scale * error
+        return tuple(whole)
 
 
 def _turn(
@@ -176,22 +202,63 @@ def _turn(
     forms: Sequence[ProcessForm],
     whiten: bool,
     within: tuple[float, float],
-    left: tuple[FloatArray, ...],
     early: float,
-    like: Sequence[Candidate],
+    like: _Turn | None,
+    loads: Sequence[Load],
     noise: FloatArray,
+    left: tuple[FloatArray, ...] = (),
 ) -> _Turn:
-    """Fit lags in given noise, and find the noise that they leave."""
+    """Fit lags in given noise beside loads, and find the noise that they leave."""
+    if like is not None:
+        data = with_loads(data, like.lags, loads)
     # Huber's loss would pull the data towards one lag.
     part = fit_windows(data, (Structure(1, 1),), within, False, noise, left, early)
-    fits, fitted = _fitted(part.fit, forms, like)
+    fits, fitted = _fitted(part.fit, forms, like.fitted if like else [])
     best = _plain(min(fitted, key=partial(_value, fits)))
     part = replace(part, fit=fits)
     errors = _left(part, best)
     following = whitening_filter(
         np.concatenate(errors), noise_lags(min(part.data.counts)) if whiten else 0
     )
-    return _Turn(part, fitted, best, errors, following)
+    made = _Turn(part, fitted, best, errors, following, [])
+    return made._replace(loads=sized(part, made.lags, loads))
+
+
+def _beside(
+    data: SampledData, fit: Callable[..., _Turn], made: _Turn, loads: Sequence[Load]
+) -> _Turn:
+    """Fit lags beside loads, which are placed anew once.
+
+    A load leaves slow noise behind, in the filter of which its time is hard to see.
+    """
+    slow = fit(made, loads, made.part.noise, made.part.residual)
+    again = _likelier(slow, fit(made, loads, np.ones(1)))
+    placed, _ = sought(data, again.part, again.lags, again.loads)
+    return _likelier(again, fit(again, placed, again.noise, again.left))
+
+
+def _alike(before: Sequence[Load], after: Sequence[Load]) -> bool:
+    """Whether loads have kept their places and their sizes."""
+    return all(
+        old.row == new.row and abs(new.size - old.size) <= _ALIKE * abs(new.size)
+        for old, new in zip(before, after, strict=True)
+    )
+
+
+def _same(noise: FloatArray, following: FloatArray) -> bool:
+    """Whether noise models are one."""
+    return following.size == noise.size and bool(np.abs(following - noise).max() <= _ALIKE)
+
+
+def _likelier(one: _Turn, other: _Turn) -> _Turn:
+    """Of two turns the one whose errors are the likelier."""
+    return other if _gained(one, other) > 0 else one
+
+
+def _gained(before: _Turn, after: _Turn) -> float:
+    """Decrease of the criterion of what is left of the records."""
+    count = min(*before.part.data.counts, *after.part.data.counts)
+    return _unlikely(before.errors, count) - _unlikely(after.errors, count)
 
 
 def _unlikely(errors: Sequence[FloatArray], count: int) -> float:
@@ -218,15 +285,6 @@ def _robust(
         return fits, fitted
     pulled = window.output - error + clipped(error, 0.0)
     return _fitted(replace(fits, problem=window.with_output(pulled)), forms, fitted)
-
-
-def _from_the_first(data: SampledData, errors: Sequence[FloatArray]) -> tuple[FloatArray, ...]:
-    """Residuals from the first sample of every record on, in its unit; 0 before they are known."""
-    whole = []
-    for y, rows, error, scale in zip(data.outputs, data.rows, errors, data.scales, strict=True):
-        whole.append(np.zeros(y.size))
-        whole[-1][rows] = scale * error
-    return tuple(whole)
 
 
 def _left(part: SampledWindow, model: Candidate) -> list[FloatArray]:

@@ -55,7 +55,7 @@ class SampledWindow:
     """Fit of all structures to records that were filtered by a polynomial `noise`, 1 for none.
 
     `data` are the records before the filter, without the samples that depend on the unknown past;
-    `unweighted` is the model before it.
+    `unweighted` is the model before it, and `residual` as for `SampledData.whitened`.
     """
 
     data: SampledData
@@ -64,6 +64,7 @@ class SampledWindow:
     fit: WindowFit
     huber: bool
     unweighted: PlausibleModel | None = None
+    residual: tuple[FloatArray, ...] = ()
 
     @property
     def model(self) -> PlausibleModel:
@@ -114,7 +115,7 @@ def fit_windows(
         mean = float(np.exp(np.mean(np.log(levels))))
         data = replace(data, scales=tuple(float(level) / mean for level in levels))
         fits = _fit(data.whitened(noise, residual), structures, scales, huber, fits)
-    return SampledWindow(data, noise, scales, fits, huber)
+    return SampledWindow(data, noise, scales, fits, huber, residual=residual)
 
 
 def in_coloured_noise(plain: SampledWindow) -> SampledWindow:
