@@ -55,7 +55,7 @@ _PARAMETERS = 3  # time, lag and size
 _LEAST_LOAD, _MOST_LAG = 0.03, 2.0
 """Part of a response from which on a load is one, and its longest lag, over what is left of the
 record: slower ones are drifts."""
-_IN_SLOW_NOISE, _MOST_LEFT = 3 * VERY_STRONG, 0.75
+IN_SLOW_NOISE, _MOST_LEFT = 3 * VERY_STRONG, 0.75
 """Decrease of the criterion for a load where the residual is correlated, and the part of that which
 one that is told apart may leave (0.92 beside friction, 0.1 to 0.72 beside a load): AR(1) noise with
 a pole at 0.9 reached 20 in 1 of 60 simulated records, a measured heater 28 and a measured arm 26;
@@ -150,7 +150,7 @@ def load_of(
     white = also.correlation == 1.0
     own, soon = _evidence(fits, also.residual(also.best), also.best.structure), since < apart
     evidence = max(evidence, own) if soon else own  # many poles take up a load that comes soon
-    told = evidence > (VERY_STRONG if white else _IN_SLOW_NOISE)
+    told = evidence > (VERY_STRONG if white else IN_SLOW_NOISE)
     if not told or not is_noise(loaded, also, also.best):
         return None
     early = soon or not (white or (also.normalized_rms / fits.normalized_rms) ** 2 < _MOST_LEFT)
