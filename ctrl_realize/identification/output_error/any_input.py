@@ -176,13 +176,10 @@ def _summary(
         )
     if fit.averaged:
         reasons += loop_choices(records[0])
-        moved = [
-            f"{load.size:.3g} seen from {in_time(at, 4)} on"
-            for load in found.loads
-            for at in [
-                float(used[load.record].time[data.offsets[load.record] + data.every * load.row])
-            ]
-        ]
+        moved = []
+        for i, row, size in found.loads:
+            seen = float(used[i].time[data.offsets[i] + data.every * row])
+            moved.append(f"{size:.3g} seen from {in_time(seen, 4)} on")
         if moved:
             reasons.append(chosen("loop.load", moved=", ".join(moved)))
     choices = (*reasons, *choices_of(fit))

@@ -82,6 +82,8 @@ def with_loads(data: SampledData, lags: Lags, loads: Sequence[Load]) -> SampledD
 
 def sized(part: SampledWindow, lags: Lags, loads: Sequence[Load]) -> list[Load]:
     """Loads with their sizes, by what the model leaves beside those that were known."""
+    if not loads:
+        return []
     problem, edges = part.data.problem, part.data.edges
     left = problem.data - respond(
         problem.drive, problem.known, lags.numerator, lags.model.parameters
