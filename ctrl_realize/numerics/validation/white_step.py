@@ -93,15 +93,15 @@ def white_step(
     if rank < white.shape[1]:
         return None
     left = target - white @ solution
-    inverse = np.linalg.inv(white.T @ white) * float(left @ left) / freedom
     step = (solution / size)[: 1 + n + m]
-    covariance = (inverse / np.outer(size, size))[: 1 + n + m, : 1 + n + m]
+    # Of the columns, not of their products, whose inverse may have a negative diagonal.
+    root = (np.linalg.pinv(white) / size[:, None])[: 1 + n + m]
     gradients = _gradients(a, numerator)
     gain = numerator[0] / a[0]
     total = dead_time + (a[1] if n > 1 else 1.0) / a[0]
     total -= numerator[1] / numerator[0] if m > 1 else 0.0
     moved = gradients @ step
-    errors = np.sqrt(np.einsum("ij,jk,ik->i", gradients, covariance, gradients))
+    errors = np.linalg.norm(gradients @ root, axis=1) * np.sqrt(float(left @ left) / freedom)
     return WhiteStep(
         dead_time + float(moved[0]),
         float(errors[0]),
