@@ -342,6 +342,7 @@ MADE_FOR = {
     "load during the test": steps.load_moves,
     "coarse converter": steps_of_a_converter,
     "coloured noise of any input": slow_disturbance,
+    "noise that a model follows": slow_disturbance,
     "integrator beside a lag of any ratio": long_ramp,
     "start from the correlation": far_away,
     "start at the ringing": wandering_output,

@@ -87,6 +87,11 @@ def first(_: Any) -> Any:
     return lambda given, *_args, **_kwargs: given
 
 
+def _of_the_residual(whitening_filter: Any) -> Any:
+    """Noise models of what is left, whatever the model has followed."""
+    return lambda noise, lags, columns: whitening_filter(noise, lags)
+
+
 def _with_the_present(chance: Any) -> Any:
     """Chances of predictions by past outputs alone are 1."""
     return lambda *signals, first=0: 1.0 if first else chance(*signals)
@@ -187,7 +192,7 @@ SWITCHES = (
     Switch("noise made white", {f"{STEP}:in_coloured_noise": first}),
     Switch(
         "noise of a short rest made white",
-        {f"{FITS}.coloured:first_order_covariance": giving(np.ones(1))},
+        {f"{FITS}.coloured:whitening_filter": giving(np.ones(1))},
     ),
     Switch("louder noise that goes on", {f"{STEP}:continues": giving(False)}),
     Switch("first motion in slow noise", {f"{FITS}.step_data:_unseen_at_rest": giving(1.0)}),
@@ -394,6 +399,11 @@ SWITCHES = (
     Switch(
         "coloured noise of any input",
         {f"{FITS}.any_input.stretch:in_coloured_noise": first},
+        called=True,
+    ),
+    Switch(
+        "noise that a model follows",
+        {f"{FITS}.any_input.window:whitening_filter": _of_the_residual},
         called=True,
     ),
     Switch(

@@ -18,21 +18,16 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..arrays import FloatArray
+from ..arrays import FloatArray, IntArray, unit_columns
 from ..engine.batch_search import fit_batch
 from ..engine.compared_fits import converged
 from ..engine.eliminate import eliminate
 from ..engine.problem import Problem, Structure
+from ..engine.static_gain import local_errors
 from ..engine.structures import Candidate, Scales, choose, neighbour_starts, parameter_bounds
 from ..engine.window_fit import WindowFit
 from ..signals.noise import correlation_time, mad_sigma
-from ..signals.noise_model import (
-    first_order_covariance,
-    noise_covariance,
-    noise_lags,
-    whitener,
-    whitening_filter,
-)
+from ..signals.noise_model import noise_covariance, noise_lags, whitener, whitening_filter
 from .step_data import StepData, settled_at
 
 _COLOURED = 2.0  # samples at rest that count as one, from which on: white noise scatters to 1.5
@@ -72,12 +67,10 @@ def in_coloured_noise(fits: WindowFit, data: StepData) -> WindowFit:
     # Not the pseudo-values of Huber's loss, which distort smooth noise.
     limit = _OUTLIER * max(mad_sigma(error), fits.sigma)
     plain = fits.window.with_output(fits.window.output - error + np.clip(error, -limit, limit))
-    if told:
-        covariance = noise_covariance(_quiet(error, data), error.size)
-    elif whitening_filter(error, noise_lags(error.size)).size == 2:
-        covariance = first_order_covariance(error, fits.estimated[0])
-    else:
+    quiet = _quiet(error.size, data) if told else np.arange(error.size)
+    if not told and whitening_filter(error, noise_lags(error.size)).size != 2:
         return fits
+    covariance = noise_covariance(error[quiet], error.size, _followed(fits)[quiet])
     if covariance.size == 1:
         return fits
     problem = replace(plain, whitener=whitener(bins, covariance))
@@ -120,7 +113,19 @@ def _dead_times_near(problem: Problem, old: Candidate, scales: Scales) -> list[F
     return [old.parameters, *starts[np.argsort(cost)[:2]]]
 
 
-def _quiet(error: FloatArray, data: StepData) -> FloatArray:
-    """Residual in the baseline, and in the later half of the settled response."""
-    late = error[(settled_at(data) + error.size) // 2 :]
-    return np.concatenate([error[: data.edge][-_ENOUGH:], late[:_ENOUGH]])
+def _quiet(samples: int, data: StepData) -> IntArray:
+    """Samples of the baseline, and of the later half of the settled response."""
+    late = np.arange((settled_at(data) + samples) // 2, samples)
+    return np.concatenate([np.arange(data.edge)[-_ENOUGH:], late[:_ENOUGH]])
+
+
+def _followed(fits: WindowFit) -> FloatArray:
+    """Derivatives (N, p) of the best model at every sample: what it may have followed of noise."""
+    window, best = fits.window, fits.best
+    problem = replace(
+        fits.problem, data=window.output, root_weight=np.ones(window.output.size),
+        drive=window.drive, regressors=window.columns,
+    )  # fmt: skip
+    numerator = eliminate(fits.problem, best.structure, best.parameters[None]).numerator[0]
+    found = local_errors(problem, best, numerator, fits.scales.length)
+    return unit_columns(np.hstack([found.slopes, found.own]))[0]

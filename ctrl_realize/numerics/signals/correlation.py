@@ -19,6 +19,8 @@ References
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 from scipy.special import gammaincc, ndtri
 
@@ -88,31 +90,37 @@ def fit_percent(measured: FloatArray, modelled: FloatArray) -> FloatArray:
 
 
 def autoregression(signal: FloatArray, most: int) -> FloatArray:
-    """Fit ``e[k] = sum c_i e[k-i]`` with the order of least BIC, 0...most; shape (order,).
+    """Fit ``e[k] = sum c_i e[k-i]`` with the order of least BIC, 0...most; shape (order,)."""
+    N, best = signal.size, (0.0, np.ones(1))
+    for filter_, left in prediction_filters((signal - signal.mean())[:, None], most):
+        bic = N * np.log(left) + (filter_.size - 1) * np.log(N)
+        best = (bic, filter_) if bic < best[0] else best
+    return -best[1][1:]
 
-    Burg's recursion: stable at every order, so that no prediction diverges.
+
+def prediction_filters(signals: FloatArray, most: int) -> Iterator[tuple[FloatArray, float]]:
+    """Polynomials ``1 - c_1 z^-1 - ...`` of orders 0...most, and the variance that each leaves.
+
+    Common to all signals (N, K); the variance is relative to theirs. Burg's recursion: stable at
+    every order, so that no prediction diverges. It ends where nothing is left.
     """
-    forward = signal - signal.mean()
-    backward, N = forward, signal.size
-    power = float(forward @ forward)
-    filter_ = np.ones(1)
-    best, found, left = 0.0, np.zeros(0), 1.0
-    for order in range(1, most + 1):
+    forward = backward = signals
+    power = float(np.vdot(forward, forward))
+    filter_, left = np.ones(1), 1.0
+    yield filter_, left
+    for _ in range(most):
         ahead, behind = forward[1:], backward[:-1]
-        energy = float(ahead @ ahead + behind @ behind)
+        energy = float(np.vdot(ahead, ahead) + np.vdot(behind, behind))
         if energy <= 1e-28 * power:
             break
         # Burg: the reflection coefficient that minimises the forward and backward prediction
         # errors.
-        reflection = -2.0 * float(ahead @ behind) / energy
+        reflection = -2.0 * float(np.vdot(ahead, behind)) / energy
         forward, backward = ahead + reflection * behind, behind + reflection * ahead
         longer = np.append(filter_, 0.0)
         filter_ = longer + reflection * longer[::-1]
         left *= max(1.0 - reflection**2, 1e-28)
-        bic = N * np.log(left) + order * np.log(N)
-        if bic < best:
-            best, found = bic, -filter_[1:]
-    return found
+        yield filter_, left
 
 
 def predict_ahead(signal: FloatArray, coefficients: FloatArray, steps: int) -> FloatArray:

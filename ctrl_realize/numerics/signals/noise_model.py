@@ -13,6 +13,8 @@ References
    doi:10.1214/aos/1176344136.
 .. [3] P. Stoica and R. Moses, Spectral Analysis of Signals, Prentice Hall 2005, section 3.9.3 (the
    Burg method).
+.. [4] D. A. Harville, Maximum likelihood approaches to variance component estimation and to related
+   problems, J. Amer. Statist. Assoc. 72 (1977) 320-338, doi:10.1080/01621459.1977.10480998.
 """
 
 from __future__ import annotations
@@ -26,7 +28,7 @@ from scipy.signal import lfilter
 from ..arrays import FloatArray, IntArray
 from ..constants import SMALLEST, Z_95
 from .bins import Bins
-from .correlation import autoregression
+from .correlation import autoregression, prediction_filters
 from .noise import mad_sigma
 
 MOST_LAGS = 25  # of the autoregression
@@ -67,20 +69,57 @@ _WILD = 4.0  # standard deviations of which one of 16 000 Gaussian samples is be
 _NOTHING = 1e-6  # relative size of a response that has decayed
 _SLOWEST = 0.99  # pole of noise: slower noise is a drift over 200 samples
 _JITTER = 1e-9  # of the variance: a covariance of smooth noise is nearly singular
+_TURNS = 100  # of expectation and maximisation at most, and
+_SAME = 1e-4  # difference of coefficients in a turn, at which they end
+_ROUNDING = 1e-9  # part of the largest singular value of derivatives that counts as nothing
 
 
-def whitening_filter(noise: FloatArray, lags: int, wild: float = _WILD) -> FloatArray:
+def whitening_filter(
+    noise: FloatArray, lags: int, wild: float = _WILD, columns: FloatArray | None = None
+) -> FloatArray:
     """Polynomial ``1 - a_1 z^-1 - ...`` that makes noise white; for white noise it is 1.
 
     Autoregression (Burg, smallest BIC up to order `lags`) of noise that is cut at so many standard
-    deviations.
+    deviations. A model whose parameters have the derivatives `columns` (N, p) has followed a part
+    of slow noise: restricted maximum likelihood [4]_, by expectation and maximisation, makes up for
+    that. Without it the pole 0.9 of noise beside 240 samples is 0.85. Ablation: noise that a model
+    follows.
     """
     limit = wild * mad_sigma(noise)
     tamed = np.clip(noise - np.median(noise), -limit, limit)
-    return np.concatenate([[1.0], -autoregression(tamed, lags)])
+    tamed = tamed - tamed.mean()
+    order = autoregression(tamed, lags).size
+    filters = list(prediction_filters(tamed[:, None], order))
+    if columns is not None and order:
+        both, p = np.column_stack([columns, tamed]), columns.shape[1]
+        for _ in range(_TURNS):
+            upper = np.linalg.qr(_whitened(both, filters))[1]
+            inverse = np.linalg.pinv(upper[:p, :p], rcond=_ROUNDING)
+            followed = columns @ inverse
+            sigma = abs(float(upper[p, p])) / np.sqrt(max(noise.size - p, 1))
+            before, left = filters[-1][0], tamed - followed @ upper[:p, p]
+            signals = np.column_stack([left, sigma * followed])
+            filters = list(prediction_filters(signals, order))
+            if filters[-1][0].size <= order or np.abs(filters[-1][0] - before).max() <= _SAME:
+                break
+    return filters[-1][0]
 
 
-def noise_covariance(quiet: FloatArray, longest: int) -> FloatArray:
+def _whitened(signals: FloatArray, filters: Sequence[tuple[FloatArray, float]]) -> FloatArray:
+    """Errors of prediction of signals (N, K); those of the first samples by shorter filters.
+
+    Without these a response that the last filter takes away would seem to be unknown.
+    """
+    last, least = filters[-1]
+    white = lfilter(last, [1.0], signals, axis=0)
+    for k, (filter_, left) in enumerate(filters[:-1]):
+        white[k] = filter_[::-1] @ signals[: k + 1] * np.sqrt(least / left)
+    return np.asarray(white)
+
+
+def noise_covariance(
+    quiet: FloatArray, longest: int, columns: FloatArray | None = None
+) -> FloatArray:
     """Autocovariance of noise over its variance, from lag 0 until it has decayed.
 
     For white noise this is lag 0 alone.
@@ -92,8 +131,10 @@ def noise_covariance(quiet: FloatArray, longest: int) -> FloatArray:
         covariances are only noise.
     longest : int
         Largest number of lags.
+    columns : ndarray, optional
+        As for `whitening_filter`.
     """
-    denominator = whitening_filter(quiet, noise_lags(quiet.size))
+    denominator = whitening_filter(quiet, noise_lags(quiet.size), columns=columns)
     if denominator.size == 1:
         return np.ones(1)
     slowest = float(np.abs(np.roots(denominator)).max(initial=0.0))
@@ -124,29 +165,6 @@ def continues(rest: FloatArray, later: FloatArray, as_large: float) -> bool:
         return False
     steps = [e[1:] - pole * e[:-1] for e in (centred, later)]
     return bool(np.std(steps[1]) <= as_large * np.std(steps[0]))
-
-
-def first_order_covariance(residual: FloatArray, parameters: int) -> FloatArray:
-    """Autocovariance, as `noise_covariance`, of AR(1) noise of which a model has taken its part.
-
-    A model with p parameters takes part ``c = (p / n) (1 + rho) / (1 - rho)`` of the variance of
-    noise with pole rho, and lowers its autocorrelations by c (`correlation_of_noise`): that at one
-    sample is then ``r = (rho - c) / (1 - c)``, a quadratic equation for rho. Where no pole gives so
-    small a one, the nearest does.
-
-    Parameters
-    ----------
-    residual : ndarray, shape (n,)
-    parameters : int
-        Estimated parameters p.
-    """
-    r = float(residual[1:] @ residual[:-1]) / max(float(residual @ residual), SMALLEST)
-    part = parameters / residual.size
-    middle = 0.5 * (1.0 - part + r * (1.0 + part))
-    square = middle**2 - part - r * (1.0 - part)
-    pole = np.clip(middle - np.sqrt(max(square, 0.0)), 0.0, _SLOWEST)
-    covariance: FloatArray = pole ** np.arange(residual.size, dtype=np.float64)
-    return covariance[: max(int(np.sum(covariance > _NOTHING)), 1)]
 
 
 def whitener(bins: Bins, covariance: FloatArray) -> FloatArray:

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from scipy.linalg import toeplitz
+from scipy.optimize import minimize_scalar
 from scipy.signal import lfilter
 from scipy.special import ndtr
 
@@ -20,9 +21,9 @@ from ctrl_realize.numerics.signals.noise import (
 )
 from ctrl_realize.numerics.signals.noise_model import (
     continues,
-    first_order_covariance,
     noise_covariance,
     whitener,
+    whitening_filter,
 )
 from ctrl_realize.numerics.validation.held_output import held_share, longest_hold
 from ctrl_realize.numerics.validation.limits import at_limit
@@ -208,17 +209,47 @@ def slow(n, seed, pole=0.9):
     return lfilter([np.sqrt(1 - pole**2)], [1, -pole], white(n + 200, seed))[200:]
 
 
-def test_the_pole_of_noise_is_found_in_what_a_polynomial_leaves_of_it():
-    powers = np.polynomial.legendre.legvander(np.linspace(-1, 1, 250), 5)
-    project = powers @ np.linalg.pinv(powers)
+def restricted(columns, left, pole):
+    """Restricted likelihood of AR(1) noise from its whole covariance, -2 log (Harville 1977)."""
+    inverse = np.linalg.inv(toeplitz(pole ** np.arange(left.size)) / (1 - pole**2))
+    inside = columns.T @ inverse @ columns
+    rest = left - columns @ np.linalg.solve(inside, columns.T @ inverse @ left)
+    freedom = left.size - columns.shape[1]
+    sizes = np.linalg.slogdet(inside)[1] - np.linalg.slogdet(inverse)[1]
+    return freedom * np.log(rest @ inverse @ rest) + sizes
+
+
+def lags_and_a_step(n):
+    """What a model of two lags has: level, drift, two free responses, and a step."""
+    k = np.arange(n)
+    return np.stack([k**0, k / n, np.exp(-k / 20), np.exp(-k / 6), k > 90], axis=1).astype(float)
+
+
+@pytest.mark.parametrize(
+    "columns", [np.polynomial.legendre.legvander(np.linspace(-1, 1, 250), 5), lags_and_a_step(250)]
+)
+def test_the_pole_of_noise_is_found_in_what_a_model_leaves_of_it(columns):
+    project = columns @ np.linalg.pinv(columns)
     plain, found = [], []
     for seed in range(40):
         left = (noise := slow(250, seed)) - project @ noise
         plain.append(left[1:] @ left[:-1] / (left @ left))
-        found.append(first_order_covariance(left, 6)[1])
+        found.append(-whitening_filter(left, 1, np.inf, columns)[1])
     # one is off by sqrt(1 - rho^2) / sqrt(n) = 0.03 at least, the mean of 40 by a sixth of that
     assert np.mean(found) == pytest.approx(0.9, abs=0.02)
-    assert np.mean(plain) < 0.85
+    assert np.mean(plain) < 0.86
+
+
+def test_it_is_that_of_the_restricted_likelihood_of_the_whole_covariance():
+    columns = lags_and_a_step(250)
+    project = columns @ np.linalg.pinv(columns)
+    for seed in range(5):
+        left = (noise := slow(250, seed)) - project @ noise
+        found = -whitening_filter(left, 1, np.inf, columns)[1]
+        bounds = {"bounds": (0.5, 0.999), "method": "bounded"}
+        best = minimize_scalar(lambda pole, left=left: restricted(columns, left, pole), **bounds)
+        # Burg leaves one error of prediction at each end out: two of 250 samples
+        assert found == pytest.approx(best.x, abs=0.01)
 
 
 def test_noise_of_a_short_rest_goes_on_and_a_misfit_is_none():

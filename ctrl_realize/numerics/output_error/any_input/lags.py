@@ -47,7 +47,7 @@ from ...families.form_fit import fit_form
 from ...families.lag_profiles import with_profiled_lags
 from ...families.process_form import ProcessForm
 from ...signals.noise import correlation_time
-from ...signals.noise_model import coloured_criterion, noise_lags, whitening_filter
+from ...signals.noise_model import coloured_criterion, noise_lags
 from ..load import IN_SLOW_NOISE
 from ..other_structures import Requested, line_of
 from ..profiles import profile_of
@@ -61,7 +61,7 @@ from ..result import (
 )
 from .data import SOUGHT, SampledData
 from .loads import Lags, Load, sized, sought, with_loads
-from .window import SampledWindow, fit_windows, simulation_error
+from .window import SampledWindow, fit_windows, noise_model, simulation_error
 
 LAGS = tuple(ProcessForm(f"P{n}D", n) for n in (1, 2, 3))
 FURTHER = ProcessForm("P4D", 4)  # where three lags are chosen
@@ -222,9 +222,8 @@ def _turn(
     best = _plain(min(fitted, key=partial(_value, fits)))
     part = replace(part, fit=fits)
     errors = _left(part, best)
-    following = whitening_filter(
-        np.concatenate(errors), noise_lags(min(part.data.counts)) if whiten else 0
-    )
+    lags = noise_lags(min(part.data.counts)) if whiten else 0
+    following = noise_model(part, best, np.concatenate(errors), lags)
     made = _Turn(part, fitted, best, errors, following, [])
     return made._replace(loads=sized(part, made.lags, loads))
 

@@ -19,16 +19,18 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.linalg import block_diag
 
-from ...arrays import FloatArray, without_gaps
+from ...arrays import FloatArray, unit_columns, without_gaps
 from ...constants import SMALLEST, VERY_STRONG
 from ...engine.compared_fits import settled
 from ...engine.eliminate import evaluate
+from ...engine.local_terms import local_columns
 from ...engine.modal import respond
 from ...engine.plausible_models import PlausibleModel
 from ...engine.poles import poles_from_parameters
 from ...engine.problem import Problem, Structure
-from ...engine.static_gain import StaticGain
+from ...engine.static_gain import StaticGain, local_errors
 from ...engine.structures import Candidate, Scales, pattern_starts, search
 from ...engine.window import Window, window_of_rows
 from ...engine.window_fit import WindowFit, fit_window
@@ -118,30 +120,47 @@ def fit_windows(
     return SampledWindow(data, noise, scales, fits, huber, residual=residual)
 
 
-def in_coloured_noise(plain: SampledWindow) -> SampledWindow:
+def in_coloured_noise(
+    plain: SampledWindow, structures: Sequence[Structure] | None = None
+) -> SampledWindow:
     """Fit filtered records; the noise model is the autoregression of the residual.
 
     Where the residual does not become whiter, the previous fit remains. The filter removes the low
     frequencies, which distinguish a slow pole from a disturbance: structures whose response does
-    not settle within the record, or whose gain is not significant, are left out; if no other is
-    left, as for an integrator, the previous fit remains too.
+    not settle within the record, or whose gain is not significant, are left out unless they are
+    stated; if no other is left, as for an integrator, the previous fit remains too.
     """
     found, before = plain, None
     for _ in range(_NOISE_TURNS):
         error = simulation_error(found.data, found.fit.best, found.fit)
-        noise = whitening_filter(error, noise_lags(min(found.data.counts)))
+        lags = noise_lags(min(found.data.counts))
+        noise = noise_model(found, found.fit.best, error, lags)
         within = plain.scales.earliest, plain.scales.latest
-        again = fit_windows(plain.data, ORDERS, within, plain.huber, noise, like=before)
-        before = again.fit
-        settling = [s for s, c in again.fit.candidates.items() if _settles(again.fit.static(c))]
+        every = structures or ORDERS
+        again = fit_windows(plain.data, every, within, plain.huber, noise, like=before)
+        before, candidates = again.fit, again.fit.candidates
+        settling = structures or [s for s, c in candidates.items() if _settles(before.static(c))]
         if not settling:
             break
-        if len(settling) < len(ORDERS):
+        if len(settling) < len(every):
             again = fit_windows(plain.data, settling, within, plain.huber, noise, like=before)
         if not again.fit.correlation < plain.fit.correlation:
             break
         found = again
     return found
+
+
+def noise_model(part: SampledWindow, model: Candidate, error: FloatArray, lags: int) -> FloatArray:
+    """Polynomial that makes white what a model leaves of the records, and what it has followed."""
+    if not lags:
+        return np.ones(1)
+    problem, edges = part.data.problem, part.data.edges
+    assert problem.segments is not None
+    state = evaluate(part.fit.problem, model.structure, model.parameters[None])
+    slopes = local_errors(problem, model, state.numerator[0], part.scales.length).slopes
+    own = np.split(local_columns(problem.segments, model.poles[None])[0], edges[1:-1])
+    columns = unit_columns(np.hstack([slopes, block_diag(*own)]))[0]
+    return whitening_filter(error, lags, columns=columns)
 
 
 def simulates_worse(weighted: SampledWindow, plain: SampledWindow) -> bool:
