@@ -20,7 +20,6 @@ from .cases import (
     PLANTS,
     Case,
     dead_time,
-    of_least_squares,
     planned,
     simulated,
 )
@@ -49,11 +48,10 @@ def rows(path: Path | None, seeds: int) -> Rows:
 def table(found: Rows) -> Iterator[str]:
     """Rows of the table of the docs, a case each."""
     yield (
-        "| plant | noise, pole | test | structure | records | predicted [s] | achieved [s] | ratio "
-        "| of plain least squares |"
+        "| plant | noise, pole | test | structure | records | predicted [s] | achieved [s] "
+        "| ratio |"
     )
-    yield "|" + "---|" * 9
-    words = {"given": "given", "filtered": "given, noise filtered", "chosen": "chosen"}
+    yield "|" + "---|" * 8
     for case in CASES:
         plan = planned(case)
         every = [one - DEAD_TIME for (own, _), one in found.items() if own == case]
@@ -61,13 +59,10 @@ def table(found: Rows) -> Iterator[str]:
         if errors:
             told = f"{len(errors)} of {len(every)}" if len(errors) < len(every) else len(errors)
             rms = float(np.sqrt(np.mean(np.square(errors))))
-            plain = case.pole and case.way == "given"
-            ratio = f"{rms / of_least_squares(plan):.2f}" if plain else ""
             test = f"{plan.kind}, {plan.chosen.detail}"
             yield (
                 f"| {case.plant} | {case.noise:g}, {case.pole:g} | {test} | "
-                f"{words[case.way]} | {told} | {plan.std:.4f} | {rms:.4f} | "
-                f"{rms / plan.std:.2f} | {ratio} |"
+                f"{case.way} | {told} | {plan.std:.4f} | {rms:.4f} | {rms / plan.std:.2f} |"
             )
 
 

@@ -102,9 +102,9 @@ def fit_output_error(
     noise : {"auto", "white"}, optional
         ``"auto"``: coloured noise is prewhitened by its autoregressive model (generalised least
         squares): for step records if the baseline noise is coloured and the residual does not
-        exceed it, for other inputs if the residual is coloured, no sample is missing, and no
-        structures are given. ``"white"``: all samples have equal weight, and correlation only
-        widens the interval.
+        exceed it, for other inputs if the residual is coloured, no sample is missing, and no other
+        structure rules out those that are given. ``"white"``: all samples have equal weight, and
+        correlation only widens the interval.
     focus : {"simulation", "prediction"}, optional
         For other inputs than steps in coloured noise. ``"prediction"``: errors weigh by the noise
         model. ``"simulation"``: so do they unless the model then simulates the records worse than

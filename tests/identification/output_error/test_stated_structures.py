@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
 import ctrl_realize as cr
 from benchmarks.acceptance import cases
@@ -66,6 +67,47 @@ def test_of_any_input_a_stated_structure_is_conditional_too():
     right = cr.fit_output_error(record, structures=[(2, 2)]).fit
     assert right.interval_kind == "conditional"
     assert "apparent_dead_time" not in codes(right)
+
+
+def _in_slow_noise(seed):
+    """Simulated: gain 2, lag 10 s, 3.03 s, in AR(1) noise with a pole at 0.9, two samples a s."""
+    rng = np.random.default_rng(seed)
+    u = np.repeat([0.0, 1.0, 0.0, 1.0, 0.0, 1.0, 0.0], [20, 12, 8, 30, 4, 60, 106])
+    time, y = np.arange(u.size) / 2, np.zeros(u.size)
+    for at in np.flatnonzero(np.diff(u)) + 1:
+        since = np.maximum(time - time[at] - 3.03, 0.0)
+        y += 2.0 * (u[at] - u[at - 1]) * -np.expm1(-since / 10.0)
+    noise = lfilter([1.0], [1.0, -0.9], rng.standard_normal(u.size + 200))[200:]
+    return cr.Record(time, u, y + 0.01 * noise)
+
+
+def test_a_stated_structure_of_any_input_is_fitted_with_the_noise_made_white():
+    errors, gains, held, plain = [], [], 0, []
+    for seed in range(6):
+        record = _in_slow_noise(seed)
+        fit = cr.identify(record, structures="P1D").fit
+        assert fit.estimate.residual.noise_lags >= 1
+        assert not codes(fit) & {"coloured_residual", "apparent_dead_time"}
+        errors.append(fit.dead_time - 3.03)
+        held += covers(fit, 2 * 3.03)
+        low, high = fit.gain_interval
+        gains.append(low <= 2.0 <= high)
+        plain.append(cr.identify(record, structures="P1D", noise="white").fit.dead_time - 3.03)
+    assert np.sqrt(np.mean(np.square(errors))) < 0.5 * np.sqrt(np.mean(np.square(plain)))
+    # 95 % of 6
+    assert held >= 5
+    assert sum(gains) >= 5
+
+
+def test_what_a_stated_structure_cannot_describe_is_no_coloured_noise():
+    rng = np.random.default_rng(4)
+    u = np.repeat(rng.choice([-1.0, 1.0], 30), 16)
+    ringing = np.real(np.poly(np.exp([-0.02 + 0.25j, -0.02 - 0.25j])))
+    y = lfilter([0.0, ringing.sum()], ringing, np.concatenate([np.zeros(5), u[:-5]]))
+    record = cr.Record(np.arange(u.size) * 1.0, u, y + 0.02 * rng.standard_normal(u.size))
+    fit = cr.identify(record, structures="P1D").fit
+    assert "apparent_dead_time" in codes(fit)
+    assert fit.estimate.residual.noise_lags == 0
 
 
 def test_a_stated_structure_with_zeros_needs_no_optimum_without_them_to_start_from():

@@ -47,7 +47,15 @@ from .condensed import MOST_LAGS, Condensed, condensed
 from .data import BEYOND, MOST_SAMPLES, SampledData, cut
 from .lags import fit_lags, plain_lags
 from .loads import Load
-from .stretch import DIED_AWAY, WHITE, explained, fit_stretch, response_samples, samples_in_a_block
+from .stretch import (
+    DIED_AWAY,
+    WHITE,
+    explained,
+    fit_stretch,
+    made_white,
+    response_samples,
+    samples_in_a_block,
+)
 from .window import ORDERS, SampledWindow, modelled, window_of
 
 MORE_LAGS = (Structure(4, 4), Structure(5, 5))
@@ -119,7 +127,8 @@ def fit_sampled(
     and a half dead times of the best first-order model are left out, at most half of the record. If
     the residual is coloured, all structures are fitted again by generalised least squares [3]_:
     inputs and outputs are filtered by the residual's autoregressive model, which does not change a
-    linear plant. Not if structures are given: the residual may be what they cannot describe.
+    linear plant. Structures that are given remain those of equal weights where others rule them out
+    in such noise: the residual is what they cannot describe.
 
     Of a record of more than `data.MOST_SAMPLES` a part is fitted. If the response ends within
     `condensed.MOST_LAGS` samples, all samples are fitted afterwards; if the plant is slower, means
@@ -138,13 +147,11 @@ def fit_sampled(
         if requested.forms or fit.better is None:
             fit = _of_measured(found, fit, found.noise.size - 1)
             return SampledFit(fit, found.data, explained(found.fit), found.noise, None, loads)
-    structures, tried = requested.structures, requested
-    every, part = samples_in_a_block(outputs, inputs, dt, requested)
+    structures = requested.structures
+    every, part = samples_in_a_block(outputs, inputs, dt, replace(requested, structures=None))
     if part is None or structures is not None:
-        if structures is not None:
-            tried = replace(requested, whiten=False)
         data = cut(outputs, inputs, dt, every, requested.known)
-        part = fit_stretch(data, structures or ORDERS, tried)
+        part = fit_stretch(data, structures or ORDERS, requested)
     data, stretch = part.data, part.fit
     fits, sums = stretch, None
     long = any(y.size > every * kept.size for y, kept in zip(outputs, data.outputs, strict=True))
@@ -158,12 +165,15 @@ def fit_sampled(
             fits, sums = of_all
     if structures is None and fits.best.structure.order == ORDERS[-1].order:
         fits = extended(fits, MORE_LAGS)
-    others = None
-    if structures is not None:
+    others = Compared() if structures is not None else None
+    if structures is not None and requested.fastest is None and requested.compared:
         # On the part also if all samples were fitted: what is ruled out there is ruled out in any
-        # case.
-        compared = requested.fastest is None and requested.compared
-        others = other_structures(stretch, partial(part.fit_of, ORDERS)) if compared else Compared()
+        # case. The residual may be what a structure cannot describe, and is then no noise.
+        refit = partial(fit_stretch, part.data, ORDERS, replace(requested, structures=None))
+        filtered = part if sums is not None else made_white(part, requested)
+        others = other_structures(filtered.fit, lambda: refit().fit)
+        if others.better is None and filtered is not part:
+            part, data, fits = filtered, filtered.data, filtered.fit
     white = fits.correlation <= WHITE
     if requested.fastest is not None:
         fit = fit_without_fast_lags(

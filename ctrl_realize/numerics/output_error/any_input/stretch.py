@@ -50,9 +50,14 @@ def fit_stretch(
     limit = SOUGHT * data.longest if requested.latest is None else requested.latest
     within = requested.earliest, max(limit, requested.earliest)
     part = fit_windows(data, structures, within, requested.huber, np.ones(1))
-    if not (part.fit.correlation > WHITE and requested.whiten and data.complete):
+    return part if requested.structures is not None else made_white(part, requested)
+
+
+def made_white(part: SampledWindow, requested: Requested) -> SampledWindow:
+    """Fit again with the noise made white, if it is coloured and the records are complete."""
+    if not (part.fit.correlation > WHITE and requested.whiten and part.data.complete):
         return part
-    weighted = in_coloured_noise(part)
+    weighted = in_coloured_noise(part, requested.structures)
     # In a loop the noise model is needed for consistency [1]_.
     if requested.simulates and not requested.loop and simulates_worse(weighted, part):
         return part
