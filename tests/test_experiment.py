@@ -397,6 +397,10 @@ def test_rounding_of_coloured_noise_is_white(pole):
     for one in plan.candidates:
         slopes = np.concatenate(Bound(plan.model, plan.dt).slopes(one.input), axis=1)
         information = slopes.T @ np.linalg.solve(covariance, slopes)
+        # The first samples, which have no past, tell nothing by themselves.
+        first = plan.noise.coefficients.size
+        early = slopes[:first]
+        information -= early.T @ np.linalg.solve(covariance[:first, :first], early)
         expected = np.sqrt(np.linalg.inv(information)[0, 0])
         assert one.std == pytest.approx(expected, rel=0.05), one.kind
 
@@ -444,3 +448,30 @@ def test_what_is_refused():
             cr.experiment.plan(LEVEL, **{**ASKED, "amplitude": one_sided})
     with pytest.raises(UnsuitableSystemError, match="got output_limits beside a model"):
         cr.experiment.plan(FLOW, **ASKED, output_limits=0.1)
+
+
+def test_what_an_input_did_before_is_as_unknown_to_a_plan_as_to_a_fit():
+    # simulated: a lag behind 3.03 s; Cramer-Rao bound from differences of the exact response
+    slow = cr.design.ProcessModel(gain=2.0, lag=10.0, dead_time=3.03)
+    plan = cr.experiment.plan(slow, time=120, amplitude=1.0, rate=2, noise=0.02)
+    time = plan.time - plan.time[0]
+
+    def response(point, u):
+        gain, lag, dead = point
+        moves = np.flatnonzero(np.diff(u)) + 1
+        since = np.maximum(time[:, None] - time[moves] - dead, 0.0)
+        return gain * -np.expm1(-since / lag) @ (u[moves] - u[moves - 1])
+
+    point = np.array([2.0, 10.0, 3.03])
+    known = {}
+    for one in plan.candidates:
+        columns = [
+            (response(point + move, one.input) - response(point - move, one.input)) / 2e-5
+            for move in 1e-5 * np.eye(3)
+        ]
+        of_steps = one.kind in {"one step", "steps"}
+        past = [] if of_steps else [time, np.exp(-time / 10.0)]
+        slopes = np.stack([*columns, time**0, *past], axis=1)
+        known[one.kind] = 0.02 * np.sqrt(np.linalg.inv(slopes.T @ slopes)[2, 2])
+        assert one.std == pytest.approx(known[one.kind], rel=1e-3), one.kind
+    assert len(known) > 3

@@ -1,7 +1,9 @@
 """Standard errors that a test will have: the Cramer-Rao bound of a model, an input and a noise.
 
 The information [1]_ of dead time, poles, numerator and level, from the derivatives of the response
-that the fits use. Coloured noise is whitened by its autoregression; tests of one plant add up.
+that the fits use. Beside inputs other than steps these estimate a drift and the free response to
+what was before as well. Coloured noise is whitened by its autoregression; tests of one plant add
+up.
 
 References
 ----------
@@ -21,6 +23,7 @@ from scipy.signal import lfilter
 
 from ..errors import UnsuitableSystemError
 from ..numerics.arrays import BoolArray, FloatArray
+from ..numerics.engine.local_terms import Segments, local_columns
 from ..numerics.engine.modal import respond
 from ..numerics.engine.plausible_models import PlausibleModel
 from ..numerics.engine.poles import parameters_from_poles, poles_from_parameters
@@ -36,6 +39,7 @@ from ..numerics.loops.reference import (
     robust_pi,
 )
 from .noise import NoiseModel
+from .output_error.arguments import DWELL
 
 Wanted: TypeAlias = Literal["dead_time", "gain", "phase", "Ms"]
 WANTED: tuple[Wanted, ...] = ("dead_time", "gain", "phase", "Ms")
@@ -79,13 +83,27 @@ class Bound:
         return together.std(every, 1.0)[: len(gradient)]
 
     def slopes(self, signal: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Derivatives (N, p) of the response by the parameters, and the level (N, 1)."""
+        """Derivatives (N, p) of the response by the parameters, and terms beside it (N, q).
+
+        These are the level, and drift and free responses unless the test consists of steps.
+        """
         theta, numerator, known = self._parts(signal.size)
-        level = np.ones((signal.size, 1))
-        problem = Problem(np.zeros(signal.size), level[:, 0], self._drive(signal), level, known)
+        clock, own = self.dt * np.arange(signal.size, dtype=np.float64), np.ones((signal.size, 1))
+        if not self._of_steps(signal):
+            shapes = np.hstack([own, clock[:, None] / clock[-1]])
+            poles = self.model.poles[self.model.poles != 0]
+            own = local_columns(Segments.single(clock, shapes), poles[None])[0]
+        problem = Problem(
+            np.zeros(signal.size), np.ones(signal.size), self._drive(signal), own, known
+        )
         there = Candidate(Structure(theta.size - 1, theta.size - numerator.size), theta, 0.0)
         found = local_errors(problem, there, numerator, signal.size * self.dt)
         return found.slopes, found.own
+
+    def _of_steps(self, signal: FloatArray) -> bool:
+        """Whether a fit takes a test for steps, which begin at rest."""
+        held = self.dt * np.diff(np.flatnonzero(np.diff(signal)))
+        return bool(np.all(held >= DWELL * self.model.dead_time))
 
     @property
     def point(self) -> FloatArray:

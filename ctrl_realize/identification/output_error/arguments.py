@@ -33,7 +33,7 @@ _STRAY = 0.01  # part of the first step by which a clean input may stray before 
 _ONE_WAY = 0.9
 """Of the moves of a curve; noise turns at two of three. Ablation: curves are no steps."""
 _SPIKE = 3  # samples of a spike of the input that do not move a plant
-_DWELL = 3  # times the visible onset: the onsets of faster steps overlap
+DWELL = 3  # times the visible onset: the onsets of faster steps overlap
 
 
 def known_factor(known: Any) -> KnownFactor:
@@ -134,7 +134,7 @@ def step_data_of(record: Record, first: int = 0) -> StepData | None:
             f"standard deviations ({5 * data.sigma:.3g}) for long after the step at "
             f"{edges[0].time:.6g} s"
         )
-    if len(edges) > 1 and edges[1].index - edges[0].index < _DWELL * data.motion.crossing:
+    if len(edges) > 1 and edges[1].index - edges[0].index < DWELL * data.motion.crossing:
         return None
     return data
 
