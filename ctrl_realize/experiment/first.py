@@ -13,7 +13,7 @@ from ..delayed import DelayedStateSpace
 from ..design import ProcessModel
 from ..errors import UnsuitableSystemError
 from ..identification import OutputErrorFit, identify
-from ..identification.bound import Bound, Experiment
+from ..identification.bound import Bound, Experiment, operating_terms
 from ..identification.noise import NoiseModel, noise_of
 from ..identification.output_error.own_gains import at_model_gain
 from ..numerics.arrays import FloatArray
@@ -116,6 +116,5 @@ def _left(record: Record, model: PlausibleModel) -> FloatArray:
     time = record.time - record.time[0]
     rows = record.seen & (time >= min(model.dead_time, time[-1] / 2))
     left = (np.ravel(record.output) - Bound(model, record.dt).response(_moved(record)))[rows]
-    free = np.exp(np.outer(time, model.poles))
-    columns = np.column_stack([time**0, time, free.real, free.imag])[rows]
+    columns = operating_terms(time, model.poles)[rows]
     return np.asarray(left - columns @ np.linalg.lstsq(columns, left, rcond=None)[0])

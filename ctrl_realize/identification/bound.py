@@ -22,7 +22,8 @@ from scipy.linalg import block_diag
 from scipy.signal import lfilter
 
 from ..errors import UnsuitableSystemError
-from ..numerics.arrays import BoolArray, FloatArray
+from ..numerics.arrays import BoolArray, ComplexArray, FloatArray
+from ..numerics.constants import SMALLEST
 from ..numerics.engine.local_terms import Segments, local_columns
 from ..numerics.engine.modal import respond
 from ..numerics.engine.plausible_models import PlausibleModel
@@ -90,9 +91,7 @@ class Bound:
         theta, numerator, known = self._parts(signal.size)
         clock, own = self.dt * np.arange(signal.size, dtype=np.float64), np.ones((signal.size, 1))
         if not self._of_steps(signal):
-            shapes = np.hstack([own, clock[:, None] / clock[-1]])
-            poles = self.model.poles[self.model.poles != 0]
-            own = local_columns(Segments.single(clock, shapes), poles[None])[0]
+            own = operating_terms(clock, self.model.poles)
         problem = Problem(
             np.zeros(signal.size), np.ones(signal.size), self._drive(signal), own, known
         )
@@ -145,6 +144,12 @@ class Bound:
         theta = np.concatenate([[self.model.dead_time], parameters_from_poles(moving)])
         slow = np.full(poles.size - moving.size, -SLOWEST / (samples * self.dt), dtype=complex)
         return theta, self.model.numerator, KnownFactor(slow)
+
+
+def operating_terms(clock: FloatArray, poles: ComplexArray) -> FloatArray:
+    """Level, drift and free responses (N, q), which a fit of any input estimates beside a model."""
+    shapes = np.stack([np.ones_like(clock), clock / max(float(clock[-1]), SMALLEST)], axis=1)
+    return np.asarray(local_columns(Segments.single(clock, shapes), poles[None, poles != 0])[0])
 
 
 def _white(bound: Bound, test: Experiment) -> list[FloatArray]:

@@ -23,14 +23,13 @@ from scipy.linalg import orth
 from scipy.optimize import least_squares
 
 from ..data import Record
-from ..numerics.arrays import ComplexArray, FloatArray
+from ..numerics.arrays import FloatArray
 from ..numerics.constants import HUBER, SMALLEST
-from ..numerics.engine.local_terms import Segments, local_columns
 from ..numerics.engine.plausible_models import PlausibleModel
 from ..numerics.output_error.any_input.data import BEYOND
 from ..numerics.output_error.step_data import own_regressors
 from ..numerics.signals.noise import mad_sigma
-from .bound import Bound
+from .bound import Bound, operating_terms
 from .output_error.result import OutputErrorFit
 
 _MOST_STEPS = 50  # the next turn begins where it ends
@@ -80,7 +79,7 @@ def fitted_together(
     def columns(x: FloatArray) -> FloatArray:
         if at_rest:
             return own
-        every = [_in_operation(clock[seen], model.model.poles) for model in models(x)]
+        every = [operating_terms(clock[seen], model.model.poles) for model in models(x)]
         return np.hstack([every[0], *(one[:, 2:] for one in every[1:])])  # one level, one drift
 
     def responses(x: FloatArray) -> FloatArray:
@@ -138,9 +137,4 @@ def own_columns(fit: OutputErrorFit, clock: FloatArray, at_rest: bool) -> FloatA
     # A fit may have left out the first samples, or spikes.
     if at_rest and fit.data.rows.size == clock.size:
         return own_regressors(fit.data, fit.poles)
-    return _in_operation(clock, fit.poles)
-
-
-def _in_operation(clock: FloatArray, poles: ComplexArray) -> FloatArray:
-    shapes = np.stack([np.ones_like(clock), clock / max(float(clock[-1]), SMALLEST)], axis=1)
-    return np.asarray(local_columns(Segments.single(clock, shapes), poles[None, poles != 0])[0])
+    return operating_terms(clock, fit.poles)
