@@ -2,26 +2,19 @@
 
 Slow noise hides the second lag of a plant, and any noise the third. The information criterion then
 chooses fewer lags, and takes the others for dead time. The mean over dead times has less of such a
-bias: every number of lags with its profile likelihood [1]_, and a weight by its best fit [2]_, with
-a charge for each lag and each initial value. A lag costs what one that is not there gains in 5 % of
-records, so that criterion and likelihood-ratio test say the same [4]_. Three equal lags [5]_ cost
-as much as one: else three lags are taken for two. Where three are chosen, the interval reaches as
-far as that of four. In loops, moreover, zeros and pairs of poles imitate the slow noise that the
+bias: every number of lags counts by its weight (`lag_weights`). Three equal lags [2]_ count as much
+as one: else three lags are taken for two. Where three are chosen, the interval reaches as far as
+that of four. In loops, moreover, zeros and pairs of poles imitate the slow noise that the
 controller answers.
 
-Noise is the autoregression of the residual of these lags, and both are fitted in turn [3]_, for
+Noise is the autoregression of the residual of these lags, and both are fitted in turn [1]_, for
 lags that were asked for as for those that were not. Measured: `benchmarks.closed_loop`.
 
 References
 ----------
-.. [1] S. A. Murphy and A. W. van der Vaart, On profile likelihood, J. Amer. Statist. Assoc. 95
-   (2000) 449-465, doi:10.1080/01621459.2000.10474219.
-.. [2] K. P. Burnham and D. R. Anderson, Model Selection and Multimodel Inference, 2nd ed., Springer
-   2002, section 4.2 (model averaging).
-.. [3] D. W. Clarke, Generalized least squares estimation of the parameters of a dynamic model, IFAC
+.. [1] D. W. Clarke, Generalized least squares estimation of the parameters of a dynamic model, IFAC
    Symposium on Identification in Automatic Control Systems, Prague 1967, paper 3.17.
-.. [4] T. Soderstrom and P. Stoica, System Identification, Prentice Hall 1989, section 11.5.
-.. [5] V. Strejc, Naherungsverfahren fur aperiodische Ubergangscharakteristiken, Regelungstechnik 7
+.. [2] V. Strejc, Naherungsverfahren fur aperiodische Ubergangscharakteristiken, Regelungstechnik 7
    (1959) 124-128.
 """
 
@@ -33,14 +26,13 @@ from functools import partial
 from typing import NamedTuple
 
 import numpy as np
-from scipy.interpolate import PchipInterpolator
 
 from ...arrays import FloatArray
-from ...constants import CHI2_95, SMALLEST, VERY_STRONG
-from ...engine.eliminate import eliminate, evaluate
-from ...engine.plausible_models import CALIBRATED, PlausibleDraw
+from ...constants import VERY_STRONG
+from ...engine.eliminate import evaluate
+from ...engine.plausible_models import PlausibleDraw
 from ...engine.problem import Structure
-from ...engine.profile import Points, profile_curve, profile_grid, profile_limits, profile_points
+from ...engine.profile import profile_curve, profile_limits
 from ...engine.structures import Candidate
 from ...engine.window_fit import RAMP, WindowFit, clipped, has_outliers
 from ...families.form_fit import fit_form
@@ -60,6 +52,7 @@ from ..result import (
     assembled,
 )
 from .data import SOUGHT, SampledData
+from .lag_weights import charged_misfit, known_dead_time, profiled, weighted, with_moves
 from .loads import Lags, Load, sized, sought, with_loads
 from .window import SampledWindow, fit_windows, noise_model, simulation_error
 
@@ -80,14 +73,11 @@ tenth to a fifth of the true ones. Ablation: first turn in slow noise."""
 _HIDDEN = 0.1
 """Of the record, that may come from before it and is left out for that: dead times longer than what
 is left out would be ruled out by samples that depend on an input that is not known."""
-_SHORTER = 0.3  # of the last lag: a further one, where a profile starts
-_BETWEEN = 8  # dead times between two points of a profile
 _LASTING = 0.05, 0.95
 """Quantiles of an input between which it moves for longer than a pulse. Of 194 loops beside a load
 that drifts eight had a load of three to six times the lasting motion in place of the response to
 the set point, and dead times of three to five times the true ones; four had with the range of the
 input, none has with these."""
-_TAIL = 0.025  # of the weight, beyond each end of an interval
 
 
 def plain_lags(requested: Requested) -> bool:
@@ -133,10 +123,10 @@ def fit_lags(
     part, problem, scales = replace(part, fit=fits), fits.problem, fits.scales
     # Free lags follow all that equal ones do: these count for weights alone.
     equal = [] if requested.forms else [fit_form(problem, EQUAL, scales, fitted)]
-    profiles = _profiles(fits, [*fitted, *equal])
-    dead_times, shares = _weighted(fits, profiles)
+    profiles = profiled(fits, [*fitted, *equal])
+    dead_times, shares = weighted(fits, profiles)
     weights = shares.sum(axis=0)
-    mean, first, last = _known(dead_times, weights)
+    mean, first, last = known_dead_time(dead_times, weights)
     if not requested.forms and shares[len(LAGS) - 1 :].sum() > 0.5:
         # Three lags may stand for more: one more than chosen is never ruled out.
         further = fit_form(problem, FURTHER, scales, fitted)
@@ -157,7 +147,7 @@ def fit_lags(
     process = ProcessEstimate(find, form if requested.forms else None)
     plain = {s.plain: _plain(one) for s, one in fits.candidates.items()}
     plainly = fits.of(plain)
-    better = _better(part, min(fitted, key=partial(_value, fits)), within)
+    better = _better(part, min(fitted, key=partial(charged_misfit, fits)), within)
     of_lags = np.add.reduceat(shares.sum(axis=1), range(len(forms)))
     evidence = dict(zip(plain, of_lags.tolist(), strict=True))
     points = {
@@ -167,7 +157,7 @@ def fit_lags(
     others = OtherStructures(better)
     found = replace(
         found, process=process, points=points, others=others,
-        with_moves=partial(_with_moves, fits, profiles),
+        with_moves=partial(with_moves, fits, profiles),
     )  # fmt: skip
     found = replace(found, drawn=PlausibleDraw(plainly, evidence, plain.__getitem__))
     return part, found, tuple(made.loads)
@@ -219,7 +209,7 @@ def _turn(
     # Huber's loss would pull the data towards one lag.
     part = fit_windows(data, (Structure(1, 1),), within, False, noise, left, early)
     fits, fitted = _fitted(part.fit, forms, like.fitted if like else [])
-    best = _plain(min(fitted, key=partial(_value, fits)))
+    best = _plain(min(fitted, key=partial(charged_misfit, fits)))
     part = replace(part, fit=fits)
     errors = _left(part, best)
     lags = noise_lags(min(part.data.counts)) if whiten else 0
@@ -296,7 +286,7 @@ def _robust(
     fits: WindowFit, forms: Sequence[ProcessForm], fitted: list[Candidate]
 ) -> tuple[WindowFit, list[Candidate]]:
     """Repeat the fit with Huber's loss if there are outliers, as `fit_window` does."""
-    window, best = fits.window, _plain(min(fitted, key=partial(_value, fits)))
+    window, best = fits.window, _plain(min(fitted, key=partial(charged_misfit, fits)))
     error = fits.residual(best)
     if not has_outliers(error):
         return fits, fitted
@@ -365,73 +355,6 @@ def _with_noise(fits: WindowFit, lags: Sequence[Candidate]) -> WindowFit:
     )  # fmt: skip
 
 
-def _profiles(fits: WindowFit, fitted: Sequence[Candidate]) -> list[Points]:
-    """Best models with given dead times, the same for every number of lags.
-
-    A further lag that vanishes at the minimum has no grid of its own. Every profile starts from
-    its minimum or from that of fewer lags, by what is closer at each dead time.
-    """
-    setting = fits.problem, fits.variance, fits.scales
-    grids = [profile_grid(setting[0], one, *setting[1:]) for one in fitted]
-    grid = np.unique(np.concatenate([*grids, [one.dead_time for one in fitted]]))
-    found: list[Points] = []
-    for one in fitted:
-        starts = np.tile(one.parameters, (grid.size, 1))
-        if found and starts.shape[1] > found[-1][float(grid[0])].parameters.size:
-            fewer = np.stack([found[-1][float(at)].parameters for at in grid])
-            more = np.arange(1, starts.shape[1] - fewer.shape[1] + 1)
-            nested = np.hstack([fewer, fewer[:, -1:] + np.log(_SHORTER) * more])
-            starts[:, 0] = grid
-            own, theirs = (eliminate(setting[0], one.structure, x).cost for x in (starts, nested))
-            starts = np.where((theirs < own)[:, None], nested, starts)
-        starts[:, 0] = grid
-        found.append(profile_points(setting[0], one, *setting[1:], starts))
-    return found
-
-
-def _weighted(
-    fits: WindowFit, profiles: Sequence[Points], larger: float = 1.0
-) -> tuple[FloatArray, FloatArray]:
-    """Dead times (G,), and the weights (S, G) of every number of lags; they sum to 1.
-
-    Of an input that moves so many times further; what a model misses, beside the best, then grows
-    with the square of that.
-    """
-    every = np.array(sorted(profiles[0]))
-    values = np.array([[_value(fits, own[float(at)]) for at in every] for own in profiles])
-    cost = np.array([[own[float(at)].cost for at in every] for own in profiles])
-    values += (larger**2 - 1.0) * (cost - cost.min()) / (CALIBRATED * fits.variance)
-    part = np.arange(_BETWEEN) / _BETWEEN
-    fine = np.append((every[:-1, None] + np.diff(every)[:, None] * part).ravel(), every[-1])
-    between = PchipInterpolator(every, values, axis=1)(fine)
-    least = values.min(axis=1, keepdims=True)
-    density = np.exp(-0.5 * (between - least)) * np.gradient(fine)
-    weights = np.exp(-0.5 * (least - least.min()))
-    share = weights / weights.sum() / np.maximum(density.sum(axis=1, keepdims=True), SMALLEST)
-    return fine, share * density
-
-
-def _with_moves(
-    fits: WindowFit, profiles: Sequence[Points], larger: float
-) -> tuple[float, float, float]:
-    """Mean dead time and the ends of its interval, had the input moved so many times further."""
-    dead_times, shares = _weighted(fits, profiles, larger)
-    return _known(dead_times, shares.sum(axis=0))
-
-
-def _known(dead_times: FloatArray, weights: FloatArray) -> tuple[float, float, float]:
-    """Mean dead time and the ends of its interval."""
-    ends = np.interp([_TAIL, 1.0 - _TAIL], np.cumsum(weights), dead_times).tolist()
-    return float(weights @ dead_times), ends[0], ends[1]
-
-
 def _plain(lags: Candidate) -> Candidate:
     """Lags of a form, with the parameters of a structure."""
     return Candidate(lags.structure.plain, lags.theta, lags.cost)
-
-
-def _value(fits: WindowFit, lags: Candidate) -> float:
-    """Misfit and charges; one initial value more of a record lowers the misfit by one for noise."""
-    free = CHI2_95 * (lags.parameters.size - 1)
-    charge = free + fits.problem.local_count(lags.structure.order)
-    return lags.cost / (CALIBRATED * fits.variance) + charge
