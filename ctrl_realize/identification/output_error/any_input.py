@@ -14,15 +14,12 @@ from ...data import Record
 from ...errors import DataError
 from ...numerics.arrays import FloatArray
 from ...numerics.constants import SMALLEST
-from ...numerics.engine.modal import respond
-from ...numerics.engine.poles import parameters_from_poles
 from ...numerics.output_error.any_input.data import SOUGHT, SampledData
 from ...numerics.output_error.any_input.fit import SampledFit, fit_sampled
 from ...numerics.output_error.any_input.stretch import FOLLOWS
 from ...numerics.output_error.other_structures import Requested
 from ...numerics.output_error.result import AT_BOUND, OutputErrorEstimate
 from ...numerics.output_error.step_data import StepData, bare_data
-from ...numerics.signals.correlation import fit_percent
 from ...numerics.signals.counters import counter_period
 from ...numerics.validation.own_response import OwnResponse
 from .averaging import common_sample_time
@@ -155,8 +152,6 @@ def _summary(
 ) -> OutputErrorFit:
     """Concatenate what was fitted on one time axis."""
     data = found.data
-    most = max(fit.followed.simulated, _from_first_input(data, fit))
-    fit = replace(fit, followed=fit.followed._replace(simulated=most))
     used = records if repeats is None else tuple(compress(records, repeats.kept))
     shown, time = joined(used, data, fit.residual.std)
     limit = SOUGHT * data.longest if latest is None else latest
@@ -184,17 +179,6 @@ def _summary(
             reasons.append(chosen("loop.load", moved=", ".join(moved)))
     choices = (*reasons, *choices_of(fit))
     return OutputErrorFit(fit, shown, time, records, repeats, choices=choices, flags=tuple(flags))
-
-
-def _from_first_input(data: SampledData, fit: OutputErrorEstimate) -> float:
-    """Per cent of the output that the model follows, at rest at the first input, not its mean."""
-    rest = tuple(u - u[0] for u in data.inputs)
-    problem = replace(data.without_loads, inputs=rest).problem
-    parameters = np.append(fit.dead_time, parameters_from_poles(fit.poles))
-    left = problem.data - respond(problem.drive, data.known, fit.numerator, parameters)
-    for part in np.split(left, data.edges[1:-1]):
-        part -= part.mean()
-    return float(fit_percent(problem.data, problem.data - left))
 
 
 def joined(

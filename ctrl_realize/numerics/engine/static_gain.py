@@ -8,12 +8,15 @@ References
    (the delta method), doi:10.1007/b98854.
 .. [2] K. P. Burnham and D. R. Anderson, Model Selection and Multimodel Inference, 2nd ed., Springer
    2002, section 4.3, doi:10.1007/b97636.
+.. [3] C. R. Rao, Large sample tests of statistical hypotheses concerning several parameters, Proc.
+   Cambridge Philos. Soc. 44 (1948) 50-57, doi:10.1017/S0305004100023987.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from scipy.special import ndtr, ndtri
@@ -21,6 +24,7 @@ from scipy.special import ndtr, ndtri
 from ..arrays import BoolArray, ComplexArray, FloatArray, unit_columns
 from ..constants import PIECE, SMALLEST, Z_95
 from .eliminate import eliminate, evaluate
+from .local_terms import LocalTerms
 from .modal import partial_fractions, responses
 from .poles import lag_sum, poles_from_parameters
 from .problem import Family, Problem
@@ -37,6 +41,8 @@ _CLEAR = 0.01  # relative distance of poles, twice that below which they are set
 _HALVINGS = 60  # of an interval, until a double has no more digits
 _ROUNDED = 1e-7  # part of a derivative that differences leave of nothing
 _NOTHING = 1e-13  # part of the largest singular value that is rounding
+_INDEPENDENT = 1e-10  # part of it, from which on columns count as several
+_OTHERS = 1e-3  # part of a column that the other terms leave: less is theirs
 
 
 @dataclass(frozen=True, eq=False)
@@ -151,11 +157,36 @@ class LocalErrors:
     `slopes` (m, p) are the weighted derivatives of the model with respect to dead time, pole
     parameters and numerator, `own` (m, q) the columns of the terms that are estimated with it.
     Along the `tangent` (p, j) of a family these may change; the slopes (m, j) are then along it.
+    What is `local` to segments has been projected out of both.
     """
 
     slopes: FloatArray
     own: FloatArray
     tangent: FloatArray | None = None
+    local: LocalTerms | None = None
+
+    def lowered(self, data: FloatArray, columns: FloatArray) -> FloatArray:
+        """Decrease (k,) of the sum of squares by each of further weighted columns (m, k).
+
+        Rao's score test [3]_: linear in all that is estimated. What the other terms leave of a
+        column counts as a thousandth of it at least.
+        """
+        least = _OTHERS**2 * np.einsum("mk,mk->k", columns, columns) + SMALLEST
+        left = self.without(columns)
+        square = np.maximum(np.einsum("mk,mk->k", left, left), least)
+        return np.asarray((data @ left) ** 2 / square)
+
+    def without(self, columns: FloatArray) -> FloatArray:
+        """What all that is estimated leaves of weighted columns (m, k)."""
+        if self.local is not None:
+            columns = self.local.without(columns[None])[0]
+        return np.asarray(columns - self._basis @ (self._basis.T @ columns))
+
+    @cached_property
+    def _basis(self) -> FloatArray:
+        columns = unit_columns(np.concatenate([self.slopes, self.own], axis=1))[0]
+        basis, singular, _ = np.linalg.svd(columns, full_matrices=False)
+        return np.asarray(basis[:, singular > _INDEPENDENT * singular[0]])
 
     def covariance(self) -> FloatArray:
         """Covariance (p, p) of dead time, pole parameters, numerator, for noise of variance 1."""
@@ -209,7 +240,7 @@ def local_errors(
     every = [responses(*setting, x[:, theta.size :], x[:, : theta.size]) for x in parts]
     ahead, behind = np.split(np.concatenate(every), 2)
     slopes = (ahead - behind).T / (2 * moves.diagonal())
-    columns = problem.weighted(np.concatenate([slopes, problem.regressors], axis=1))
+    columns, local = problem.weighted(np.concatenate([slopes, problem.regressors], axis=1)), None
     if problem.segments is not None:
         # The free response that the records are fitted with moves with the poles as well.
         poles, turned = poles_from_parameters(theta[None, 1:])
@@ -221,7 +252,7 @@ def local_errors(
         columns[:, 1 : theta.size] += local.moved(left[None], turned)[0]
         columns = local.without(columns[None])[0]
     count = moves.shape[0]
-    return LocalErrors(columns[:, :count], columns[:, count:])
+    return LocalErrors(columns[:, :count], columns[:, count:], local=local)
 
 
 def _clear(candidate: Candidate) -> FloatArray:

@@ -31,7 +31,7 @@ from functools import partial
 
 import numpy as np
 
-from ..arrays import FloatArray, unit_columns
+from ..arrays import FloatArray
 from ..constants import OUTLIER, SMALLEST, VERY_STRONG
 from ..engine.batch_search import fit_batch
 from ..engine.descend import descend
@@ -87,7 +87,6 @@ _ROUGH = 1e-2
 lower, and one of two steps of Gauss and Newton: all but one of 171 simulated loads and 46 measured
 records had the same verdict as with 2e-4 and 1e-3, which takes 1.6 times as long."""
 _FLOOR = 0.1  # of the noise, below which a residual is rounding
-_NOTHING = 1e-10  # part of the largest singular value that is rounding
 
 _roughly = partial(fit_batch, tolerance=_ROUGH)
 
@@ -229,9 +228,6 @@ def _scan(
     p = fits.window.problem
     numerator = eliminate(p, candidate.structure, candidate.parameters[None]).numerator[0]
     errors = local_errors(p, candidate, numerator, fits.scales.length)
-    taken = np.concatenate([errors.slopes, errors.own], axis=1)
-    basis, singular, _ = np.linalg.svd(unit_columns(taken)[0], full_matrices=False)
-    basis = basis[:, singular > _NOTHING * singular[0]]
     middle = _on_bins(fits, clock[:, None])[:, 0]
     # A load faster than a bin differs from a jump there alone.
     width = np.interp(times, middle[1:], np.diff(middle))
@@ -240,14 +236,11 @@ def _scan(
     lags = np.maximum(np.array([[shape.lag] for shape in shapes]), width)
     since = np.maximum(middle[:, None] - times, 0.0)
     tried = [shape.response(since / lag) for shape, lag in zip(shapes, lags, strict=True)]
-    columns = p.weighted(np.concatenate([*tried, p.data[:, None]], axis=1))
-    whole = np.einsum("mk,mk->k", columns, columns)
-    columns = columns - basis @ (basis.T @ columns)
-    square = np.maximum(np.einsum("mk,mk->k", columns, columns), 1e-6 * whole + SMALLEST)
-    gained = (columns[:, -1] @ columns[:, :-1]) ** 2 / square[:-1]
+    gained = errors.lowered(p.weighted_data, p.weighted(np.hstack(tried)))
     shape, at = divmod(int(np.argmax(gained)), times.size)
     found = replace(shapes[shape], time=float(times[at]), lag=float(lags[shape, at]))
-    return float(columns[:, -1] @ columns[:, -1] - gained.max()), found
+    left = errors.without(p.weighted_data[:, None])
+    return float(np.sum(left**2) - gained.max()), found
 
 
 def _through_the_plant(fits: WindowFit, candidate: Candidate, problem: Problem) -> LoadStep:

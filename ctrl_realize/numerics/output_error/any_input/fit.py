@@ -28,6 +28,7 @@ from ...arrays import FloatArray
 from ...constants import Z_95
 from ...engine.compared_fits import converged
 from ...engine.local_terms import local_columns
+from ...engine.modal import respond
 from ...engine.poles import lag_sum, parameters_from_poles, poles_from_parameters
 from ...engine.problem import KnownFactor, Problem, Structure
 from ...engine.profile import dead_time_error
@@ -145,7 +146,7 @@ def fit_sampled(
         every = -(-max(y.size for y in outputs) // MOST_SAMPLES)
         found, fit, loads = fit_lags(cut(outputs, inputs, dt, every, requested.known), requested)
         if requested.forms or fit.better is None:
-            fit = _of_measured(found, fit, found.noise.size - 1)
+            fit = _at_rest(found.data, _of_measured(found, fit, found.noise.size - 1))
             return SampledFit(fit, found.data, explained(found.fit), found.noise, None, loads)
     structures = requested.structures
     every, part = samples_in_a_block(outputs, inputs, dt, replace(requested, structures=None))
@@ -206,7 +207,7 @@ def fit_sampled(
     residual = fit.residual._replace(normalized_rms=float(np.sqrt(correlation)))
     close = fit.close + close_to("adequate", correlation, WHITE)
     fitted = fit.fitted * np.repeat(data.scales, data.counts)
-    fit = replace(fit, residual=residual, close=close, fitted=fitted)
+    fit = _at_rest(data, replace(fit, residual=residual, close=close, fitted=fitted))
     return SampledFit(fit, data, explained(stretch), part.noise, sums)
 
 
@@ -227,6 +228,22 @@ def _of_measured(
         followed=followed._replace(complete=complete),
         residual=fit.residual._replace(std=left, noise_lags=noise_lags),
     )
+
+
+def _at_rest(data: SampledData, fit: OutputErrorEstimate) -> OutputErrorEstimate:
+    """Tell how much of the output a simulation follows: at rest at the first input, or its mean.
+
+    It is that which follows more: what came before is not known.
+    """
+    rest = tuple(u - u[0] for u in data.inputs)
+    problem = replace(data.without_loads, inputs=rest).problem
+    parameters = np.append(fit.dead_time, parameters_from_poles(fit.poles))
+    left = problem.data - respond(problem.drive, data.known, fit.numerator, parameters)
+    for part in np.split(left, data.edges[1:-1]):
+        part -= part.mean()
+    simulated = float(fit_percent(problem.data, problem.data - left))
+    most = max(fit.followed.simulated, simulated)
+    return replace(fit, followed=fit.followed._replace(simulated=most))
 
 
 def _of_all_samples(

@@ -25,7 +25,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.signal import lfilter
 
-from ...arrays import FloatArray, IntArray, unit_columns
+from ...arrays import FloatArray, IntArray
 from ...constants import SMALLEST
 from ...engine.eliminate import evaluate
 from ...engine.local_terms import local_columns
@@ -37,7 +37,6 @@ from .data import SampledData
 from .window import SampledWindow
 
 _TIMES = 200  # of a load that are tried in a record, and then every sample about the best
-_OWN = 1e-3  # part of a response to a load that the other terms leave: less is theirs
 
 
 class Load(NamedTuple):
@@ -123,9 +122,8 @@ def _likeliest(
     filtered = with_loads(data, lags, others).whitened(part.noise, part.residual)
     problem, edges = filtered.problem, filtered.edges
     state = evaluate(problem, model.structure, model.parameters[None])
-    left, terms = state.residual[0], problem.local_terms(model.poles[None])
-    slopes = local_errors(problem, model, state.numerator[0], part.fit.scales.length).slopes
-    basis = np.linalg.qr(unit_columns(slopes)[0])[0]
+    left = state.residual[0]
+    errors = local_errors(problem, model, state.numerator[0], part.fit.scales.length)
     shapes = [lfilter(part.noise, [1.0], shape) for shape in lags.responses(data)]
 
     def scores(record: int, times: IntArray) -> FloatArray:
@@ -134,10 +132,7 @@ def _likeliest(
         columns[edges[record] : edges[record + 1]] = np.where(
             since < 0, 0.0, shapes[record][np.maximum(since, 0)]
         )
-        least = _OWN**2 * np.sum(columns**2, axis=0) + SMALLEST
-        columns = terms.without(columns[None])[0]
-        columns -= basis @ (basis.T @ columns)
-        return np.asarray((left @ columns) ** 2 / np.maximum(np.sum(columns**2, axis=0), least))
+        return errors.lowered(left, columns)
 
     best, most = Load(0, 0), 0.0
     for record, rows in enumerate(filtered.rows):
