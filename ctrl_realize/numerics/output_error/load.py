@@ -148,7 +148,7 @@ def load_of(
     also = refit(loaded, data.output.size, tuple(fits.candidates))
     white = also.correlation == 1.0
     own, soon = _evidence(fits, also.residual(also.best), also.best.structure), since < apart
-    evidence = max(evidence, own) if soon else own  # many poles take up a load that comes soon
+    evidence = max(evidence, own)
     told = evidence > (VERY_STRONG if white else IN_SLOW_NOISE)
     if not told or not is_noise(loaded, also, also.best):
         return None
