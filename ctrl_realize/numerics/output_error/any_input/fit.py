@@ -170,9 +170,8 @@ def fit_sampled(
     if structures is not None and requested.fastest is None and requested.compared:
         # On the part also if all samples were fitted: what is ruled out there is ruled out in any
         # case. The residual may be what a structure cannot describe, and is then no noise.
-        refit = partial(fit_stretch, part.data, ORDERS, replace(requested, structures=None))
         filtered = part if sums is not None else made_white(part, requested)
-        others = other_structures(filtered.fit, lambda: refit().fit)
+        others = other_structures(filtered.fit, partial(filtered.fit_of, ORDERS))
         if others.better is None and filtered is not part:
             part, data, fits = filtered, filtered.data, filtered.fit
     white = fits.correlation <= WHITE

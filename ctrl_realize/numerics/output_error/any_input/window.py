@@ -37,7 +37,7 @@ from ...engine.window_fit import WindowFit, fit_window
 from ...signals.noise import correlation_time, quantisation_step, winsorised_sigma
 from ...signals.noise_model import noise_lags, whitening_filter
 from ...signals.onset import correlation_onset
-from .data import BEYOND, SampledData
+from .data import BEYOND, MOST_SAMPLES, SampledData
 
 ORDERS = tuple(Structure(n, r) for n in range(1, 4) for r in range(n, 0, -1))
 """Every sample counts here, so that orders 4 and 5 would take most of the time."""
@@ -156,11 +156,13 @@ def noise_model(part: SampledWindow, model: Candidate, error: FloatArray, lags: 
         return np.ones(1)
     problem, edges = part.data.problem, part.data.edges
     assert problem.segments is not None
+    # As many records as one may have samples: every one has terms of its own.
+    stop = max(int(np.searchsorted(edges, MOST_SAMPLES, "right")), 2) - 1
     state = evaluate(part.fit.problem, model.structure, model.parameters[None])
     slopes = local_errors(problem, model, state.numerator[0], part.scales.length).slopes
-    own = np.split(local_columns(problem.segments, model.poles[None])[0], edges[1:-1])
-    columns = unit_columns(np.hstack([slopes, block_diag(*own)]))[0]
-    return whitening_filter(error, lags, columns=columns)
+    own = np.split(local_columns(problem.segments, model.poles[None])[0], edges[1:-1])[:stop]
+    columns = unit_columns(np.hstack([slopes[: edges[stop]], block_diag(*own)]))[0]
+    return whitening_filter(error[: edges[stop]], lags, columns=columns)
 
 
 def simulates_worse(weighted: SampledWindow, plain: SampledWindow) -> bool:
