@@ -173,8 +173,7 @@ def _by_amplitude(
         axes.vlines(at, low, high, color=looks["color"], linewidth=1.2, alpha=0.45)
         lines += axes.plot(at, [row.delay for row in rows], **looks)
     axes.set_xticks(range(len(groups)), [f"{height:g}" for height in groups])
-    axes.set_xlabel("height of the step [unit of the input]")
-    axes.set_ylabel("delay [samples]")
+    axes.set(xlabel="height of the step [unit of the input]", ylabel="delay [samples]")
     return lines
 
 
@@ -185,8 +184,7 @@ def _by_name(
     axes.hlines(range(len(rows)), low, high, color=looks["color"], linewidth=1.6, alpha=0.45)
     names = [plain(row.name, 34) for row in rows]
     axes.set_yticks(range(len(rows)), names, fontsize=10)
-    axes.set_ylim(len(rows) - 0.5, -0.5)
-    axes.set_xlabel("delay [samples]")
+    axes.set(ylim=(len(rows) - 0.5, -0.5), xlabel="delay [samples]")
     return list(axes.plot([row.delay for row in rows], range(len(rows)), **looks))
 
 

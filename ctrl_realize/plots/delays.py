@@ -101,8 +101,7 @@ def delay_comparison_plot(
             for estimate in reversed(check.estimates)
         ]
         axes.set_yticks(range(len(names)), names)
-        axes.set_ylim(-0.6, len(names) - 0.4)
-        axes.set_xlabel(f"dead time, or bound ◂ [{unit}]")
+        axes.set(ylim=(-0.6, len(names) - 0.4), xlabel=f"dead time, or bound ◂ [{unit}]")
         return style.finished([axes], [lines], loc="above")
 
 
@@ -147,6 +146,5 @@ def track_plot(
         gain = np.where(resolved, track.gain_ratio, np.nan)
         lower = list(axes[1].plot(time, gain, color=style.MEASURED))
         axes[0].set_ylabel(f"dead time [{name}]")
-        axes[1].set_ylabel("gain over\nthe model's")
-        axes[1].set_xlabel(f"time [{unit}]")
+        axes[1].set(ylabel="gain over\nthe model's", xlabel=f"time [{unit}]")
         return style.finished(axes, [upper, lower], loc="above")

@@ -231,8 +231,7 @@ def several_inputs_plot(
             own: dict[str, Any] = {"color": style.model_colour(i + 1), "label": plain(name, 30)}
             lines[1] += lower.plot(time, response, **own)
         upper.set_ylabel(with_unit(record.output_labels[0], record.output_units[0]))
-        lower.set_ylabel("response to")
-        lower.set_xlabel(f"time [{unit}]")
+        lower.set(xlabel=f"time [{unit}]", ylabel="response to")
         return style.finished([upper, lower], lines, legends=(0, 1), loc="above")
 
 
@@ -268,9 +267,8 @@ def data_and_model(
     start = _first_motion(result)
     upper.set_xlim(time[start], time[-1])
     upper.tick_params(labelbottom=False)
-    lower.set_xlabel(f"time [{unit}]")
     upper.set_ylabel(_output_label(result))
-    lower.set_ylabel("residual")
+    lower.set(xlabel=f"time [{unit}]", ylabel="residual")
     lower.legend(loc="upper right", fontsize=10)
     return [data, rest]
 
@@ -344,9 +342,8 @@ def _evidence(axes: Axes, result: OutputErrorFit, **kwargs: Any) -> list[Line2D]
         looks = {"color": colour, "marker": "o", "linestyle": "none", **kwargs}
         points += axes.plot([factor * seen], [height], **looks)
     axes.set_yticks(range(len(rows)), [plain(name, 40) for name, *_ in rows], fontsize=10)
-    axes.set_ylim(len(rows) - 0.4, -0.6)
+    axes.set(ylim=(len(rows) - 0.4, -0.6), xlabel=f"dead time [{unit}]")
     axes.grid(visible=False, axis="y")
-    axes.set_xlabel(f"dead time [{unit}]")
     said = f"{time_within(result.dead_time, low, high)} ({interval_in_time(low, high)})"
     axes.set_title(said, loc="left", fontsize=11)
     return points

@@ -96,8 +96,7 @@ def frf_plot(
         phase_ticks(axes[1])
         if coherent:
             axes[2].axhline(TRUSTED_COHERENCE, color=style.NOISE, linewidth=1.0, linestyle=":")
-            axes[2].set_ylabel("coherence")
-            axes[2].set_ylim(-0.02, 1.05)
+            axes[2].set(ylabel="coherence", ylim=(-0.02, 1.05))
         for one in axes:
             if band is not None:
                 mark_band(one, band)

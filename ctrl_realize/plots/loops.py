@@ -134,20 +134,12 @@ def _nyquist(axes: Any, result: Margins, values: Any) -> Any:
     lines = axes.plot(values.real, values.imag, color=style.MODEL)
     axes.plot(values.real, -values.imag, color=style.MODEL, alpha=0.35, linewidth=1)
     axes.plot([-1], [0], marker="+", markersize=12, color=style.INK, linestyle="none")
-    angle = np.linspace(0, 2 * np.pi, 200)
-    axes.plot(
-        -1 + result.modulus_margin * np.cos(angle),
-        result.modulus_margin * np.sin(angle),
-        color=style.TRUTH,
-        linestyle=style.DASHES[1],
-        label=f"modulus margin {result.modulus_margin:.3g}",
-    )
-    axes.set(
-        xlim=(-NYQUIST_SPAN, NYQUIST_SPAN - 1),
-        ylim=(-NYQUIST_SPAN + 0.5, NYQUIST_SPAN - 0.5),
-        xlabel="real part",
-        ylabel="imaginary part",
-    )
+    circle = -1 + result.modulus_margin * np.exp(1j * np.linspace(0, 2 * np.pi, 200))
+    label = f"modulus margin {result.modulus_margin:.3g}"
+    looks = {"color": style.TRUTH, "linestyle": style.DASHES[1], "label": label}
+    axes.plot(circle.real, circle.imag, **looks)
+    axes.set(xlabel="real part", ylabel="imaginary part")
+    axes.set(xlim=(-NYQUIST_SPAN, NYQUIST_SPAN - 1), ylim=(0.5 - NYQUIST_SPAN, NYQUIST_SPAN - 0.5))
     axes.set_aspect("equal", adjustable="box")
     return lines
 

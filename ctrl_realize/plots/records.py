@@ -310,13 +310,8 @@ def experiment_plot(
         lines += upper.loglog(factor * curve.time, scale * curve.step, **plain_looks)
         others = [one.std for one in plan.candidates if one not in (best, step)]
         at = np.full(len(others), factor * plan.duration)
-        dots: dict[str, Any] = {
-            "color": style.NOISE,
-            "marker": "_",
-            "markersize": 14,
-            "linestyle": "none",
-        }
-        lines += upper.plot(at, scale * np.array(others), label="other candidates", **dots)
+        dots: dict[str, Any] = {"color": style.NOISE, "markersize": 14}
+        lines += upper.plot(at, scale * np.array(others), "_", label="other candidates", **dots)
         if curve.first is not None:
             today = [factor * curve.first[0]], [scale * curve.first[1]]
             lines += upper.plot(*today, "D", color=style.MEASURED, label="today")

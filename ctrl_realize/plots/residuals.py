@@ -130,8 +130,7 @@ def model_comparison_plot(
         axes[1].sharex(axes[0])
         axes[0].set_xlabel("")
         axes[0].tick_params(labelbottom=False)
-        axes[1].set_xlabel(f"time [{unit}]")
-        axes[1].set_ylabel("residual")
+        axes[1].set(xlabel=f"time [{unit}]", ylabel="residual")
         _label_correlations(*axes[2:])
         return style.finished(axes, lines, loc="above")
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any
 
 import control as ct
@@ -135,13 +136,10 @@ def uncertainty_plot(
     """
     with style.canvas(ax, title=title, default_title="Multiplicative uncertainty") as (axes,):
         hertz = result.omega / HERTZ
-        lines = _positive_loglog(axes, hertz, result.bound, color=style.MODEL, label="bound")
-        lines += _positive_loglog(
-            axes, hertz, result.spread, color=style.MEASURED, label="spread of the systems"
-        )
-        lines += _positive_loglog(
-            axes, hertz, result.delay_part, color=style.BAND, label="uncertain dead time"
-        )
+        curve = partial(_positive_loglog, axes, hertz)
+        lines = curve(result.bound, color=style.MODEL, label="bound")
+        lines += curve(result.spread, color=style.MEASURED, label="spread of the systems")
+        lines += curve(result.delay_part, color=style.BAND, label="uncertain dead time")
         axes.axhline(1, color=style.INPUT, linewidth=1)
         axes.set(xlabel="frequency [Hz]", ylabel="relative error")
         return style.finished([axes], [lines], loc="upper left")

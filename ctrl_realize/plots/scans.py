@@ -106,10 +106,15 @@ def singular_value_plot(
     ['order 2']
     """
     advice = "no singular values; use the result of realize, estimate_delay or scan_orders"
-    result = style.result_of(fit, (DelayScan, Realization, OrderScan), advice)
-    values, order, floor, name = _singular_values(result, count)
-    with style.canvas(ax, title=title, default_title=name) as (axes,):
-        lines = _singular_values_on(axes, values, order, floor, **kwargs)
+    result: Any = style.result_of(fit, (DelayScan, Realization, OrderScan), advice)
+    if isinstance(result, OrderScan):
+        values = result.singular_values[result.delay][:count]
+    else:
+        found = result.realization if isinstance(result, DelayScan) else result
+        values = found.leading_singular_values(count)
+    floor = None if isinstance(result, Realization) else result.noise_floor
+    with style.canvas(ax, title=title, default_title=result.impulse.name) as (axes,):
+        lines = _singular_values_on(axes, values, result.order, floor, **kwargs)
         return style.finished([axes], [lines])
 
 
@@ -171,20 +176,9 @@ def _misfits_of_orders(axes: Axes, scan: OrderScan, asked: dict[str, Any]) -> li
 
 
 def _misfit_axes(axes: Axes) -> None:
-    axes.set_xlabel("delay [samples]")
-    axes.set_ylabel("IAE [output / input]")
+    axes.set(xlabel="delay [samples]", ylabel="IAE [output / input]")
     axes.set_ylim(bottom=0.0)
     axes.xaxis.set_major_locator(MaxNLocator(integer=True))
-
-
-def _singular_values(result: Any, count: int) -> tuple[FloatArray, int, float | None, str]:
-    if isinstance(result, DelayScan):
-        values = result.realization.leading_singular_values(count)
-        return values, result.order, result.noise_floor, result.impulse.name
-    if isinstance(result, Realization):
-        return result.leading_singular_values(count), result.order, None, result.impulse.name
-    values = result.singular_values[result.delay][:count]
-    return values, result.order, result.noise_floor, result.impulse.name
 
 
 def _singular_values_on(
@@ -199,8 +193,6 @@ def _singular_values_on(
     lines += axes.plot(positions[~inside], positive[~inside], **rest)
     if floor is not None and floor > 0:
         axes.axhline(floor, color=style.NOISE, linestyle="--", label="largest of pure noise")
-    axes.set_yscale("log")
+    axes.set(yscale="log", xlabel="number" if at is None else "order", ylabel="singular value")
     axes.xaxis.set_major_locator(MaxNLocator(integer=True))
-    axes.set_xlabel("number" if at is None else "order")
-    axes.set_ylabel("singular value")
     return lines

@@ -109,14 +109,10 @@ def axes_for(
     needed = rows * columns
     if ax is None or isinstance(ax, FigureBase):
         figure = plt.figure(figsize=size, layout="constrained") if ax is None else ax
-        made = figure.subplots(
-            rows,
-            columns,
-            squeeze=False,
-            sharex="col" if sharex else False,
-            gridspec_kw=None if heights is None else {"height_ratios": heights},
+        shared: Any = "col" if sharex else False
+        return list(
+            figure.subplots(rows, columns, squeeze=False, sharex=shared, height_ratios=heights).flat
         )
-        return [axes for row in made for axes in row]
     given = list(np.ravel(np.asarray(ax, dtype=object)))
     if len(given) != needed or not all(isinstance(axes, Axes) for axes in given):
         raise OptionError(

@@ -131,15 +131,9 @@ def write_identification(
         tables=[*fit_tables(system.fit), *comparison_tables(comparison), model_table(system)],
         records=[record],
         fit=system.fit,
-        controller=_controller(system, controller, form),
+        controller=controller_of(system, controller, form),
         **about,
     )
-
-
-def _controller(
-    system: DelayedStateSpace, controller: PIDController | None, form: PIDForm | None
-) -> Controller | None:
-    return None if controller is None else controller_of(system, controller, form)
 
 
 def write_campaign(
@@ -216,7 +210,7 @@ def write_campaign(
             ],
             records=records,
             fit=system.fit,
-            controller=_controller(system, controller, form),
+            controller=controller_of(system, controller, form),
             **about,
         )
 

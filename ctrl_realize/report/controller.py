@@ -72,18 +72,20 @@ def _unsafe_if(system: DelayedStateSpace, pid: PIDController) -> Iterator[str]:
 
 
 def controller_of(
-    system: DelayedStateSpace, pid: PIDController, form: PIDForm | None = None
-) -> Controller:
-    """Make the part of a report about a controller.
+    system: DelayedStateSpace, pid: PIDController | None, form: PIDForm | None = None
+) -> Controller | None:
+    """Make the part of a report about a controller, if there is one.
 
     Parameters
     ----------
     system : DelayedStateSpace
-    pid : PIDController
+    pid : PIDController or None
         Tuned for `system`.
     form : PIDForm, optional
         Its parameters as they are entered; default: the ideal form.
     """
+    if pid is None:
+        return None
     written = pid.as_form() if form is None else form
     rows = [Row((name, value)) for name, value in written._rows()]
     entered = Table(

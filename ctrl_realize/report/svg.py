@@ -24,17 +24,8 @@ from ..plots import style
 POINTS = 1200
 """Largest number of points of a line; more than the columns of a screen are not visible."""
 
-_VARIABLES = {
-    style.INK: "var(--ink)",
-    style.GRID: "var(--grid)",
-    style.PAPER: "var(--paper)",
-    style.MEASURED: "var(--measured)",
-    style.MODEL: "var(--model)",
-    style.TRUTH: "var(--truth)",
-    style.INPUT: "var(--input)",
-    style.NOISE: "var(--noise)",
-    style.BAND: "var(--band)",
-}
+_COLOURS = ("INK", "GRID", "PAPER", "MEASURED", "MODEL", "TRUTH", "INPUT", "NOISE", "BAND")
+_VARIABLES = {getattr(style, name): f"var(--{name.lower()})" for name in _COLOURS}
 
 
 def laid_out(draw: Callable[[Figure], Any], size: tuple[float, float]) -> Figure:
@@ -70,11 +61,9 @@ def thin_lines(figure: Figure, points: int = POINTS) -> None:
         for line in axes.get_lines():
             x = np.asarray(line.get_xdata(), dtype=np.float64)
             y = np.asarray(line.get_ydata(), dtype=np.float64)
-            if x.size <= points:
-                continue
-            if (np.diff(x) >= 0).all():
+            if x.size > points and (np.diff(x) >= 0).all():
                 line.set_data(*envelope(x, y, points, logarithmic=logarithmic))
-            else:
+            elif x.size > points:
                 line.set_data(*path_of(x, y))
 
 
@@ -170,13 +159,9 @@ def scales(figure: Figure) -> str:
         part = axes.get_position()
         box = (part.x0 * wide, (1 - part.y1) * high, part.width * wide, part.height * high)
         across = axes.get_shared_x_axes().get_siblings(axes)
-        found.append(
-            {
-                "box": [round(float(length), 2) for length in box],
-                "x": _scale(axes.xaxis, axes.get_xlim(), [one.get_xlabel() for one in across]),
-                "y": _scale(axes.yaxis, axes.get_ylim(), [axes.get_ylabel()]),
-            }
-        )
+        x = _scale(axes.xaxis, axes.get_xlim(), [one.get_xlabel() for one in across])
+        y = _scale(axes.yaxis, axes.get_ylim(), [axes.get_ylabel()])
+        found.append({"box": [round(float(length), 2) for length in box], "x": x, "y": y})
     return json.dumps(found)
 
 
@@ -200,12 +185,8 @@ def _at_home(document: str, key: str, description: str, data: str) -> str:
     body = re.sub(r"\s*\n\s*", " ", body)
     head = f'<svg role="img" aria-label="{aria}" class="plot" data-axes="{axes}" '
     # By functions, not templates: a name in the data may contain a backslash.
-    body = re.sub(
-        r'<svg (?:xmlns:xlink="[^"]*" )?width="[^"]*" height="[^"]*" ',
-        lambda _: head,
-        body,
-        count=1,
-    )
+    size = r'<svg (?:xmlns:xlink="[^"]*" )?width="[^"]*" height="[^"]*" '
+    body = re.sub(size, lambda _: head, body, count=1)
     return body.replace('xmlns="http://www.w3.org/2000/svg" ', "", 1)
 
 

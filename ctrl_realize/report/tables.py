@@ -104,9 +104,8 @@ def _matrix(values: Any) -> str:
 
 def settings_tables(settings: Mapping[str, Any] | None) -> list[Table]:
     """List the settings, if there are any."""
-    if not settings:
-        return []
-    return [pairs("Settings", [(str(key), str(value)) for key, value in settings.items()])]
+    rows = [(str(key), str(value)) for key, value in (settings or {}).items()]
+    return [pairs("Settings", rows)] if rows else []
 
 
 def data_table(records: Sequence[Record], files: Paths) -> Table:

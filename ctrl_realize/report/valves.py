@@ -142,10 +142,8 @@ def _cell(found: Any, unit: str) -> str:
 
 
 def _missing_tables(result: ValveReport) -> list[Table]:
-    if not result.missing_tests:
-        return []
     rows = [(test, ", ".join(names)) for test, names in result.missing_tests.items()]
-    return [pairs("Missing tests, and what they would tell", rows)]
+    return [pairs("Missing tests, and what they would tell", rows)] if rows else []
 
 
 def _step_table(result: ValveReport) -> Table:

@@ -40,12 +40,11 @@ def _draw_trend(axes: Axes, diagnosis: LoopDiagnosis, looks: dict[str, Any]) -> 
         ("PV", signals.pv, style.MEASURED),
         ("SP", signals.sp, style.OTHERS[0]),
     ):
-        if signal is None:
-            continue
-        scale = float((signals.pv if label == "SP" else signal).std()) or 1.0
-        middle = float((signals.pv if label == "SP" else signal).mean())
-        own = {"color": colour, "linewidth": 1.2, "label": label, **looks}
-        lines += axes.plot(time * unit, (signal[part] - middle) / scale, **own)
+        if signal is not None:
+            alike = signals.pv if label == "SP" else signal
+            own = {"color": colour, "linewidth": 1.2, "label": label, **looks}
+            shown = (signal[part] - alike.mean()) / (float(alike.std()) or 1.0)
+            lines += axes.plot(time * unit, shown, **own)
     axes.set(xlabel=f"time [{name}]", ylabel="deviation / standard deviation")
     return lines
 

@@ -57,8 +57,7 @@ def _draw_steps(axes: Axes, report: ValveReport, looks: dict[str, Any]) -> list[
     for level in (0.632, 0.865):
         axes.axhline(level, color=style.NOISE, linewidth=0.8, linestyle=":")
     axes.set(xlabel=f"time after the step [{name}]", ylabel="response / change")
-    axes.set_xlim(0, longest * unit if longest > 0 else 1.0)
-    axes.set_ylim(-0.3, 1.5)
+    axes.set(xlim=(0, longest * unit if longest > 0 else 1.0), ylim=(-0.3, 1.5))
     if not lines:
         style.no_curve(axes, "no step with a complete response")
     return lines
