@@ -121,9 +121,7 @@ def valve(
     before = [
         lag(paper.SETUP.converter_cutoff_hz), lag(lag_hz), second_order_lag(actuator_hz, damping)
     ]  # fmt: skip
-    after = []
-    if lvdt_hz is not None:
-        after.append(lag(lvdt_hz))
+    after = [] if lvdt_hz is None else [lag(lvdt_hz)]
     if given["anti_aliasing"] == "analog":
         after += butterworth(4, 1 / (2.56 * dt))
     gain = STROKE_MM / (paper.SETUP.current_range[1] - paper.SETUP.current_range[0])

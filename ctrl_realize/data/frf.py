@@ -140,10 +140,8 @@ class MeasuredFRF(FRFAlgebra):
         self.frequency_hz = read_only(grid)
         self.coherence = _beside(coherence, values, order, "coherence")
         self.std = _beside(std, values, order, "std")
-        for what, array, most in (
-            ("coherence", self.coherence, 1 + 1e-9),
-            ("std", self.std, np.inf),
-        ):
+        for what, most in (("coherence", 1 + 1e-9), ("std", np.inf)):
+            array = getattr(self, what)
             if array is not None and (array.min() < 0 or array.max() > most):
                 raise DataError(
                     f"{what} runs from {array.min():g} to {array.max():g}; expected values "
@@ -164,14 +162,8 @@ class MeasuredFRF(FRFAlgebra):
             as_code(self.frdata[0, 0] if self._single else self.frdata),
             as_code(self.frequency_hz),
         ]
-        for name, value in (
-            ("coherence", self.coherence),
-            ("std", self.std),
-            ("repeats", self.repeats),
-            ("sample_time", self.sample_time),
-            ("name", self.name),
-        ):
-            if value is not None:
+        for name in ("coherence", "std", "repeats", "sample_time", "name"):
+            if (value := getattr(self, name)) is not None:
                 parts.append(f"{name}={as_code(value)}")
         parts.append(f"inputs={self.input_labels!r}, outputs={self.output_labels!r}")
         return f"MeasuredFRF({', '.join(parts)})"

@@ -20,6 +20,7 @@ that are linear in that response, cancels in a quotient of two, and occurs twice
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import control as ct
@@ -257,10 +258,7 @@ class FRFAlgebra(ct.FrequencyResponseData):  # type: ignore[misc]  # control is 
         H = np.moveaxis(one.values, 2, 0)
         p, m = self.noutputs, self.ninputs
         if two.is_scalar and p == m:
-            two = Operand(
-                two.values * np.eye(p)[:, :, None], two.variance, None, two.hold, two.repeats,
-                two.measured,
-            )  # fmt: skip
+            two = replace(two, values=two.values * np.eye(p)[:, :, None], coherence=None)
         if two.values.shape[:2] != (m, p):
             raise DataError(
                 f"feedback of shape {two.values.shape[:2]} around {p} outputs and {m} inputs; "

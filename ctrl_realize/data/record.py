@@ -153,18 +153,10 @@ class Record(RecordConversions):
         return Record(**self._arguments() | changes)
 
     def _arguments(self) -> dict[str, Any]:
-        return {
-            "time": self.time,
-            "input": self.input,
-            "output": self.output,
-            "reference": self.reference,
-            "name": self.name,
-            "input_labels": self.input_labels,
-            "output_labels": self.output_labels,
-            "units": dict(self.units),
-            "missing": self.missing,
-            "sample_time": self.sample_time if self.irregular else None,
-        }
+        names = ("time", "input", "output", "reference", "name", "input_labels", "output_labels")
+        given = {name: getattr(self, name) for name in (*names, "missing")}
+        usual = self.sample_time if self.irregular else None
+        return given | {"units": dict(self.units), "sample_time": usual}
 
     def _longer(self, given: float | None) -> float:
         """Sample time that was given, which is not below a step of the time axis."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Any
+from functools import partial
 
 import control as ct
 import numpy as np
@@ -89,13 +89,10 @@ def delayed_ss(
     if isinstance(core, ct.TransferFunction):
         check_proper(core, "a model with dead time")
     system = core if isinstance(core, ct.StateSpace) else ct.ss(core)
-    settings: dict[str, Any] = {
-        "output_delay": output_delay,
-        "fit": fit,
-        "name": name,
-        "inputs": inputs,
-        "outputs": outputs,
-    }
+    made = partial(
+        DelayedStateSpace, output_delay=output_delay, fit=fit, name=name, inputs=inputs,
+        outputs=outputs,
+    )  # fmt: skip
     dead_time = None if dead_time is None else real(dead_time, "dead_time", "dead time in s, >= 0")
     if dead_time is not None and dead_time < 0:
         raise DelayRangeError(f"dead_time={dead_time:g} s; expected a value >= 0")
@@ -125,7 +122,7 @@ def delayed_ss(
             outputs=system.output_labels,
             remove_useless_states=False,
         )
-        return DelayedStateSpace(discrete, samples if delay is None else delay, **settings)
+        return made(discrete, samples if delay is None else delay)
     check_core(system)
     if dt is not None and not np.isclose(positive(dt, "dt", "sample time in s"), system.dt):
         raise OptionError(f"dt={dt:g} s, but the core has the sample time {system.dt:g} s")
@@ -139,7 +136,7 @@ def delayed_ss(
                 "a discrete core needs a whole number of samples (a continuous core takes "
                 "any dead time)"
             )
-    return DelayedStateSpace(system, 0 if delay is None else delay, **settings)
+    return made(system, 0 if delay is None else delay)
 
 
 def _check_span(system: ct.StateSpace, dead_time: float, step: float) -> None:

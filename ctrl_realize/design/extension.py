@@ -6,7 +6,6 @@ import sys
 from collections.abc import Callable
 from functools import wraps
 from threading import local
-from types import TracebackType
 from typing import Any
 
 import control as ct
@@ -67,12 +66,7 @@ class ControlExtension:
     def __enter__(self) -> ControlExtension:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *error: object) -> None:
         self.undo()
 
 

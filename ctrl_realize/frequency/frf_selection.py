@@ -225,14 +225,8 @@ def _of_lower_orders(
     high = max(interval[1], *(last / unit for _, last in ends))
     least, most = best[min(best)], rows[0]
     above, left = (100 * residual_ratio(data, fits[key_of(row)]) for row in (least, most))
-    systematic = flagged(
-        "systematic_error",
-        least=least.order,
-        left_by_least=above,
-        most=most.order,
-        left_by_most=left,
-    )
-    return (low, high), [systematic]
+    orders, shares = (least.order, most.order), {"left_by_least": above, "left_by_most": left}
+    return (low, high), [flagged("systematic_error", least=orders[0], most=orders[1], **shares)]
 
 
 def _cover(

@@ -192,10 +192,7 @@ def _model_content(model: Model) -> dict[str, Any]:
             delays["transfer_function"] = True
     else:
         core = model.delay_free
-        delays = {
-            "input_delays": list(model.input_delays),
-            "output_delays": list(model.output_delays),
-        }
+        delays = {end: list(getattr(model, end)) for end in ("input_delays", "output_delays")}
     states = core.state_labels
     named = states != [f"x[{i}]" for i in range(core.nstates)]
     return {

@@ -96,12 +96,10 @@ class DelayRobustness(Result):
 
     def _inside(self) -> BoolArray:
         low, high = self.dead_time_interval
-        if not self.dt:
-            inside = (self.delays >= low) & (self.delays <= high)
-            return np.asarray(inside | (self.delays == self.nominal), dtype=np.bool_)
-        inside = (self.delays >= np.floor((low + self.fractional_time) / self.dt + 1e-9)) & (
-            self.delays <= np.ceil((high + self.fractional_time) / self.dt - 1e-9)
-        )
+        if self.dt:
+            low = np.floor((low + self.fractional_time) / self.dt + 1e-9)
+            high = np.ceil((high + self.fractional_time) / self.dt - 1e-9)
+        inside = (self.delays >= low) & (self.delays <= high)
         return np.asarray(inside | (self.delays == self.nominal), dtype=np.bool_)
 
     def table(self) -> pd.DataFrame:

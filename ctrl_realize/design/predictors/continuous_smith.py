@@ -8,7 +8,7 @@ import control as ct
 import numpy as np
 
 from ..._checks import positive
-from ...delayed import DelaySystem
+from ...delayed import DelaySystem, delay
 from ...errors import OptionError, UnsuitableSystemError
 from ..loops.loop_check import loop_check, refuse_unstable, warn_of
 from ..siso import core_and_dead_time, proper_ss
@@ -53,7 +53,9 @@ def continuous_smith_predictor(
     filtered: Any = 1.0
     if filter_time is not None:
         filtered = ct.ss(ct.tf([1], [positive(filter_time, "filter_time", "time in s"), 1]))
-    late = filtered * _delay(dead_time)
+    if dead_time == 0:
+        raise OptionError("the plant has no dead time to predict over; use the controller itself")
+    late = filtered * delay(dead_time)
     # the inner loop sees G (1 - F exp(-tau s)), with one G
     made = (DelaySystem(ct.ss(primary))).feedback((1 - late) * core) * filtered
     check = loop_check(plant, made)
@@ -61,9 +63,3 @@ def continuous_smith_predictor(
     warn_of(check, more_robust(filter_time, dead_time))
     names = {"inputs": ["e"], "outputs": plant.input_labels, "name": name}
     return DelaySystem(made.core, made.internal_delays, **names)
-
-
-def _delay(dead_time: float) -> DelaySystem:
-    if dead_time == 0:
-        raise OptionError("the plant has no dead time to predict over; use the controller itself")
-    return DelaySystem(ct.StateSpace([], [], [], [[0.0, 1.0], [1.0, 0.0]], 0), [dead_time])

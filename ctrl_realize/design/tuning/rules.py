@@ -71,13 +71,10 @@ def imc(model: ProcessModel, kind: str, closed_loop_time: float | None) -> Param
     theta, tau = model.dead_time, model.lag
     fallback = (0.8 if kind == "PID" else 1.7) * theta
     target = max(fallback, 0.1 * tau) if closed_loop_time is None else closed_loop_time
+    ti = tau + theta / 2
     if kind == "PI":
-        return (2 * tau + theta) / (2 * model.gain * target), tau + theta / 2, 0.0
-    return (
-        (2 * tau + theta) / (2 * model.gain * (target + theta / 2)),
-        tau + theta / 2,
-        tau * theta / (2 * tau + theta),
-    )
+        return ti / (model.gain * target), ti, 0.0
+    return ti / (model.gain * (target + theta / 2)), ti, tau * theta / (2 * ti)
 
 
 def amigo(model: ProcessModel, kind: str, closed_loop_time: float | None) -> Parameters:
@@ -99,9 +96,8 @@ def ziegler_nichols(model: ProcessModel, kind: str, closed_loop_time: float | No
     """Ziegler and Nichols (1942), from the step response: quarter-amplitude damping."""
     L = _dead_time(model, "ziegler_nichols")
     a = model.gain * L if model.integrating else model.gain * L / model.lag
-    return {"P": (1 / a, INF, 0.0), "PI": (0.9 / a, L / 0.3, 0.0), "PID": (1.2 / a, 2 * L, L / 2)}[
-        kind
-    ]
+    rows = {"P": (1 / a, INF, 0.0), "PI": (0.9 / a, L / 0.3, 0.0), "PID": (1.2 / a, 2 * L, L / 2)}
+    return rows[kind]
 
 
 def cohen_coon(model: ProcessModel, kind: str, closed_loop_time: float | None) -> Parameters:

@@ -100,10 +100,8 @@ def _by_worker(path: Path, max_bytes: float, kind: str) -> dict[str, AnyArray]:
 
 def _is_version_4(head: bytes) -> bool:
     """Whether a file begins with type, size and name length of a matrix of version 4."""
-    words = head[:20]
-    for order in ("<i4", ">i4"):
-        if len(words) == 20:
-            kind, rows, columns, imaginary, letters = np.frombuffer(words, order)
-            if 0 <= kind < 5000 and min(rows, columns) >= 0 and imaginary in (0, 1) and letters > 0:
-                return True
+    for order in ("<i4", ">i4") if len(head) >= 20 else ():
+        kind, rows, columns, imaginary, letters = np.frombuffer(head[:20], order)
+        if 0 <= kind < 5000 and min(rows, columns) >= 0 and imaginary in (0, 1) and letters > 0:
+            return True
     return False

@@ -72,13 +72,26 @@ def long_samples(
     rules: Rules,
 ) -> Samples:
     """Samples of the chosen tags of a long table, each at its own stamps."""
-    tags = list(long.rows)
+    tags, seconds, (first, last) = list(long.rows), axis.seconds, span
+
+    def series_of(k: int, *, holds: bool) -> tuple[FloatArray, FloatArray]:
+        """Stamps and values of one tag in the order of time; of equal stamps the last one holds."""
+        rows = long.rows[tags[k]]
+        rows = rows[np.argsort(seconds[rows], kind="stable")]
+        rows = rows[np.r_[np.diff(seconds[rows]) != 0, True]]
+        inside = (seconds[rows] >= first) & (seconds[rows] <= last)
+        if holds and rows.size:
+            # what was set before the part begins still holds there
+            before = np.flatnonzero(seconds[rows] < first)
+            inside[before[-1:]] = True
+        rows = rows[inside]
+        values = rules.values(table, long.value, rows)
+        known = ~np.isnan(values)  # a sample without a value is no sample
+        return np.maximum(seconds[rows][known], first), values[known]
+
     both = []
     for chosen in (parts.inputs, parts.outputs):
-        series = [
-            _series(table, long, tags[k], axis.seconds, rules, span, holds=chosen is parts.inputs)
-            for k in chosen
-        ]
+        series = [series_of(k, holds=chosen is parts.inputs) for k in chosen]
         time = np.unique(np.concatenate([stamps for stamps, _ in series]))
         values = np.full((len(series), time.size), np.nan)
         for row, (stamps, numbers) in zip(values, series, strict=True):
@@ -91,44 +104,14 @@ def long_samples(
         input = np.concatenate([input, input[..., -1:]], axis=-1)
     reference = None
     if parts.references:
-        wanted = [
-            held(*_series(table, long, tags[k], axis.seconds, rules, span, holds=True), time)
-            for k in parts.references
-        ]
+        wanted = [held(*series_of(k, holds=True), time) for k in parts.references]
         reference = _stacked(wanted)
         if parts.mode is not None:
             rows = long.rows[tags[parts.mode]]
-            rows = rows[np.argsort(axis.seconds[rows], kind="stable")]
+            rows = rows[np.argsort(seconds[rows], kind="stable")]
             manual = in_manual(table.rows(rows, [long.value]), long.value)
-            reference[..., held(axis.seconds[rows], manual, time) == 1] = np.nan
+            reference[..., held(seconds[rows], manual, time) == 1] = np.nan
     return Samples(time, input, output, input_time, "sample {}".format, reference)
-
-
-def _series(
-    table: Table,
-    long: LongTable,
-    tag: str,
-    seconds: FloatArray,
-    rules: Rules,
-    span: tuple[float, float],
-    *,
-    holds: bool,
-) -> tuple[FloatArray, FloatArray]:
-    """Stamps and values of one tag in the order of time; of equal stamps the last one holds."""
-    rows = long.rows[tag]
-    rows = rows[np.argsort(seconds[rows], kind="stable")]
-    stamps = seconds[rows]
-    rows = rows[np.r_[np.diff(stamps) != 0, True]]
-    first, last = span
-    inside = (seconds[rows] >= first) & (seconds[rows] <= last)
-    if holds and rows.size:
-        # what was set before the part begins still holds there
-        before = np.flatnonzero(seconds[rows] < first)
-        inside[before[-1:]] = True
-    rows = rows[inside]
-    values = rules.values(table, long.value, rows)
-    known = ~np.isnan(values)  # a sample without a value is no sample
-    return np.maximum(seconds[rows][known], first), values[known]
 
 
 def span_of(start: Any, stop: Any, axis: TimeAxis) -> tuple[float, float]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import codecs
 import math
 import re
+from functools import partial
 from itertools import islice
 from pathlib import Path
 from typing import Any
@@ -50,13 +51,8 @@ def read_delimited(source: TextSource, options: TextOptions) -> Table:
     if len(columns) > 1 and not columns[-1].name and _is_blank(columns[-1].cells):
         # every line ends in a delimiter
         columns.pop()
-    return Table(
-        path,
-        tuple(columns),
-        layout.sample_times,
-        layout.decimal,
-        lambda row: _place(source, layout, row),
-    )
+    place = partial(_place, source, layout)
+    return Table(path, tuple(columns), layout.sample_times, layout.decimal, place)
 
 
 def _parse(source: TextSource, layout: TextLayout) -> Any:
