@@ -86,10 +86,8 @@ class Achieved(Result):
             rows.append(("structures not ruled out included", amount(want, every)))
         if want == "dead_time":
             rows.append((self.fit.interval_label, interval_in_time(*self.fit.interval)))
-        return [
-            *rows,
-            ("model", f"order {self.fit.order}, residual {plainly(self.fit.residual, 3)}"),
-        ]
+        model = f"order {self.fit.order}, residual {plainly(self.fit.residual, 3)}"
+        return [*rows, ("model", model)]
 
 
 def achieved(plan: ExperimentPlan, record: Record, **options: Any) -> Achieved:

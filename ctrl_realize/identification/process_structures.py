@@ -114,10 +114,8 @@ def requested(given: Structures | None) -> Requested:
     pairs: list[Structure] = []
     forms: list[ProcessForm] = []
     for one in several:
-        if isinstance(one, str):
-            forms.append(ProcessStructure(one)._checked())
-        elif isinstance(one, ProcessStructure):
-            forms.append(one._checked())
+        if isinstance(one, str | ProcessStructure):
+            forms.append((ProcessStructure(one) if isinstance(one, str) else one)._checked())
         else:
             pairs.append(_pair(one))
     if not pairs and not forms:

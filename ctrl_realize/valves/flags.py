@@ -36,10 +36,9 @@ def flags_of(
         yield flagged("not_settled.valve", unsettled=unsettled, count=len(steps))
     known = [one for one in groups if one.estimates["dead_time"].is_known and not one.stroke]
     if len(known) > 1:
-        times = np.array([one.estimates["dead_time"].value for one in known])
-        errors = np.array(
-            [(one.estimates["dead_time"].high - one.estimates["dead_time"].low) for one in known]
-        ) / (2 * Z_95)
+        found = [one.estimates["dead_time"] for one in known]
+        times = np.array([one.value for one in found])
+        errors = np.array([one.high - one.low for one in found]) / (2 * Z_95)
         chance = homogeneity(times, errors)[1]
         late, early = (
             f"{one.size:.3g} % {one.direction}"

@@ -159,9 +159,8 @@ def _bracket(pairs: list[tuple[float, float]]) -> Interval:
     low, high = float(lows.max()), float(highs.min())
     if low < high:
         return Interval(0.5 * (low + high), low, high, len(pairs))
-    return Interval(
-        float(np.mean(lows + highs)) / 2, float(lows.min()), float(highs.max()), len(pairs)
-    )
+    middle = float(np.mean(lows + highs)) / 2
+    return Interval(middle, float(lows.min()), float(highs.max()), len(pairs))
 
 
 def static_curve(
@@ -195,6 +194,7 @@ def _binned(
     low = min(float(command.min()) for command, _, _ in points)
     high = max(float(command.max()) for command, _, _ in points)
     ends = np.linspace(low, high, _BINS + 1)
+    middle = 0.5 * (ends[1:] + ends[:-1])
     curves, fewest = [], np.inf
     for way in (1, -1):
         own = [(command, output) for command, output, sign in points if sign == way]
@@ -205,7 +205,6 @@ def _binned(
             place = np.clip(np.digitize(command, ends) - 1, 0, _BINS - 1)
             count = np.bincount(place, minlength=_BINS)
             # the position at the middle of the bin, whatever the samples in it
-            middle = 0.5 * (ends[1:] + ends[:-1])
             slope = slope_of(command, output)
             output = output - slope * (command - middle[place])
             total = np.bincount(place, weights=output, minlength=_BINS)
@@ -213,7 +212,6 @@ def _binned(
             curve[full] = total[full] / count[full]
             fewest = min(fewest, float(np.median(count)))
         curves.append(curve)
-    middle = 0.5 * (ends[1:] + ends[:-1])
     # near its ends a ramp has not reached its steady speed, and the play is not crossed
     inner = (middle > low + 0.05 * (high - low)) & (middle < high - 0.05 * (high - low))
     if not inner.any() or not np.isfinite(curves).any():

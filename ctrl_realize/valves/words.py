@@ -28,13 +28,11 @@ def in_words(one: Interval, unit: str) -> tuple[str, str]:
         return "unknown", ""
     if not np.isfinite([one.low, one.high]).all():
         return (in_time(one.value) if unit == "s" else f"{one.value:.4g} {unit}"), ""
+    ends = one.low, one.high
     if unit == "s":
-        return (
-            time_within(one.value, one.low, one.high),
-            f"({interval_in_time(one.low, one.high)})",
-        )
-    ends = " to ".join(numbers_alike((one.low, one.high), one.low, one.high))
-    return f"{number_within(one.value, one.low, one.high)} {unit}", f"({ends} {unit})"
+        return time_within(one.value, *ends), f"({interval_in_time(*ends)})"
+    said = " to ".join(numbers_alike(ends, *ends))
+    return f"{number_within(one.value, *ends)} {unit}", f"({said} {unit})"
 
 
 def where_in_words(one: Metric) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Sequence
+from functools import partial
 from typing import Literal
 
 import numpy as np
@@ -16,7 +17,7 @@ from ...data.impulse_estimate import ImpulseEstimate
 from ...errors import DataWarning
 from ...numerics.blas_threads import single_threaded
 from ...numerics.signals.onset import correlation_onset
-from .estimator import Choice, choose_estimate
+from .estimator import choose_estimate
 from .regression import PulseRegression, through_arx, with_prior, without_prior
 
 Method = Literal["auto", "regularized", "least_squares", "okid"]
@@ -138,8 +139,14 @@ def impulse_from_io(
     else:
         count = integer(length, "length", 2)
     chosen = choose_estimate(group, count, start) if method == "auto" else None
+    kernels: tuple[str, ...] = (kernel,) * group[0].noutputs
+    if chosen is not None and kernel == "auto":
+        kernels = chosen.kernels
+    estimators = {"okid": through_arx, "least_squares": without_prior}
+    way = method if chosen is None else chosen.method
+    estimate = estimators.get(way, partial(with_prior, kernels=kernels))
     while True:
-        found = _estimate(group, count, start, chosen, method, kernel)
+        found = estimate(group, count, start)
         tail = _tail_flags(found)
         if length is not None or not tail or count == most:
             break
@@ -177,26 +184,6 @@ def _latest_onset(group: tuple[Record, ...], lags: int) -> int:
         if np.ptp(row) > 0
     ]
     return max([0, *onsets])
-
-
-def _estimate(
-    group: tuple[Record, ...],
-    count: int,
-    start: str,
-    chosen: Choice | None,
-    method: str,
-    kernel: str,
-) -> PulseRegression:
-    """Estimate by the requested or the chosen method."""
-    kernels = (kernel,) * group[0].noutputs
-    if chosen is not None:
-        method = chosen.method
-        kernels = chosen.kernels if kernel == "auto" else kernels
-    if method == "okid":
-        return through_arx(group, count, start)
-    if method == "least_squares":
-        return without_prior(group, count, start)
-    return with_prior(group, count, start, kernels)
 
 
 def _tail_flags(found: PulseRegression) -> tuple[Flag, ...]:

@@ -185,15 +185,11 @@ def _check_signals(group: Sequence[Record], feedthrough: bool | None) -> None:
                 f"record {i} has missing samples in its input; use the parts between the gaps "
                 "as records, or impulse_from_io"
             )
-    signals = {
-        "input": [np.atleast_2d(record.input) for record in group],
-        "output": [np.atleast_2d(record.output) for record in group],
-    }
-    for name, known in signals.items():
+    for name in ("input", "output"):
+        known = [np.atleast_2d(getattr(record, name)) for record in group]
         # Without a copy of a long record: the largest magnitude is at an end of the range.
-        ends = [np.fmax.reduce(x, axis=1) for x in known] + [
-            -np.fmin.reduce(x, axis=1) for x in known
-        ]
+        ends = [*(np.fmax.reduce(x, axis=1) for x in known)]
+        ends += [-np.fmin.reduce(x, axis=1) for x in known]
         size = np.fmax.reduce(ends, axis=0)
         if np.any(size < SMALLEST):
             raise DataError(

@@ -108,14 +108,8 @@ class Search:
         self._markov = markov
         self._top = top
         u, y = (
-            np.concatenate(
-                [
-                    np.atleast_2d(x) - np.nanmean(np.atleast_2d(x), axis=1, keepdims=True)
-                    for x in signals
-                ],
-                axis=1,
-            )
-            for signals in ([r.input for r in group], [r.output for r in group])
+            np.hstack([x - np.nanmean(x, axis=1, keepdims=True) for x in map(np.atleast_2d, rows)])
+            for rows in ([r.input for r in group], [r.output for r in group])
         )
         self._samples = u.shape[1]
         self._size_in, self._size_out = u.std(axis=1), np.nanstd(y, axis=1)

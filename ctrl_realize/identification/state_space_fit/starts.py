@@ -129,16 +129,10 @@ def _from_start(
 
 def _marginal(others: Sequence[Candidate]) -> Iterator[Flag]:
     """Flag a choice so close that rounding may change it."""
-    if not others:
-        return
-    one = others[0]
-    yield flagged(
-        "marginal_decision.state_space",
-        order=one.order,
-        inputs=one.inputs,
-        outputs=one.outputs,
-        feedthrough="and" if one.feedthrough else "and no",
-    )
+    for one in others[:1]:
+        delays = {"inputs": one.inputs, "outputs": one.outputs}
+        own = "and" if one.feedthrough else "and no"
+        yield flagged("marginal_decision.state_space", order=one.order, feedthrough=own, **delays)
 
 
 def _silence(best: Candidate) -> tuple[Flag, ...]:

@@ -191,15 +191,12 @@ def unit_step(
 def _single(signal: FloatArray, what: str, record: Record) -> FloatArray:
     (check_input if what == "input" else check_complete)(record, "a step response")
     if signal.ndim == 2 and signal.shape[0] > 1:
+        labels = record.input_labels if what == "input" else record.output_labels
         raise DataError(
-            f"the record has {signal.shape[0]} {what}s ({', '.join(_labels(record, what))}); "
+            f"the record has {signal.shape[0]} {what}s ({', '.join(labels)}); "
             "a step response has one; select it when the record is made"
         )
     return signal if signal.ndim == 1 else signal[0]
-
-
-def _labels(record: Record, what: str) -> tuple[str, ...]:
-    return record.input_labels if what == "input" else record.output_labels
 
 
 def _of(record: Record) -> str:
