@@ -9,7 +9,7 @@ import control as ct
 from ..errors import OptionError
 from ..numerics.internal_delays.form import DelayForm, delayed_ends
 from .operators import DelayOperators
-from .parts import CoreAndDelays, named
+from .parts import CoreAndDelays, named, signals_of
 
 _ENDS = ("prefix", "suffix")
 
@@ -23,12 +23,7 @@ class DelayedAlgebra(CoreAndDelays, DelayOperators):
         return delayed_ends(form, self.input_delays, self.output_delays)
 
     def _around(self, core: ct.StateSpace, **changes: Any) -> Self:
-        settings: dict[str, Any] = {
-            "output_delay": self.output_delays,
-            "inputs": self.input_labels,
-            "outputs": self.output_labels,
-        }
-        settings.update(changes)
+        settings = {"output_delay": self.output_delays, **signals_of(self), **changes}
         states = self._core_states()
         if len(states) == core.nstates:  # python-control numbers the states again
             core = named(core, core.input_labels, core.output_labels, states)
@@ -54,8 +49,7 @@ class DelayedAlgebra(CoreAndDelays, DelayOperators):
             chosen,
             delay=tuple(self.input_delays[j] for j in inputs),
             output_delay=tuple(self.output_delays[i] for i in outputs),
-            inputs=chosen.input_labels,
-            outputs=chosen.output_labels,
+            **signals_of(chosen),
             name=f"{prefix}{self.name}{suffix}",
         )
 

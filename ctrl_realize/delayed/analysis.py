@@ -10,7 +10,7 @@ from ..numerics.arrays import ComplexArray, FloatArray
 from ..numerics.internal_delays.dominant import largest
 from ..numerics.internal_delays.form import DelayForm
 from ..numerics.state_space.responses import markov
-from .parts import CoreAndDelays
+from .parts import CoreAndDelays, signals_of
 
 
 class DelayedAnalysis(CoreAndDelays):
@@ -67,9 +67,8 @@ class DelayedAnalysis(CoreAndDelays):
             [[_numerator(den, channel) for channel in row] for row in pulses],
             [[np.concatenate([den, np.zeros(delay)]) for delay in row] for row in total],
             self.dt,
-            inputs=self.input_labels,
-            outputs=self.output_labels,
             name=self.name,
+            **signals_of(self),
         )
 
 

@@ -14,7 +14,7 @@ from ..errors import DelayRangeError, OptionError, UnsuitableSystemError
 from ..numerics.state_space.sampling import sample_with_dead_time, split_dead_time
 from ..results import ModelFit
 from .operands import check_proper
-from .parts import MAX_DELAY, check_core
+from .parts import MAX_DELAY, check_core, signals_of
 from .system import DelayedStateSpace
 
 
@@ -115,13 +115,7 @@ def delayed_ss(
                 f"sampled every {step:g} s the core has non-finite entries; its poles reach "
                 f"{np.abs(system.poles()).max(initial=0.0):.3g} rad/s: use a shorter dt"
             )
-        discrete = ct.StateSpace(
-            *sampled,
-            step,
-            inputs=system.input_labels,
-            outputs=system.output_labels,
-            remove_useless_states=False,
-        )
+        discrete = ct.StateSpace(*sampled, step, remove_useless_states=False, **signals_of(system))
         return made(discrete, samples if delay is None else delay)
     check_core(system)
     if dt is not None and not np.isclose(positive(dt, "dt", "sample time in s"), system.dt):

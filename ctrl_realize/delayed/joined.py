@@ -12,6 +12,7 @@ from ..errors import UnsuitableSystemError
 from ..numerics.internal_delays import form as forms
 from .inside.system import DelaySystem
 from .operands import common_dt, core_states, form_of
+from .parts import stand_in
 
 
 def interconnect(systems: Sequence[Any], *args: Any, **settings: Any) -> Any:
@@ -50,11 +51,10 @@ def interconnect(systems: Sequence[Any], *args: Any, **settings: Any) -> Any:
     <DelaySystem: r -> y, u, order 2, internal delay 30 samples, dt = 0.01 s>
     """
     dt = _time_base(systems)
-    stand_ins = [_stand_in(system) for system in systems]
-    wired = ct.interconnect(stand_ins, *args, **settings)
     all_ = form_of(systems[0])
     for system in systems[1:]:
         all_ = forms.append(all_, form_of(system))
+    wired = ct.interconnect([*map(stand_in, systems)], *args, **settings)
     gain, into = np.asarray(wired.connect_map), np.asarray(wired.input_map)
     # selection of the outputs, and the inputs u = gain y + into r
     seen = np.asarray(wired.output_map)
@@ -89,18 +89,3 @@ def _time_base(systems: Sequence[Any]) -> float:
     for system in known[1:]:
         common_dt(known[0], system)
     return float(common_dt(known[0], known[-1]) or 0.0)
-
-
-def _stand_in(system: Any) -> ct.StateSpace:
-    """Make a system without dynamics with the names of another one."""
-    form = form_of(system)
-    return ct.StateSpace(
-        form.A[:0, :0],
-        np.zeros((0, form.inputs)),
-        np.zeros((form.outputs, 0)),
-        np.zeros((form.outputs, form.inputs)),
-        system.dt,
-        name=system.name,
-        inputs=system.input_labels,
-        outputs=system.output_labels,
-    )

@@ -28,6 +28,7 @@ from .operands import (
     product,
     shapes,
 )
+from .parts import signals_of
 
 ENDS, INSIDE = "ends", "inside"
 
@@ -224,8 +225,8 @@ class BesideDelays(ct.StateSpace):  # type: ignore[misc]  # control is untyped
         if not isinstance(other, DelayOperators):
             return super().feedback(other, sign)
         inside = DelayOperators._kinds[INSIDE]
-        names = {"inputs": self.input_labels, "outputs": self.output_labels}
-        return inside(plain(form_of(self), self.dt), (), **names).feedback(other, sign)
+        own = inside(plain(form_of(self), self.dt), (), **signals_of(self))
+        return own.feedback(other, sign)
 
 
 def algebraic(what: str) -> UnsuitableSystemError:

@@ -77,6 +77,17 @@ class CoreAndDelays(DeferredMatrices):
         return self.delay * self.dt
 
 
+def signals_of(system: Any) -> dict[str, Any]:
+    """Names of the inputs and outputs of a system or record, as keywords of a new system."""
+    return {"inputs": list(system.input_labels), "outputs": list(system.output_labels)}
+
+
+def stand_in(system: Any) -> ct.StateSpace:
+    """Make a system without dynamics with the names of another one, for python-control."""
+    ends = np.zeros((system.noutputs, system.ninputs))
+    return ct.StateSpace([], [], [], ends, system.dt, name=system.name, **signals_of(system))
+
+
 def named(
     core: ct.StateSpace,
     inputs: Sequence[str],

@@ -25,7 +25,7 @@ from .analysis import DelayedAnalysis
 from .cards import DelayedCards
 from .chains import parse_delays
 from .operators import ENDS
-from .parts import MAX_DELAY, check_core, named, parts_of, signal_names, with_core
+from .parts import MAX_DELAY, check_core, named, parts_of, signal_names, signals_of, with_core
 from .responses import DelayedResponses
 
 AnyFit = TypeVar("AnyFit", bound=ModelFit)
@@ -172,14 +172,8 @@ class DelayedStateSpace(
         return copy
 
     def _settings(self) -> dict[str, Any]:
-        return {
-            "delay": self.input_delays,
-            "output_delay": self.output_delays,
-            "fit": self.fit,
-            "name": self.name,
-            "inputs": self.input_labels,
-            "outputs": self.output_labels,
-        }
+        delays = {"delay": self.input_delays, "output_delay": self.output_delays}
+        return {**delays, "fit": self.fit, "name": self.name, **signals_of(self)}
 
     def _made_by(self) -> tuple[Any, ...]:
         return with_core, (type(self), *parts_of(self.delay_free)), self._settings()

@@ -14,6 +14,7 @@ import numpy as np
 from ..delayed import DelaySystem, exp, interconnect
 from ..delayed.operands import common_dt, form_of, is_linear, plain
 from ..delayed.operators import DelayOperators
+from ..delayed.parts import signals_of
 from .loops.gang_of_four import gang_of_four
 from .loops.root_locus import root_locus
 
@@ -156,7 +157,7 @@ def _with_delays(original: Call) -> Call:
 
 def _delayed(system: Any, beside: Any) -> Any:
     """Make a system with delays, of which it has none, so that its operators are exact."""
-    names = {"inputs": system.input_labels, "outputs": system.output_labels, "name": system.name}
+    names = {**signals_of(system), "name": system.name}
     form, sizes = form_of(system), (beside.ninputs, beside.noutputs)
     if (form.states, form.inputs, form.outputs) == (0, 1, 1) and sizes != (1, 1):
         # the number 1 in ct.feedback(1, L), which python-control has made a system

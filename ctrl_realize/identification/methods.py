@@ -170,10 +170,11 @@ def identify(
     >>> isinstance(sys, ct.StateSpace), round(sys.fit.dead_time, 3)
     (True, 0.125)
     """
+    said = locals()
     options = {
-        name: value
-        for name, value in locals().items()
-        if name in _DEFAULTS and not _is_default(value, _DEFAULTS[name])
+        name: said[name]
+        for name, default in _DEFAULTS.items()
+        if said[name] is not default and not (isinstance(said[name], str) and said[name] == default)
     }
     models = frf is not None, structures is not None
     name, fit = _fit_of(one_of(method, "method", METHODS), record, *models)
@@ -199,10 +200,6 @@ _DEFAULTS = {
 }
 """Arguments that only some methods take."""
 _OUTPUT_ERROR = "method='output_error'"
-
-
-def _is_default(value: object, default: object) -> bool:
-    return value is default or (isinstance(value, str) and value == default)
 
 
 def _fit_of(

@@ -10,6 +10,7 @@ import numpy as np
 
 from ..data import Record, StepResponse
 from ..delayed import DelayedStateSpace, fit_of
+from ..delayed.parts import signals_of
 from ..errors import DelayRangeError
 from ..numerics.arrays import FloatArray
 from ..paper import SETTINGS
@@ -102,7 +103,7 @@ def _named(
     names: dict[str, Any] = {"fit": replace(fit_of(system, DelayScan), choices=tuple(choices))}
     record = step.record
     if record is not None:
-        names |= {"inputs": list(record.input_labels), "outputs": list(record.output_labels)}
+        names |= signals_of(record)
         if record.name:
             names["name"] = record.name
     return system.replace(**names)

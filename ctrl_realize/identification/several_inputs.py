@@ -29,6 +29,7 @@ from ..data import Record
 from ..data.given import as_records
 from ..data.shown_units import in_shown_units
 from ..delayed import DelayedStateSpace, fit_of
+from ..delayed.parts import signals_of
 from ..errors import DataError, DataWarning
 from ..numerics.arrays import BoolArray, FloatArray
 from ..numerics.blas_threads import single_threaded
@@ -235,7 +236,4 @@ def _joined(systems: Sequence[DelayedStateSpace], result: SeveralInputsFit) -> D
     whole: Any = reduce(lambda some, one: some.append(one), systems)
     total: DelayedStateSpace = np.ones((1, len(systems))) * whole
     record = result.records[0]
-    return total.replace(
-        fit=result, name=record.name or None, inputs=list(record.input_labels),
-        outputs=list(record.output_labels),
-    )  # fmt: skip
+    return total.replace(fit=result, name=record.name or None, **signals_of(record))

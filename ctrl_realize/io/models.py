@@ -15,6 +15,7 @@ import numpy as np
 from .._facts import version_of
 from ..delayed import DelayedStateSpace, DelaySystem
 from ..delayed.inside.pure import TransferDelay
+from ..delayed.parts import signals_of
 from ..errors import CtrlRealizeError, FileFormatError, OptionError
 from .atomic import write_text
 from .checks import usable_file
@@ -197,8 +198,7 @@ def _model_content(model: Model) -> dict[str, Any]:
     named = states != [f"x[{i}]" for i in range(core.nstates)]
     return {
         "name": model.name,
-        "inputs": list(model.input_labels),
-        "outputs": list(model.output_labels),
+        **signals_of(model),
         **({"states": states} if named else {}),
         "order": core.nstates,
         "dt": None if core.dt is None else float(core.dt),

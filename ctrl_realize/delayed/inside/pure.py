@@ -11,6 +11,7 @@ from ..._checks import positive, real
 from ...errors import DelayRangeError, UnsuitableSystemError
 from ...numerics.state_space.sampling import split_dead_time
 from ..operators import ENDS
+from ..parts import signals_of
 from .checks import not_rational
 from .system import DelaySystem
 
@@ -47,8 +48,7 @@ class TransferDelay(DelaySystem, _InName):
         """Keep the class of the product of a pure dead time and a transfer function."""
         if self._core.nstates or not isinstance(other, ct.TransferFunction):
             return made
-        names = {"inputs": made.input_labels, "outputs": made.output_labels}
-        return type(self)(made.core, made.internal_delays, **names)
+        return type(self)(made.core, made.internal_delays, **signals_of(made))
 
 
 def delay(dead_time: float, dt: float | None = None, *, name: str | None = None) -> Any:

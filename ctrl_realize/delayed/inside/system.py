@@ -14,14 +14,13 @@ import control as ct
 import numpy as np
 
 from ..._checks import real, system_name
-from ...numerics.arrays import IntArray
 from ...numerics.internal_delays.form import DelayForm
 from ...numerics.internal_delays.merging import ends_apart
 from ...numerics.internal_delays.response import Response
 from ..chains import Matrices
 from ..operands import plain
 from ..operators import INSIDE, DelayOperators
-from ..parts import named, parts_of, signal_names, with_core
+from ..parts import named, parts_of, signal_names, signals_of, stand_in, with_core
 from .cards import InsideCards
 from .checks import check_core, check_delays, not_rational, without_zeros
 from .conversions import InsideConversions
@@ -148,9 +147,8 @@ class DelaySystem(InsideResponses, InsideConversions, InsideCards, DelayOperator
             In samples, or s in continuous time.
         """
         before, behind, rest = ends_apart(self._form())
-        core = plain(rest, self.dt)
-        names = {"inputs": self.input_labels, "outputs": self.output_labels}
-        return DelaySystem(core, rest.delays, **names), before[0] + behind[0]
+        made = DelaySystem(plain(rest, self.dt), rest.delays, **signals_of(self))
+        return made, before[0] + behind[0]
 
     def _make_matrices(self) -> Matrices:
         if not self.dt and self.internal_delays:
@@ -175,7 +173,7 @@ class DelaySystem(InsideResponses, InsideConversions, InsideCards, DelayOperator
 
     def __getitem__(self, key: Any) -> Self:
         """Select channels, by number or name."""
-        chosen = _ends_of(self)[key]
+        chosen = stand_in(self)[key]
         rows = [self.output_index[name] for name in chosen.output_labels]
         columns = [self.input_index[name] for name in chosen.input_labels]
         q = len(self.internal_delays)
@@ -196,17 +194,6 @@ class DelaySystem(InsideResponses, InsideConversions, InsideCards, DelayOperator
         return self._joined(self._form(), self.dt, self.input_labels, self.output_labels)
 
     def _made_by(self) -> tuple[Any, ...]:
-        settings = {
-            "internal_delays": self.internal_delays,
-            "name": self.name,
-            "inputs": self.input_labels,
-            "outputs": self.output_labels,
-        }
+        names = {"name": self.name, **signals_of(self)}
+        settings = {"internal_delays": self.internal_delays, **names}
         return with_core, (type(self), *parts_of(self._core)), settings
-
-
-def _ends_of(system: DelaySystem) -> ct.StateSpace:
-    """Make a gain with the names of a system, for indexing by python-control."""
-    ends: IntArray = np.zeros((system.noutputs, system.ninputs), dtype=np.int64)
-    names = {"inputs": system.input_labels, "outputs": system.output_labels}
-    return ct.StateSpace([], [], [], ends, system.dt, name=system.name, **names)

@@ -11,6 +11,7 @@ from scipy.linalg import block_diag
 
 from ..._checks import integer
 from ...delayed import DelayedStateSpace
+from ...delayed.parts import signals_of
 from ...errors import OrderError
 from ...numerics.arrays import FloatArray, read_only
 from ...numerics.blas_threads import single_threaded
@@ -203,14 +204,10 @@ def reduce(system: Any, order: int) -> DelayedStateSpace:
         kept_unstable=kept,
         error_bound=float(2 * values[n:].sum()),
     )
+    delays, names = (plant.input_delays, plant.output_delays), signals_of(plant)
+    name = f"{plant.name}_reduced"
     return DelayedStateSpace(
-        reduced,
-        plant.input_delays,
-        output_delay=plant.output_delays,
-        fit=fit,
-        name=f"{plant.name}_reduced",
-        inputs=plant.input_labels,
-        outputs=plant.output_labels,
+        reduced, delays[0], output_delay=delays[1], fit=fit, name=name, **names
     )
 
 

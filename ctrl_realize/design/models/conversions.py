@@ -14,6 +14,7 @@ from ..._wording import in_time
 from ...delayed import DelayedStateSpace, DelaySystem, delayed_ss
 from ...delayed.inside.conversions import check_logarithm
 from ...delayed.operands import plain
+from ...delayed.parts import signals_of
 from ...errors import OptionError, UnsuitableSystemError
 from ...numerics.arrays import FloatArray
 from ...numerics.blas_threads import single_threaded
@@ -100,7 +101,7 @@ class ContinuousModel(Result):
     def __reduce__(self) -> tuple[Any, ...]:
         # python-control's systems cannot be pickled.
         core = self.core
-        names = {"name": core.name, "inputs": core.input_labels, "outputs": core.output_labels}
+        names = {"name": core.name, **signals_of(core)}
         ends = self.input_delays, self.output_delays
         return _rebuild_model, ((core.A, core.B, core.C, core.D), names, *ends, self.dt)
 
@@ -110,13 +111,7 @@ class ContinuousModel(Result):
         core = self.core
         form = DelayForm(core.A, core.B, core.C, core.D)
         form = delayed_ends(form, self.input_delays, self.output_delays)
-        return DelaySystem(
-            plain(form, 0),
-            form.delays,
-            name=core.name,
-            inputs=core.input_labels,
-            outputs=core.output_labels,
-        )
+        return DelaySystem(plain(form, 0), form.delays, name=core.name, **signals_of(core))
 
     def pade(self, order: int = 5) -> ct.StateSpace:
         """Continuous system with each dead time as a Pade approximant, see `pade_ss`."""
@@ -201,14 +196,8 @@ def to_continuous(system: DelayedStateSpace) -> ContinuousModel:
     check_logarithm(core.A)
     ends = plant.input_delays, plant.output_delays
     matrices, before, behind = continuous_ends((core.A, core.B, core.C, core.D), dt, *ends)
-    continuous = ct.StateSpace(
-        *matrices,
-        0,
-        name=f"{plant.name}_continuous",
-        inputs=plant.input_labels,
-        outputs=plant.output_labels,
-        remove_useless_states=False,
-    )
+    names = {"name": f"{plant.name}_continuous", **signals_of(plant)}
+    continuous = ct.StateSpace(*matrices, 0, remove_useless_states=False, **names)
     return ContinuousModel(continuous, before, behind, dt)
 
 

@@ -17,6 +17,7 @@ import numpy as np
 from ..._checks import integer
 from ..._wording import in_time
 from ...delayed import DelayedStateSpace, fit_of
+from ...delayed.parts import signals_of
 from ...errors import DataError
 from ...numerics.arrays import FloatArray
 from ...numerics.statistics import TrimmedStatistics, trimmed_statistics
@@ -150,9 +151,7 @@ class Campaign(Result):
             feedthrough=scan.realization.feedthrough,
             hankel=scan.realization.hankel,
         )
-        return final.replace(
-            name=chosen.name, inputs=chosen.input_labels, outputs=chosen.output_labels
-        )
+        return final.replace(name=chosen.name, **signals_of(chosen))
 
     def _identified(self, row: CampaignRow) -> DelayedStateSpace:
         """The model of a row with its complete fit, of which a store keeps only a summary."""

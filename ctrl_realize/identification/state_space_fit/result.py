@@ -12,6 +12,7 @@ from ..._flags import Flag, flagged
 from ..._wording import in_percent, in_time, interval_in_time, rate_in_time, time_within
 from ...data import Record
 from ...delayed import DelayedStateSpace
+from ...delayed.parts import signals_of
 from ...numerics.arrays import FloatArray, read_only
 from ...numerics.constants import SMALLEST
 from ...numerics.state_space.balancing import balanced_truncation
@@ -213,9 +214,8 @@ def fitted_system(
         flags=(*flags, *drift, *seen.values(), *loop),
     )
     first = group[0]
-    labels = {"inputs": list(first.input_labels), "outputs": list(first.output_labels)}
     name = {"name": first.name} if first.name else {}
-    return system.replace(fit=fit, **labels, **name)
+    return system.replace(fit=fit, **signals_of(first), **name)
 
 
 def _without_drifts(best: Candidate, group: Sequence[Record]) -> tuple[list[Record], list[Flag]]:
