@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -143,15 +143,8 @@ def spectral_frf(
         found, dt = from_segments(stream, method, segment, window, overlap)
     frequency = found.frequency_hz
     response = found.response * np.exp(-2j * np.pi * frequency * delay * dt)
-    return MeasuredFRF(
-        response,
-        frequency,
-        coherence=found.coherence,
-        std=found.std,
-        repeats=found.repeats,
-        sample_time=dt,
-        name=name,
-    )
+    scatter: Any = {"coherence": found.coherence, "std": found.std, "repeats": found.repeats}
+    return MeasuredFRF(response, frequency, sample_time=dt, name=name, **scatter)
 
 
 def _aligned(records: Record | Iterable[Record], delay: int) -> Stream:

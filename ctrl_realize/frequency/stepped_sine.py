@@ -214,11 +214,5 @@ def _averaged(
             # No mean is subtracted: the number of bins corresponds to one repeat more.
             values_behind[k] = 1 + bins[these].sum()
         std[k] = np.sqrt(variance)
-    return MeasuredFRF(
-        response,
-        frequency,
-        coherence=coherence,
-        std=std,
-        repeats=float(values_behind.min()),
-        name=name,
-    )
+    behind = float(values_behind.min())
+    return MeasuredFRF(response, frequency, coherence=coherence, std=std, repeats=behind, name=name)

@@ -88,12 +88,11 @@ def data_loop(
     _check_points(points)
     omega, values, std, known = points.omega, points.response, points.std, 0.0
     if other is not None:
-        beside = _on_grid(other, omega)
-        values = values * beside.values
-        known = beside.delay
-        if integrators is None and beside.integrators:
-            integrators = beside.integrators + _read_integrators(omega, points.response)
-        std = None if std is None else std * np.abs(beside.values)
+        beside, known, count = _on_grid(other, omega)
+        values = values * beside
+        if integrators is None and count:
+            integrators = count + _read_integrators(omega, points.response)
+        std = None if std is None else std * np.abs(beside)
     # The known delay is removed before the rest is estimated.
     dead_time = known + dead_time_from_phase(omega, values * np.exp(1j * omega * known))
     phase = unwrap_with_dead_time(omega, values, dead_time) + omega * dead_time
@@ -130,26 +129,17 @@ def _check_points(points: MeasuredPoints) -> None:
         raise DataError("the response is 0 at some frequency; remove that point")
 
 
-@dataclass(frozen=True)
-class _Beside:
-    """The other part of a loop on the grid of the data; `delay` in s is its known delay."""
-
-    values: ComplexArray
-    delay: float = 0.0
-    integrators: int = 0
-
-
-def _on_grid(other: Any, omega: FloatArray) -> _Beside:
-    """Evaluate the other systems of the loop."""
+def _on_grid(other: Any, omega: FloatArray) -> tuple[ComplexArray, float, int]:
+    """Evaluate the other part of the loop, with its known delay in s and its integrators."""
     if not isinstance(other, ct.FrequencyResponseData):
         loop = open_loop(other)
-        return _Beside(loop(omega), loop.delay, loop.integrators())
+        return loop(omega), loop.delay, loop.integrators()
     points = _above_zero(other)
     if not np.array_equal(points.omega, omega):
         raise DataError(
             "the two responses have different frequencies; interpolate one of them first"
         )
-    return _Beside(points.response)
+    return points.response, 0.0, 0
 
 
 def _read_integrators(omega: FloatArray, values: ComplexArray) -> int:

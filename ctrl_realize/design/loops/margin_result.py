@@ -115,15 +115,12 @@ class Margins(Result):
             delay = "none: the closed loop is unstable"
         elif self.dt and np.isfinite(self.delay_margin):
             delay += f" = {self.delay_margin_samples:.4g} samples"
+        modulus = f"{self.modulus_margin:.4g} at {self.modulus_crossover:.4g}"
         rows = [
             ("closed loop", verdict),
             ("gain margin", _gain_in_words(self.gain_margin, self.phase_crossover)),
             ("phase margin", _phase_in_words(self.phase_margin, self.gain_crossover)),
-            (
-                "modulus margin",
-                f"{self.modulus_margin:.4g} at {self.modulus_crossover:.4g} rad/s "
-                f"(Ms = {self.ms:.4g})",
-            ),
+            ("modulus margin", f"{modulus} rad/s (Ms = {self.ms:.4g})"),
             ("delay margin", delay),
         ]
         for name, (low, high) in self.intervals.items():

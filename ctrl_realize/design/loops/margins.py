@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import control as ct
@@ -101,9 +101,7 @@ def margins(
     >>> round(1e3 * found.delay_margin, 1)
     121.2
     """
-    if isinstance(loop, ct.FrequencyResponseData) or isinstance(
-        controller, ct.FrequencyResponseData
-    ):
+    if any(isinstance(one, ct.FrequencyResponseData) for one in (loop, controller)):
         if dead_time:
             raise OptionError(
                 "dead_time is for continuous systems; for data, multiply them by exp(-j "
@@ -129,13 +127,10 @@ def margins(
 def loop_margins(loop: Loop) -> Margins:
     """Margins of a loop."""
     omega, values = follow(loop, loop.grid())
-    count, marginal = closed_loop_count(loop, omega, values)
-    crossings = _crossings(loop, omega, values, _from_the_start(loop, omega, values))
-    if loop.dt:
-        crossings = replace(crossings, phases=_with_ends(loop, crossings.phases))
-    plain = _collect(loop, crossings, count, marginal, loop.dt)
+    count, closest = closed_loop_count(loop, omega, values), _from_the_start(loop, omega, values)
+    plain = _collect(loop, omega, values, closest, *count, loop.dt)
     # So close to -1 the count is not reliable.
-    stable = plain.stable and crossings.distance > MARGINAL
+    stable = plain.stable and plain.modulus_margin > MARGINAL
     return replace(plain, stable=stable, delay_margin=plain.delay_margin if stable else np.nan)
 
 
@@ -147,25 +142,6 @@ def distance_if_stable(loop: Loop) -> float:
         return 0.0
     distance, _ = _from_the_start(loop, omega, values)
     return distance if distance > MARGINAL else 0.0
-
-
-@dataclass(frozen=True)
-class _Crossings:
-    """Find where a loop on the grid `omega` has gain 1, phase -180 deg, and is closest to -1."""
-
-    omega: FloatArray
-    values: ComplexArray
-    gains: FloatArray
-    phases: FloatArray
-    distance: float
-    closest: float
-
-
-def _crossings(
-    loop: Curve, omega: FloatArray, values: ComplexArray, closest: tuple[float, float]
-) -> _Crossings:
-    gains = unit_crossings(loop, omega, values)
-    return _Crossings(omega, values, gains, negative_axis_crossings(loop, omega, values), *closest)
 
 
 def _closest(loop: Curve, omega: FloatArray, values: ComplexArray) -> tuple[float, float]:
@@ -180,9 +156,8 @@ def _from_the_start(loop: Loop, omega: FloatArray, values: ComplexArray) -> tupl
     return (start, 0.0) if start < distance else (distance, closest)
 
 
-def _with_ends(loop: Loop, phases: FloatArray) -> FloatArray:
+def _with_ends(loop: Curve, phases: FloatArray, top: float) -> FloatArray:
     """Add omega = 0 and the Nyquist frequency if the real response there is negative."""
-    top = np.pi / loop.dt
     start = loop(np.zeros(1))[0]
     end = loop(np.array([top]))[0]
     if np.isfinite(start) and start.real < 0:
@@ -223,36 +198,45 @@ def _stability_flags(count: int, marginal: bool) -> tuple[Flag, ...]:
     return (flagged("unstable.loop", count=count),) if count else ()
 
 
-def _collect(loop: Curve, at: _Crossings, count: int, marginal: bool, dt: float) -> Margins:
-    """Compute the margins from the crossings of a loop whose unstable poles are counted."""
+def _collect(
+    loop: Curve, omega: FloatArray, values: ComplexArray, closest: tuple[float, float],
+    count: int, marginal: bool, dt: float,
+) -> Margins:  # fmt: skip
+    """Compute the margins of a loop whose unstable poles are counted, on the grid `omega`.
+
+    `closest` is its smallest distance to -1, and the frequency where it is reached.
+    """
+    gains = unit_crossings(loop, omega, values)
+    phases = negative_axis_crossings(loop, omega, values)
+    if dt:
+        phases = _with_ends(loop, phases, np.pi / dt)
     # -1 is at 180 deg: the angle of -L is the phase margin, in -180...180.
-    pm = np.degrees(np.angle(-loop(at.gains)))
-    gm = 1 / np.abs(loop(at.phases))
-    waits = np.where(pm < 0, pm + 360, pm) * np.pi / 180 / at.gains
+    pm = np.degrees(np.angle(-loop(gains)))
+    gm = 1 / np.abs(loop(phases))
+    waits = np.where(pm < 0, pm + 360, pm) * np.pi / 180 / gains
     stable = count == 0 and not marginal
     return Margins(
         gain_margin=float(gm[np.argmin(np.abs(np.log(gm)))]) if gm.size else float("inf"),
         phase_margin=float(pm[np.argmin(np.abs(pm))]) if pm.size else float("inf"),
-        modulus_margin=at.distance,
+        modulus_margin=closest[0],
         delay_margin=float(waits.min(initial=np.inf)) if stable else float("nan"),
         stable=stable,
         unstable_poles=count,
-        gain_crossovers=read_only(at.gains),
-        phase_crossovers=read_only(at.phases),
+        gain_crossovers=read_only(gains),
+        phase_crossovers=read_only(phases),
         phase_margins=read_only(pm),
         gain_margins=read_only(gm),
-        modulus_crossover=at.closest,
+        modulus_crossover=closest[1],
         dt=dt,
-        response=(read_only(at.omega), locked(at.values)),
+        response=(read_only(omega), locked(values)),
         flags=_stability_flags(count, marginal),
     )
 
 
 def _from_data(loop: DataLoop) -> Margins:
-    count, marginal = loop.closed_loop_count()
     omega, values = loop.dense()
-    crossings = _crossings(loop, omega, values, _closest(loop, omega, values))
-    plain = _collect(loop, crossings, count, marginal, 0.0)
+    closest = _closest(loop, omega, values)
+    plain = _collect(loop, omega, values, closest, *loop.closed_loop_count(), 0.0)
     plain = replace(plain, flags=(*plain.flags, *loop.flags()))
     if loop.std is None:
         return plain

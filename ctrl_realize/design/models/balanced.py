@@ -59,10 +59,7 @@ class BalancedReduction(ModelFit):
     error_bound: float
     choices: tuple[str, ...] = ()
     flags: tuple[Flag, ...] = ()
-    dead_time = None
-    delay = None
-    interval = None
-    delay_interval = None
+    dead_time = interval = delay = delay_interval = None
     records = ()
 
     _method = "balanced truncation"

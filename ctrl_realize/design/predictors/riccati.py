@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import Any
 
 import control as ct
 import numpy as np
@@ -38,18 +38,10 @@ def has_states(core: ct.StateSpace, purpose: str) -> None:
         )
 
 
-class RiccatiSolution(NamedTuple):
-    """Gain, cost matrix and closed-loop poles of a linear-quadratic problem."""
-
-    gain: FloatArray
-    cost: FloatArray
-    poles: ComplexArray
-
-
 def riccati(
     solver: Any, A: FloatArray, B: FloatArray, Q: FloatArray, R: FloatArray, weights: str
-) -> RiccatiSolution:
-    """Solve by `control.dlqr`.
+) -> tuple[FloatArray, FloatArray, ComplexArray]:
+    """Solve by `control.dlqr`, for gain, cost matrix and closed-loop poles.
 
     Raises
     ------
@@ -65,8 +57,5 @@ def riccati(
             f"{weights} ({error}); an unstable or integrating mode may be uncontrollable, "
             "unobservable or unweighted"
         ) from error
-    return RiccatiSolution(
-        np.atleast_2d(np.asarray(gain, dtype=np.float64)),
-        np.atleast_2d(np.asarray(cost, dtype=np.float64)),
-        np.asarray(poles, dtype=np.complex128),
-    )
+    K, P = (np.atleast_2d(np.asarray(M, dtype=np.float64)) for M in (gain, cost))
+    return K, P, np.asarray(poles, dtype=np.complex128)

@@ -74,10 +74,7 @@ class MimoRealization(ModelFit):
     impulse: ImpulseResponse
     flags: tuple[Flag, ...] = ()
     choices: tuple[str, ...] = ()
-    dead_time = None
-    delay = None
-    interval = None
-    delay_interval = None
+    dead_time = interval = delay = delay_interval = None
     records = ()
 
     @property

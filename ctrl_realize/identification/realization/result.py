@@ -76,8 +76,7 @@ class Realization(ModelFit):
     impulse: ImpulseResponse = field(repr=False)
     flags: tuple[Flag, ...] = ()
     choices: tuple[str, ...] = ()
-    interval = None
-    delay_interval = None
+    interval = delay_interval = None
 
     @property
     def dt(self) -> float:

@@ -128,9 +128,8 @@ def fit_chains(fits: WindowFit) -> list[LagChain]:
         return chains
     for order in range(SHORTEST, LONGEST + 1):
         chain = _chain(fits, order, TANKS, moments)
-        if _over_within_a_sample(chain, fits.scales):
-            break
-        if chains and chain.criterion > chains[-1].criterion + _WORSE:
+        worse = bool(chains) and chain.criterion > chains[-1].criterion + _WORSE
+        if worse or _over_within_a_sample(chain, fits.scales):
             break
         chains.append(chain)
     return chains
@@ -173,9 +172,8 @@ def chain_profile(chain: LagChain, scales: Scales) -> tuple[FloatArray, FloatArr
     """Misfit over the dead time as `dead_time_profile`; with few parameters it is a parabola."""
     dead_time = chain.candidate.dead_time
     # The error may be zero or infinite if no sample depends on the dead time.
-    error = float(
-        np.clip(chain.error, 1e-9 * scales.dt, scales.latest - scales.earliest + scales.dt)
-    )
+    widest = scales.latest - scales.earliest + scales.dt
+    error = float(np.clip(chain.error, 1e-9 * scales.dt, widest))
     grid = np.clip(dead_time + error * np.linspace(-3, 3, 13), scales.earliest, scales.latest)
     grid = np.unique(np.append(grid, dead_time))
     return grid, ((grid - dead_time) / error) ** 2
@@ -203,11 +201,8 @@ def _chain(fits: WindowFit, order: int, law: _Law, moments: tuple[float, float])
     lag = float(np.sqrt(spread / (lags @ lags)))
     start = np.array([[mean - lag * float(lags.sum()), np.log(lag), law.first]])
     # A response that begins with the fourth power of the time has no kinks.
-    bounds = Bounds(
-        np.array([scales.earliest, -np.inf, law.low]),
-        np.array([scales.latest, np.inf, law.high]),
-        smooth=True,
-    )
+    low, high = [scales.earliest, -np.inf, law.low], [scales.latest, np.inf, law.high]
+    bounds = Bounds(np.array(low), np.array(high), smooth=True)
     fit = lowest(problem, _Chain(order, order, bounds, (-np.inf, np.inf), law), start, scales.dt)
     value = fit.cost / fits.variance + (FREE_IN_A_CHAIN + 2) * fits.penalty
     value += problem.local_count(order)

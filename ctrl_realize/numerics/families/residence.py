@@ -85,15 +85,8 @@ def flow_modes(
         curved = ((1 - q) ** 2 * value - 2 * (square + 1) * late) / (q * spread**2)
         if not complex_ones:
             turned, curved = turned.real, curved.real
-        columns.append(
-            (
-                value,
-                rate * value + arriving / time,
-                -rate * turned - arriving,
-                curved + 2 * arriving,
-                time * value - turned,
-            )
-        )
+        by_time, by_mean = rate * value + arriving / time, -rate * turned - arriving
+        columns.append((value, by_time, by_mean, curved + 2 * arriving, time * value - turned))
     return FlowModes(*(np.stack(column, axis=1) for column in zip(*columns, strict=True)))
 
 

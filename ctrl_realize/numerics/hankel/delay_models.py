@@ -150,13 +150,9 @@ def realize_at_delays(
     if p == m == 1:
         return _single_channel(markov[0, 0], delays, samples, order, padded, tol)
     models = [realize_at(markov, int(d), samples, order, padded=padded, tol=tol) for d in delays]
-    return DelayModels(
-        np.stack([model.A for model in models]),
-        np.stack([model.B for model in models]),
-        np.stack([model.C for model in models]),
-        np.stack([model.singular_values[:order] for model in models]),
-        np.array([model.following for model in models]),
-    )
+    A, B, C = (np.stack([getattr(model, letter) for model in models]) for letter in "ABC")
+    values = np.stack([model.singular_values[:order] for model in models])
+    return DelayModels(A, B, C, values, np.array([model.following for model in models]))
 
 
 def _single_channel(
