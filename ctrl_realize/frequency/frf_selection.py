@@ -193,15 +193,10 @@ def _unstable_pole(
     pole = float(closest.x)
     criterion, fit = fitted(pole, (order,))
     if criterion < information_criterion(data, chosen, count) - VERY_STRONG:
-        yield flagged(
-            "unstable.frf",
-            pole=plainly(float(np.exp(pole)) * unit, 3),
-            order=order,
-            dead_time=in_time(fit.dead_time / unit),
-            left=100 * unexplained(data, fit),
-            chosen=chosen.structure.order,
-            left_by_chosen=100 * unexplained(data, chosen),
-        )
+        left, before = (100 * unexplained(data, one) for one in (fit, chosen))
+        said = {"pole": plainly(float(np.exp(pole)) * unit, 3), "order": order, "left": left}
+        said |= {"chosen": chosen.structure.order, "left_by_chosen": before}
+        yield flagged("unstable.frf", dead_time=in_time(fit.dead_time / unit), **said)
 
 
 def _of_lower_orders(
