@@ -146,13 +146,12 @@ def load_of(
     if small or since < _SOONEST * rise or slowest > _MOST_LAG * (data.clock[-1] - load.time):
         return None
     also = refit(loaded, data.output.size, tuple(fits.candidates))
-    white = also.correlation == 1.0
-    own, soon = _evidence(fits, also.residual(also.best), also.best.structure), since < apart
-    evidence = max(evidence, own)
-    told = evidence > (VERY_STRONG if white else IN_SLOW_NOISE)
+    white, left = also.correlation == 1.0, (also.normalized_rms / fits.normalized_rms) ** 2
+    own = _evidence(fits, also.residual(also.best), also.best.structure)
+    told = max(evidence, own) > (VERY_STRONG if white else IN_SLOW_NOISE)
     if not told or not is_noise(loaded, also, also.best):
         return None
-    early = soon or not (white or (also.normalized_rms / fits.normalized_rms) ** 2 < _MOST_LEFT)
+    early = since < apart or not (white or left < _MOST_LEFT)
     return replace(load, early=early), part
 
 

@@ -240,9 +240,8 @@ def _at_rest(data: SampledData, fit: OutputErrorEstimate) -> OutputErrorEstimate
     left = problem.data - respond(problem.drive, data.known, fit.numerator, parameters)
     for part in np.split(left, data.edges[1:-1]):
         part -= part.mean()
-    simulated = float(fit_percent(problem.data, problem.data - left))
-    most = max(fit.followed.simulated, simulated)
-    return replace(fit, followed=fit.followed._replace(simulated=most))
+    simulated = max(fit.followed.simulated, float(fit_percent(problem.data, problem.data - left)))
+    return replace(fit, followed=fit.followed._replace(simulated=simulated))
 
 
 def _of_all_samples(
