@@ -16,7 +16,7 @@ from ...numerics.arrays import FloatArray
 from ...numerics.constants import SMALLEST
 from ...numerics.output_error.any_input.data import SOUGHT, SampledData
 from ...numerics.output_error.any_input.fit import SampledFit, fit_sampled
-from ...numerics.output_error.any_input.stretch import FOLLOWS
+from ...numerics.output_error.any_input.stretch import FOLLOWS, FOLLOWS_IN_LOOPS
 from ...numerics.output_error.other_structures import Requested
 from ...numerics.output_error.result import AT_BOUND, OutputErrorEstimate
 from ...numerics.output_error.step_data import StepData, bare_data
@@ -91,18 +91,19 @@ def _fit(
         _check_moves(record)
     outputs, inputs = zip(*signals, strict=True)
     found = fit_sampled(outputs, inputs, dt, requested)
-    latest, follows = SOUGHT * found.data.longest, found.explained >= FOLLOWS
+    needed = FOLLOWS_IN_LOOPS if found.fit.averaged else FOLLOWS
+    latest, follows = SOUGHT * found.data.longest, found.explained >= needed
     if requested.latest is None and not (follows and found.fit.high < AT_BOUND * latest):
         latest *= _SOUGHT_THEN
         wider = fit_sampled(outputs, inputs, dt, replace(requested, latest=latest))
         # What explains little is no response for being sought for longer: it must lie inside.
         inside = follows or wider.fit.high < AT_BOUND * latest
-        found = wider if wider.explained >= FOLLOWS and inside else found
-    if refuses and found.explained < FOLLOWS:
+        found = wider if wider.explained >= needed and inside else found
+    if refuses and found.explained < needed:
         codes = [str(code) for y in found.data.measured if (code := missing_code(y))]
         raise UnrelatedError(
             f"{_named(records)}: the output does not respond to the input, which explains nothing "
-            f"beyond the noise (test value {found.explained:.3g}, needed {FOLLOWS:g}), with dead "
+            f"beyond the noise (test value {found.explained:.3g}, needed {needed:g}), with dead "
             f"times up to {in_time(requested.latest or latest)}; "
             + (codes[0] if codes else _advice(records, found.data.measured))
         )

@@ -281,6 +281,21 @@ def beside(*loads, noise=0.03, seed=7):
     return cr.Record(TIME, *y, reference=wanted)
 
 
+def test_one_move_in_the_slowest_noise_is_still_a_response():
+    plant = PLANTS["0.4"]
+    wanted, made = record(plant, CASES["AR(0.97)"], "one", 700)
+    fit = cr.identify(cr.Record(made.time, made.input, made.output, reference=wanted)).fit
+    assert fit.interval[0] <= plant.dead_time <= fit.interval[1]
+    # the same controller about nothing: its set point moves, and the output does not answer
+    rng, integral, lazy = np.random.default_rng(700), 0.0, np.zeros(wanted.size)
+    noise = 0.15 * lfilter([np.sqrt(1 - 0.97**2)], [1, -0.97], rng.standard_normal(1400))[500:]
+    for k, error in enumerate(wanted - noise):
+        integral += 0.01 * error
+        lazy[k] = 0.5 * error + integral
+    with pytest.raises(cr.errors.DataError, match="does not respond to the input"):
+        cr.identify(cr.Record(made.time, lazy, noise, reference=wanted))
+
+
 def test_a_load_soon_after_a_move_is_no_part_of_the_gain():
     """Gains were off by 17 to 27 %, outside of the interval in all four records."""
     fits = [cr.identify(beside((at, 0.2), seed=seed)).fit for at in (380, 640) for seed in (8, 9)]
