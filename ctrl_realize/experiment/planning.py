@@ -142,7 +142,7 @@ def plan(
     >>> flow = cr.design.ProcessModel(gain=1.2, lag=3.0, dead_time=2.0)
     >>> plan = cr.experiment.plan(flow, time=60, amplitude=5, rate=5, noise=0.1)
     >>> plan.kind, f"{plan.step.std / plan.std:.1f} times better than one step"
-    ('relay', '3.7 times better than one step')
+    ('3-2-1-1', '3.4 times better than one step')
     """
     known = known_from(first, options)
     wanted = one_of(want, "want", WANTED)

@@ -296,7 +296,7 @@ def experiment_plot(
     >>> plan = cr.experiment.plan(flow, time=60, amplitude=5, rate=5, noise=0.1)
     >>> cplt = cr.plots.experiment_plot(plan)
     >>> [text.get_text() for text in cplt.figure.axes[0].get_legend().get_texts()]
-    ['relay', 'one step', 'other candidates']
+    ['3-2-1-1', 'one step', 'other candidates']
     """
     curve, of_time = plan.curve, plan.want == "dead_time"
     shape: dict[str, Any] = {"size": (8.0, 6.4), "heights": (2.0, 1.0), "sharex": False}
