@@ -193,10 +193,15 @@ def _unstable_pole(
     pole = float(closest.x)
     criterion, fit = fitted(pole, (order,))
     if criterion < information_criterion(data, chosen, count) - VERY_STRONG:
-        left, before = (100 * unexplained(data, one) for one in (fit, chosen))
-        said = {"pole": plainly(float(np.exp(pole)) * unit, 3), "order": order, "left": left}
-        said |= {"chosen": chosen.structure.order, "left_by_chosen": before}
-        yield flagged("unstable.frf", dead_time=in_time(fit.dead_time / unit), **said)
+        yield flagged(
+            "unstable.frf",
+            pole=plainly(float(np.exp(pole)) * unit, 3),
+            order=order,
+            dead_time=in_time(fit.dead_time / unit),
+            left=100 * unexplained(data, fit),
+            chosen=chosen.structure.order,
+            left_by_chosen=100 * unexplained(data, chosen),
+        )
 
 
 def _of_lower_orders(
@@ -220,8 +225,14 @@ def _of_lower_orders(
     high = max(interval[1], *(last / unit for _, last in ends))
     least, most = best[min(best)], rows[0]
     above, left = (100 * residual_ratio(data, fits[key_of(row)]) for row in (least, most))
-    orders, shares = (least.order, most.order), {"left_by_least": above, "left_by_most": left}
-    return (low, high), [flagged("systematic_error", least=orders[0], most=orders[1], **shares)]
+    systematic = flagged(
+        "systematic_error",
+        least=least.order,
+        left_by_least=above,
+        most=most.order,
+        left_by_most=left,
+    )
+    return (low, high), [systematic]
 
 
 def _cover(

@@ -234,11 +234,18 @@ def _left_open(made: LoopCheck) -> tuple[Flag, ...]:
 
     The interval of a dead time alone is for fits that say nothing on the lags that go with it.
     """
-    models, robust, worst = made.by_models, made.robustness, made.worst
-    if not models and robust is not None and not robust.stable:
-        low, high = robust.dead_time_interval
-        room = {"stable_from": robust.stable_from, "stable_to": robust.stable_to}
-        return (flagged("unstable_within_interval", low=low, high=high, **room),)
+    models = made.by_models
+    if not models and made.robustness is not None and not made.robustness.stable:
+        low, high = made.robustness.dead_time_interval
+        inside = flagged(
+            "unstable_within_interval",
+            low=low,
+            high=high,
+            stable_from=made.robustness.stable_from,
+            stable_to=made.robustness.stable_to,
+        )
+        return (inside,)
+    worst = made.worst
     if worst is None or worst.ms <= MOST_SENSITIVE * (1 + ROUNDED):
         return ()
     if worst.ms == float("inf"):
@@ -247,9 +254,11 @@ def _left_open(made: LoopCheck) -> tuple[Flag, ...]:
             corner=worst,
         )
     else:
-        sizes = {"ms": worst.ms, "most": MOST_SENSITIVE, "corner": worst}
         found = flagged(
-            "sensitive_within_interval.model" if models else "sensitive_within_interval", **sizes
+            "sensitive_within_interval.model" if models else "sensitive_within_interval",
+            ms=worst.ms,
+            most=MOST_SENSITIVE,
+            corner=worst,
         )
     return (found,)
 

@@ -33,9 +33,14 @@ def _contradiction(fit: JointFit) -> Iterator[Flag]:
     limit = min(limit, 0.999 * max(agreed.record_rise, agreed.frf_rise))
     where = [_points_outside(fit)] if agreed.frf_rise > limit else []
     where += [_times_outside(fit)] if agreed.record_rise > limit else []
-    test = {"statistic": agreed.statistic, "parameters": agreed.parameters}
-    said = {"where": ", and ".join(where), "difference": _difference(fit)}
-    yield flagged("frf_contradicts_records", chance=agreed.p_value, **test, **said)
+    yield flagged(
+        "frf_contradicts_records",
+        statistic=agreed.statistic,
+        parameters=agreed.parameters,
+        chance=agreed.p_value,
+        where=", and ".join(where),
+        difference=_difference(fit),
+    )
 
 
 def _points_outside(fit: JointFit) -> str:

@@ -129,10 +129,16 @@ def _from_start(
 
 def _marginal(others: Sequence[Candidate]) -> Iterator[Flag]:
     """Flag a choice so close that rounding may change it."""
-    for one in others[:1]:
-        delays = {"inputs": one.inputs, "outputs": one.outputs}
-        own = "and" if one.feedthrough else "and no"
-        yield flagged("marginal_decision.state_space", order=one.order, feedthrough=own, **delays)
+    if not others:
+        return
+    one = others[0]
+    yield flagged(
+        "marginal_decision.state_space",
+        order=one.order,
+        inputs=one.inputs,
+        outputs=one.outputs,
+        feedthrough="and" if one.feedthrough else "and no",
+    )
 
 
 def _silence(best: Candidate) -> tuple[Flag, ...]:
