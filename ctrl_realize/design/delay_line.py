@@ -169,8 +169,12 @@ class DelayLineController(ShownSystem, DelayOperators):
         return text_card(*self._card())
 
     def _made_by(self) -> tuple[Any, ...]:
-        names = {"inputs": self.input_labels[0], "outputs": self.output_labels[0]}
-        settings = {"name": self.name, **names, "pulses": self._pulses}
+        settings = {
+            "name": self.name,
+            "inputs": self.input_labels[0],
+            "outputs": self.output_labels[0],
+            "pulses": self._pulses,
+        }
         return type(self), (*self._parts, self.dt), settings
 
     def paths(self, z: ComplexArray) -> tuple[ComplexArray, ComplexArray]:

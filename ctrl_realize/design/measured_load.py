@@ -130,7 +130,9 @@ def feedforward(plant: Any, disturbance: Any, *, dt: float | None = None) -> Fee
             "one of plant and load integrates and the other does not; expected both or neither: "
             "otherwise the compensator differentiates, or drifts away"
         )
-    known = [step for step in (getattr(path, "dt", None) for path in (plant, disturbance)) if step]
+    known = [
+        getattr(path, "dt", None) for path in (plant, disturbance) if getattr(path, "dt", None)
+    ]
     if dt is None and not known:
         raise UnsuitableSystemError("neither model has a sample time; give dt, in s")
     step = positive(dt if dt is not None else known[0], "dt", "sample time in s")

@@ -24,8 +24,11 @@ def disagreement(comparison: FRFComparison) -> Flag | None:
     beyond = float(np.sqrt(max(error**2 - noise**2, 0.0)))
     if beyond < CLOSE:
         return None
-    size, worst = 100 * error, _worst(comparison)
-    return flagged("frf_differs" if beyond < FAR else "frf_disagrees", error=size, worst=worst)
+    return flagged(
+        "frf_differs" if beyond < FAR else "frf_disagrees",
+        error=100 * error,
+        worst=_worst(comparison),
+    )
 
 
 def _worst(comparison: FRFComparison) -> str:

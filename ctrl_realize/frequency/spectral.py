@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 
@@ -143,8 +143,15 @@ def spectral_frf(
         found, dt = from_segments(stream, method, segment, window, overlap)
     frequency = found.frequency_hz
     response = found.response * np.exp(-2j * np.pi * frequency * delay * dt)
-    scatter: Any = {"coherence": found.coherence, "std": found.std, "repeats": found.repeats}
-    return MeasuredFRF(response, frequency, sample_time=dt, name=name, **scatter)
+    return MeasuredFRF(
+        response,
+        frequency,
+        coherence=found.coherence,
+        std=found.std,
+        repeats=found.repeats,
+        sample_time=dt,
+        name=name,
+    )
 
 
 def _aligned(records: Record | Iterable[Record], delay: int) -> Stream:

@@ -170,11 +170,10 @@ def identify(
     >>> isinstance(sys, ct.StateSpace), round(sys.fit.dead_time, 3)
     (True, 0.125)
     """
-    said = locals()
     options = {
-        name: said[name]
-        for name, default in _DEFAULTS.items()
-        if said[name] is not default and not (isinstance(said[name], str) and said[name] == default)
+        name: value
+        for name, value in locals().items()
+        if name in _DEFAULTS and not _is_default(value, _DEFAULTS[name])
     }
     models = frf is not None, structures is not None
     name, fit = _fit_of(one_of(method, "method", METHODS), record, *models)
@@ -200,6 +199,10 @@ _DEFAULTS = {
 }
 """Arguments that only some methods take."""
 _OUTPUT_ERROR = "method='output_error'"
+
+
+def _is_default(value: object, default: object) -> bool:
+    return value is default or (isinstance(value, str) and value == default)
 
 
 def _fit_of(

@@ -70,9 +70,12 @@ class PlausibleModels(Result):
     @cached_property
     def systems(self) -> tuple[DelayedStateSpace, ...]:
         """The models behind a hold, for simulation and design."""
-        cores = [continuous_core(one.numerator, one.poles) for one in self.models]
-        pairs = zip(cores, self.models, strict=True)
-        return tuple(delayed_ss(core, dead_time=one.dead_time, dt=self.dt) for core, one in pairs)
+        return tuple(
+            delayed_ss(
+                continuous_core(one.numerator, one.poles), dead_time=one.dead_time, dt=self.dt
+            )
+            for one in self.models
+        )
 
     def frequency_response(self, omega: ArrayLike) -> ComplexArray:
         """Responses (39, M) of the continuous models at omega (M,) in rad/s."""

@@ -92,8 +92,9 @@ def model_table(system: DelayedStateSpace) -> Table:
         ("x[k+1] = A x[k] + B u[k-d]", f"d = {system.delay}, dt = {system.dt!r} s"),
         *((letter, _matrix(getattr(core, letter))) for letter in "ABCD"),
     ]
-    title = "State-space matrices of the model without its delay"
-    return pairs(title, rows, mono=True, folded=True)
+    return pairs(
+        "State-space matrices of the model without its delay", rows, mono=True, folded=True
+    )
 
 
 def _matrix(values: Any) -> str:

@@ -153,10 +153,13 @@ def judged(
     given = limits or {}
     out, by_size = [], []
     for one in metrics:
-        limit = given.get(one.key)
-        if isinstance(limit, Mapping):
-            by_size += _of_sizes(one, groups, limit)
-        out.append(one if limit is None or isinstance(limit, Mapping) else _with_limit(one, limit))
+        if one.key not in given:
+            out.append(one)
+        elif isinstance(given[one.key], Mapping):
+            out.append(one)
+            by_size += _of_sizes(one, groups, given[one.key])
+        else:
+            out.append(_with_limit(one, given[one.key]))
     return (*out, *by_size)
 
 
@@ -174,12 +177,15 @@ def _of_sizes(
     for size, limit in limits.items():
         wanted = float(size)
         own = [group for group in groups if abs(group.size - wanted) <= 0.15 * wanted]
-        places = [
-            (group.estimates | {"fitted_dead_time": group.fitted_dead_time}, words_of(group))
-            for group in own
-        ] or [({one.key: Interval()}, f"{wanted:g} %: no such step")]
-        for known, where in places:
-            metric = Metric(one.key, one.definition, known[one.key], where)
+        for group in own:
+            interval = (
+                group.fitted_dead_time if one.key == "fitted_dead_time"
+                else group.estimates[one.key]
+            )  # fmt: skip
+            metric = Metric(one.key, one.definition, interval, words_of(group))
+            found.append(_with_limit(metric, limit))
+        if not own:
+            metric = Metric(one.key, one.definition, Interval(), f"{wanted:g} %: no such step")
             found.append(_with_limit(metric, limit))
     return found
 

@@ -214,15 +214,21 @@ class ValveReport(Result):
         """
         import pandas as pd
 
-        plain = ("time", "before", "after", "size", "reversal", "moved", "settled")
-        rows = []
-        for one in self.steps:
-            row: dict[str, object] = {"record": self.records[one.record].name or one.record + 1}
-            row |= {name: getattr(one, name) for name in plain}
-            for key in STEP_METRICS:
-                row |= {key: one.values[key], f"{key}_std": one.errors[key]}
-            rows.append(row)
-        return pd.DataFrame(rows)
+        return pd.DataFrame(
+            [
+                {
+                    "record": self.records[one.record].name or one.record + 1,
+                    "time": one.time, "before": one.before, "after": one.after, "size": one.size,
+                    "reversal": one.reversal, "moved": one.moved, "settled": one.settled,
+                }
+                | {
+                    name: number
+                    for key in STEP_METRICS
+                    for name, number in ((key, one.values[key]), (f"{key}_std", one.errors[key]))
+                }
+                for one in self.steps
+            ]
+        )  # fmt: skip
 
     def metric_table(self) -> pd.DataFrame:
         """List the metrics.

@@ -97,9 +97,18 @@ class Motion(InsidePoles):
         form = self._form()
         wanted = positive(tolerance, "tolerance", "largest error, relative to the largest output")
         state = spread(initial_state, form.states, "initial_state")
-        start = {"initial_state": state, "history": spread(history, len(form.delays), "history")}
+        before = spread(history, len(form.delays), "history")
         try:
-            found = solve(form, signal, times, breaks, tolerance=wanted, slope=slope, **start)
+            found = solve(
+                form,
+                signal,
+                times,
+                breaks,
+                initial_state=state,
+                history=before,
+                tolerance=wanted,
+                slope=slope,
+            )
         except TooManyStepsError as error:
             raise UnsuitableSystemError(
                 f"{times[-1]:g} s need {error} steps, each no longer than the shortest delay "

@@ -99,10 +99,17 @@ def data_loop(
     x = np.log(omega)
     if integrators is None:
         integrators = _read_integrators(omega, values)
-    curves = PchipInterpolator(x, np.log(np.abs(values))), PchipInterpolator(x, phase)
-    counts = {"unstable_poles": unstable_poles, "integrators": integrators}
-    whole = (integer(count, name, 0) for name, count in counts.items())
-    return DataLoop(omega, values, std, points.repeats, dead_time, *curves, *whole)
+    return DataLoop(
+        omega,
+        values,
+        std,
+        points.repeats,
+        dead_time,
+        PchipInterpolator(x, np.log(np.abs(values))),
+        PchipInterpolator(x, phase),
+        integer(unstable_poles, "unstable_poles", 0),
+        integer(integrators, "integrators", 0),
+    )
 
 
 def _above_zero(data: ct.FrequencyResponseData) -> MeasuredPoints:

@@ -106,8 +106,14 @@ class DelayRobustness(Result):
         """One row for each delay."""
         import pandas as pd
 
-        columns = {"delay": self.delays, "dead_time": self.dead_times, "stable": self.stable_at}
-        return pd.DataFrame({**columns, "modulus_margin": self.modulus_margin})
+        return pd.DataFrame(
+            {
+                "delay": self.delays,
+                "dead_time": self.dead_times,
+                "stable": self.stable_at,
+                "modulus_margin": self.modulus_margin,
+            }
+        )
 
     _heading = "Robustness to the dead time"
 

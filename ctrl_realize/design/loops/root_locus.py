@@ -84,9 +84,16 @@ def root_locus(system: Any, gains: ArrayLike | None = None, *, count: int = 10) 
     found = [ct.feedback(float(k) * loop).dominant_poles(max(few, 1)) for k in values]
     width = min(wanted, *(poles.size for poles in found))
     short = not loop.dt or isinstance(loop, DelayedStateSpace) or loop.nstates <= FEW_STATES
-    poles, own = loop.dominant_poles(wanted), {"dt": loop.dt, "sysname": loop.name, "sys": loop}
-    zeros = loop.zeros() if short else np.zeros(0, dtype=np.complex128)
-    return ct.PoleZeroData(poles, zeros, values, _branches(found, width), sort_loci=False, **own)
+    return ct.PoleZeroData(
+        loop.dominant_poles(wanted),
+        loop.zeros() if short else np.zeros(0, dtype=np.complex128),
+        values,
+        _branches(found, width),
+        dt=loop.dt,
+        sysname=loop.name,
+        sys=loop,
+        sort_loci=False,
+    )
 
 
 def _with_delays(system: Any) -> Any:

@@ -151,10 +151,13 @@ def _grid(
             slow = np.abs(np.log(np.abs(np.asarray(plant.delay_free.poles())) + 1e-12)) / plant.dt
         else:
             slow = np.abs(plant.core.poles())
-            fastest = max(float(slow.max(initial=0.0)), 1 / dead_time if dead_time else 0.0)
-            top = 100 * fastest or 1.0
-        slowest = slow[slow > 1e-9 * top].min(initial=top)
-        return np.geomspace(np.clip(1e-3 * slowest, 1e-8 * top, 0.01 * top), top, GRID_POINTS)
+            top = (
+                100 * max(float(slow.max(initial=0.0)), 1 / dead_time if dead_time else 0.0) or 1.0
+            )
+        low = float(
+            np.clip(1e-3 * slow[slow > 1e-9 * top].min(initial=top), 1e-8 * top, 0.01 * top)
+        )
+        return np.geomspace(low, top, GRID_POINTS)
     grid = numbers(omega, "omega")
     if grid.ndim != 1 or grid.size == 0 or grid[0] <= 0 or np.any(np.diff(grid) <= 0):
         raise DataError("omega must be increasing and > 0, in rad/s")

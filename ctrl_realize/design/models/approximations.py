@@ -54,4 +54,5 @@ def pade_ss(dead_time: float, order: int = 5, *, name: str | None = None) -> ct.
     """
     dead_time = positive(dead_time, "dead_time", "dead time in s")
     ladder = pade_ladder(dead_time, integer(order, "order", 1, MAX_PADE_ORDER))
-    return ct.StateSpace(*ladder, 0, inputs=["u"], outputs=["y"], name=name)
+    named = {} if name is None else {"name": name}
+    return ct.StateSpace(*ladder, 0, inputs=["u"], outputs=["y"], **named)

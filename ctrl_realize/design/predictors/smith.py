@@ -172,8 +172,11 @@ def smith_predictor(
         plant, primary, removed, kept, _filter(seconds, plant, integrating=integrating)
     )
 
-    given = DelayedStateSpace(primary, 0, name=primary.name)
-    design = {"model": plant, "primary": given, "filter_time": seconds}
+    design = {
+        "model": plant,
+        "primary": DelayedStateSpace(primary, 0, name=primary.name),
+        "filter_time": seconds,
+    }
     dt, output = float(plant.dt), plant.input_labels[0]
     made = SmithPredictor(*parts, dt, name=name, outputs=output, pulses=pulses, design=design)
     advice = more_robust(filter_time, float(plant.dead_time))

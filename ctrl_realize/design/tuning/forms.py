@@ -139,18 +139,19 @@ def pid_forms() -> pd.DataFrame:
     """
     import pandas as pd
 
-    rows = [
-        {
-            "form": form,
-            "title": layout.title,
-            "structure": layout.structure,
-            "parameters": ", ".join([*labels_of(layout), *layout.weights]),
-            "time_unit": layout.unit or "chosen",
-            "source": layout.source,
-        }
-        for form, layout in LAYOUTS.items()
-    ]
-    return pd.DataFrame(rows)
+    return pd.DataFrame(
+        [
+            {
+                "form": form,
+                "title": layout.title,
+                "structure": layout.structure,
+                "parameters": ", ".join([*labels_of(layout), *layout.weights]),
+                "time_unit": layout.unit or "chosen",
+                "source": layout.source,
+            }
+            for form, layout in LAYOUTS.items()
+        ]
+    )
 
 
 def to_form(
@@ -206,8 +207,9 @@ def _shown(
              FormValue(layout.gain, gain, gain_unit)]  # fmt: skip
     if ideal[1] < INF:
         if parallel:
-            slope = slope_unit(gain_unit, unit)
-            written = FormValue(layout.integral, integral * scale * seconds, slope)
+            written = FormValue(
+                layout.integral, integral * scale * seconds, slope_unit(gain_unit, unit)
+            )
         elif layout.rate:
             written = FormValue(layout.integral, seconds / integral, f"repeats/{unit}")
         else:

@@ -204,12 +204,14 @@ class Campaign(Result):
         """
         import pandas as pd
 
-        columns = {
-            "amplitude": [float(f"{row.amplitude:.2g}") for row in self.good],
-            "delay": self.delays,
-            "gain": [row.gain for row in self.good],
-        }
-        groups = pd.DataFrame(columns).groupby("amplitude", dropna=False)
+        frame = pd.DataFrame(
+            {
+                "amplitude": [float(f"{row.amplitude:.2g}") for row in self.good],
+                "delay": self.delays,
+                "gain": [row.gain for row in self.good],
+            }
+        )
+        groups = frame.groupby("amplitude", dropna=False)
         return groups.agg(
             records=("delay", "size"), delay=("delay", "mean"), std=("delay", "std"),
             gain=("gain", "mean"), gain_std=("gain", "std"),

@@ -130,8 +130,10 @@ def fit_joint(
     """
     several = as_records(records)
     pairs = plain_pairs(structures, "fit_joint")
-    alone = fit_output_error(several, structures=pairs, max_delay=max_delay, dead_time=dead_time)
-    first = fit_of(alone, OutputErrorFit)
+    first = fit_of(
+        fit_output_error(several, structures=pairs, max_delay=max_delay, dead_time=dead_time),
+        OutputErrorFit,
+    )
     held = first.dt if hold == "zoh" else None
     n = None if pairs is None else sorted({n for n, _ in pairs})
     r = None if pairs is None else sorted({r for _, r in pairs})
@@ -190,8 +192,9 @@ def _records(
     repeats = first.repeatability
     used = first.records if repeats is None else list(compress(first.records, repeats.kept))
     outputs, inputs = ([np.ravel(getattr(r, k)) for r in used] for k in ("output", "input"))
-    data = cut(outputs, inputs, first.data.dt, first.data.every, KnownFactor())
-    data = data.after(first.dead_time)
+    data = cut(outputs, inputs, first.data.dt, first.data.every, KnownFactor()).after(
+        first.dead_time
+    )
     return *sampled_part(data, first.estimate, latest), *joined(used, data, first.residual)
 
 

@@ -57,7 +57,6 @@ def backlash(position: FloatArray, width: float, start: float = 0.0) -> FloatArr
 
 
 Stem: TypeAlias = tuple[float, float, float, float, bool, bool, float]
-Step: TypeAlias = Callable[[Stem, float, float, float], Stem]
 """A `StemState` without names."""
 
 
@@ -115,7 +114,12 @@ def kano(position: FloatArray, stick: float, jump: float, start: float = 0.0) ->
     return _followed(kano_step, state, position, stick, jump)
 
 
-def _followed(step: Step, state: Stem, position: FloatArray, *parameters: float) -> FloatArray:
+def _followed(
+    step: Callable[[Stem, float, float, float], Stem],
+    state: Stem,
+    position: FloatArray,
+    *parameters: float,
+) -> FloatArray:
     out = []
     for command in position.tolist():
         state = step(state, command, *parameters)

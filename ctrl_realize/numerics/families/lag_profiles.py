@@ -165,5 +165,13 @@ def _end(at: Excess, x: FloatArray, inside: float, last: float, step: float) -> 
         if outside == last:
             return nothing
         inside, x, step = outside, there, _WIDER * step
-    rest = lambda lag: known[lag] if lag in known else at(x, lag)[1]  # noqa: E731
-    return float(np.exp(brentq(rest, inside, outside, xtol=_EXACT * abs(outside - inside))))
+    return float(
+        np.exp(
+            brentq(
+                lambda lag: known[lag] if lag in known else at(x, lag)[1],
+                inside,
+                outside,
+                xtol=_EXACT * abs(outside - inside),
+            )
+        )
+    )
