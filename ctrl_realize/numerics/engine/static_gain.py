@@ -182,10 +182,14 @@ class LocalErrors:
             columns = self.local.without(columns[None])[0]
         return np.asarray(columns - self._basis @ (self._basis.T @ columns))
 
+    @property
+    def columns(self) -> FloatArray:
+        """All that is estimated (m, p + q), every column of unit size."""
+        return unit_columns(np.concatenate([self.slopes, self.own], axis=1))[0]
+
     @cached_property
     def _basis(self) -> FloatArray:
-        columns = unit_columns(np.concatenate([self.slopes, self.own], axis=1))[0]
-        basis, singular, _ = np.linalg.svd(columns, full_matrices=False)
+        basis, singular, _ = np.linalg.svd(self.columns, full_matrices=False)
         return np.asarray(basis[:, singular > _INDEPENDENT * singular[0]])
 
     def covariance(self) -> FloatArray:

@@ -18,7 +18,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..arrays import FloatArray, IntArray, unit_columns
+from ..arrays import FloatArray, IntArray
 from ..engine.batch_search import fit_batch
 from ..engine.compared_fits import converged
 from ..engine.eliminate import eliminate
@@ -127,5 +127,4 @@ def _followed(fits: WindowFit) -> FloatArray:
         drive=window.drive, regressors=window.columns,
     )  # fmt: skip
     numerator = eliminate(fits.problem, best.structure, best.parameters[None]).numerator[0]
-    found = local_errors(problem, best, numerator, fits.scales.length)
-    return unit_columns(np.hstack([found.slopes, found.own]))[0]
+    return local_errors(problem, best, numerator, fits.scales.length).columns

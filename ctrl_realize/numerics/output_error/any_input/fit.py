@@ -149,6 +149,7 @@ def fit_sampled(
             fit = _at_rest(found.data, _of_measured(found, fit, found.noise.size - 1))
             return SampledFit(fit, found.data, explained(found.fit), found.noise, None, loads)
     structures = requested.structures
+    # How long a plant must be seen is a question to all structures.
     every, part = samples_in_a_block(outputs, inputs, dt, replace(requested, structures=None))
     if part is None or structures is not None:
         data = cut(outputs, inputs, dt, every, requested.known)
