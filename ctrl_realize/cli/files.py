@@ -55,8 +55,7 @@ def command(module: str, function: str) -> Callable[[Callable[..., None]], Calla
         @wraps(declared)
         def run(**values: Any) -> int:
             for group in groups:
-                options = {name: values.pop(name) for name in GROUPS[group]}
-                values[group] = given(**options)
+                values[group] = given(**{name: values.pop(name) for name in GROUPS[group]})
             folder, overwrite = values.get("folder"), values.pop("overwrite", False)
             report = not values.pop("no_report", False)
             named = [value for name, value in values.items() if name != "folder"]

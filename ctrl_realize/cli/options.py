@@ -139,7 +139,7 @@ GROUPS: dict[str, dict[str, Any]] = {
                     "parallel, proportional_band, siemens_pid_compact, rockwell_pide_dependent, "
                     "emerson_deltav_series, ...; see design.pid_forms."),
         ],
-        **options_of("design/tuning/delivery.py", "as_form", "time_unit"),
+        **options_of("design/tuning/controller.py", "as_form", "time_unit"),
     },
     "compared": options_of("frequency/compare.py", "compare_frf"),
     "measured": options_of("valves/evaluate.py", "valve_report", "limits"),

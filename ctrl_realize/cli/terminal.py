@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import sys
 from collections.abc import Iterable, Iterator, Sequence
-from contextlib import AbstractContextManager, contextmanager, nullcontext
+from contextlib import contextmanager, nullcontext
 from typing import Any, TextIO
 
 import typer
@@ -33,7 +33,9 @@ def _write(text: str, *, to_stderr: bool) -> None:
     # most texts contain names of records and files, which must not control the terminal
     lines = "\n".join(printable(line) for line in text.split("\n"))
     try:
-        with _without_bars():
+        # progress bars are taken away while a text is written, and drawn again below it
+        bars = sys.modules.get("tqdm")
+        with nullcontext() if bars is None else bars.tqdm.external_write_mode(file=sys.stderr):
             typer.echo(lines, err=to_stderr)
     except BrokenPipeError:
         # the buffer, and everything that follows, is discarded
@@ -41,15 +43,6 @@ def _write(text: str, *, to_stderr: bool) -> None:
         nowhere = os.open(os.devnull, os.O_WRONLY)
         os.dup2(nowhere, stream.fileno())
         os.close(nowhere)
-
-
-def _without_bars() -> AbstractContextManager[None]:
-    """Take progress bars away while a text is written, and draw them again below it."""
-    loaded = sys.modules.get("tqdm")
-    if loaded is None:
-        return nullcontext()
-    bars: AbstractContextManager[None] = loaded.tqdm.external_write_mode(file=sys.stderr)
-    return bars
 
 
 def one_line(problem: object) -> str:

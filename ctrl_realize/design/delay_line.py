@@ -130,9 +130,7 @@ class DelayLineController(ShownSystem, DelayOperators):
         """
         A, B, C, D, E, h = self._parts
         n, d = E.shape
-        if d == 0:
-            return DelayForm(A, B, C, D)
-        if self._pulses is None or _radius(self._pulses[0]) > DIES_OUT:
+        if d == 0 or self._pulses is None or _radius(self._pulses[0]) > DIES_OUT:
             return DelayForm(*self._make_matrices())
         A_p, B_p, C_p = self._pulses
         taps = np.vstack([E, h])

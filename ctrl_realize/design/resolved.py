@@ -34,11 +34,11 @@ def check_sign(system: Any, purpose: str) -> None:
     UnsuitableSystemError
     """
     for flag in _flags(system):
-        if flag.code == GAIN_OPEN and not _sign_is_known(system.fit):
+        if flag.code == GAIN_OPEN and not sign_is_told(system.fit.gain_interval):
             raise UnsuitableSystemError(
-                f"{purpose} needs the sign of the gain, which the record of {_name(system)} "
-                f"does not determine: {flag}. If the gain is known from elsewhere, scale a "
-                "model of known dynamics (design.ProcessModel, delayed_ss)"
+                f"{purpose} needs the sign of the gain, which the record of the model "
+                f"{system.name!r} does not determine: {flag}. If the gain is known from elsewhere, "
+                "scale a model of known dynamics (design.ProcessModel, delayed_ss)"
             )
 
 
@@ -52,11 +52,11 @@ def warn_unresolved(system: Any, *, predicts: bool = False) -> None:
     """
     for flag in _flags(system):
         quantity = (QUANTITIES | (PREDICTED if predicts else {})).get(flag.code)
-        if flag.code == GAIN_OPEN and not _sign_is_known(system.fit):
+        if flag.code == GAIN_OPEN and not sign_is_told(system.fit.gain_interval):
             quantity = "the gain and its sign"
         if quantity is not None and not (flag.code == "not_settled" and _gain_is_known(system.fit)):
             warn_caller(
-                f"the record of {_name(system)} does not determine {quantity}: {flag}",
+                f"the record of the model {system.name!r} does not determine {quantity}: {flag}",
                 UnresolvedWarning,
             )
 
@@ -64,14 +64,6 @@ def warn_unresolved(system: Any, *, predicts: bool = False) -> None:
 def _flags(system: Any) -> tuple[Flag, ...]:
     fitted = isinstance(system, DelayedStateSpace) and system.fit is not None
     return system.fit.flags if fitted else ()
-
-
-def _name(system: Any) -> str:
-    return f"the model {system.name!r}"
-
-
-def _sign_is_known(fit: ModelFit) -> bool:
-    return sign_is_told(fit.gain_interval)
 
 
 def _gain_is_known(fit: ModelFit) -> bool:

@@ -168,17 +168,13 @@ def open_loop(plant: Any, controller: Any = None, dead_time: float = 0.0) -> Loo
             check_entries(system)
     bases = {base for base in map(_time_base, systems) if base is not None}
     if len(bases) > 1:
-        words = " and ".join(_words(base) for base in sorted(bases))
+        words = " and ".join(f"dt = {dt:g} s" if dt else "continuous" for dt in sorted(bases))
         raise UnsuitableSystemError(
             f"plant and controller have different time bases: {words}; "
             "sample the continuous one first (design.to_discrete, or .discretised(dt) of a PID)"
         )
     dt = bases.pop() if bases else 0.0
     return Loop(tuple(factor(system, dt) for system in systems), dt, dead_time)
-
-
-def _words(dt: float) -> str:
-    return f"dt = {dt:g} s" if dt else "continuous"
 
 
 def _time_base(system: Any) -> float | None:

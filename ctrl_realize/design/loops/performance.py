@@ -99,8 +99,7 @@ def step_responses(
     """
     z, values, process = _on_circle(plant, controller, count)
     setpoint = step_on_circle(values / (1 + values), z, count)
-    load = step_on_circle(process / (1 + values), z, count)
-    return setpoint, load
+    return setpoint, step_on_circle(process / (1 + values), z, count)
 
 
 def _on_circle(

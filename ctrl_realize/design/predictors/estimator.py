@@ -131,7 +131,7 @@ def kalman_predictor(system: DelayedStateSpace, QN: ArrayLike, RN: ArrayLike) ->
             f"the delays of the outputs differ by {sum(own)} samples together, the limit is "
             f"{MOST_APART}. Use a longer sample time, or use one output"
         )
-    A, C = _with_outputs(core, own)
+    A, _, C, _ = augment(ct.ssdata(core), (0,) * core.ninputs, own)
     noise = np.zeros_like(A)
     noise[: core.nstates, : core.nstates] = weight
     gain, cost, poles = riccati(ct.dlqr, A.T, C.T, noise, price, "QN and RN")
@@ -142,13 +142,6 @@ def kalman_predictor(system: DelayedStateSpace, QN: ArrayLike, RN: ArrayLike) ->
         gain = gain.T
     n = core.nstates
     return KalmanPredictor(read_only(gain), read_only(cost[:n, :n]), locked(poles), float(plant.dt))
-
-
-def _with_outputs(core: ct.StateSpace, delays: tuple[int, ...]) -> tuple[FloatArray, FloatArray]:
-    """Return A and C of the core with output delays."""
-    matrices = np.asarray(core.A), np.asarray(core.B), np.asarray(core.C), np.asarray(core.D)
-    A, _, C, _ = augment(matrices, (0,) * core.ninputs, delays)
-    return A, C
 
 
 def _late(

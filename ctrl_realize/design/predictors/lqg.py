@@ -123,8 +123,7 @@ def lqg(
     has_states(core, "lqg")
     law = regulator(plant, Q, R)
     estimator = kalman_predictor(plant, QN, RN)
-    matrices = np.asarray(core.A), np.asarray(core.B), np.asarray(core.C), np.asarray(core.D)
-    A, B, C, D = augment(matrices, (0,) * core.ninputs, tuple(plant.output_delays))
+    A, B, C, D = augment(ct.ssdata(core), (0,) * core.ninputs, tuple(plant.output_delays))
     L = estimator.gain
     # Estimated core and delay line, as in the augmented plant.
     inner, into = A - L @ C, B - L @ D

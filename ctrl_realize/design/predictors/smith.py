@@ -214,9 +214,7 @@ def _assemble(
     Also the pulse response from which all but the last column of the delay line are computed.
     """
     core, d = plant.delay_free, int(plant.delay)
-    Ac, Bc, Cc, Dc = (
-        np.asarray(M, dtype=np.float64) for M in (primary.A, primary.B, primary.C, primary.D)
-    )
+    Ac, Bc, Cc, Dc = ct.ssdata(primary)
     Ak, Bk, Ck = kept
     Af, Bf, Cf, Df = filter_
     nc, nk, nf = Ac.shape[0], Ak.shape[0], Af.shape[0]
