@@ -82,7 +82,7 @@ def known_from_fit(fit: OutputErrorFit) -> Known:
         # Means were fitted: of step records, or of samples.
         residuals = [_left(record, model) for record in records]
     tests = [
-        Experiment(_moved(record), _noise_of(residual, record, fit.dt), record.seen, record.dt)
+        Experiment(_moved(record), _noise_of(residual, record, fit), record.seen, record.dt)
         for record, residual in zip(records, residuals, strict=True)
     ]
     plausible = tuple(one for one in others if np.sum(one.poles == 0) <= 1)
@@ -91,15 +91,15 @@ def known_from_fit(fit: OutputErrorFit) -> Known:
     return Known(model, plausible, fit.dt, tests[-1].noise, tuple(tests), level, move)
 
 
-def _noise_of(residual: FloatArray, record: Record, dt: float) -> NoiseModel:
+def _noise_of(residual: FloatArray, record: Record, fit: OutputErrorFit) -> NoiseModel:
     """Noise of a residual; coloured where it is more so than white noise scatters to.
 
     No less than that of rounding: a rounded output may stand still.
     """
     quantum = quantisation_step(np.ravel(record.output)[record.seen])
-    noise = NoiseModel(np.empty(0), winsorised_sigma(residual, quantum), dt)
+    noise = NoiseModel(np.empty(0), winsorised_sigma(residual, quantum), fit.dt)
     if correlation_time(residual) > 1:
-        noise = noise_of(residual, dt)
+        noise = noise_of(residual, fit.dt, fit._noise_filter)
     return replace(noise, std=max(noise.std, quantum / np.sqrt(12)))
 
 

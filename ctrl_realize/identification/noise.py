@@ -23,7 +23,9 @@ class NoiseModel(Result):
 
     Burg's method, the order of the smallest Bayesian information criterion, at most 25 and one for
     20 samples (Stoica and Moses, Spectral Analysis of Signals, 2005, section 3.9.3). Samples beyond
-    four standard deviations are cut for it.
+    four standard deviations are cut for it. Where a fit has made coloured noise white, beside
+    inputs other than steps, the model is that of the fit: restricted maximum likelihood (Harville
+    1977), which makes up for what the fit has followed of the noise.
 
     Attributes
     ----------
@@ -104,10 +106,14 @@ class NoiseModel(Result):
         return f"<NoiseModel order {self.coefficients.size}, innovations {self.std:.4g}>"
 
 
-def noise_of(residual: FloatArray, dt: float) -> NoiseModel:
-    """Model what a fit leaves of an output, shape (N,)."""
+def noise_of(residual: FloatArray, dt: float, denominator: FloatArray | None = None) -> NoiseModel:
+    """Model what a fit leaves of an output, shape (N,); by the polynomial of the fit if it has one.
+
+    A fit follows a part of slow noise, for which its own polynomial makes up.
+    """
     left = residual[~np.isnan(residual)] - np.nanmean(residual)
-    denominator = whitening_filter(left, noise_lags(left.size))
+    if denominator is None:
+        denominator = whitening_filter(left, noise_lags(left.size))
     order = denominator.size - 1
     innovations = lfilter(denominator, [1.0], left)[order:]
     return NoiseModel(-denominator[1:], float(np.std(innovations)), dt)

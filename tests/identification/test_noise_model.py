@@ -59,6 +59,23 @@ def test_white_noise_has_no_coefficients():
     assert "white" in noise.report()
 
 
+def test_what_a_fit_followed_of_slow_noise_is_made_up_for():
+    # The pole of what is left of 240 samples is 0.845, that of the noise itself 0.89.
+    poles = []
+    for seed in range(10):
+        rng = np.random.default_rng(seed)
+        u = np.repeat(rng.choice([-1.0, 1.0], 40), 6)
+        held = np.concatenate([np.zeros(6), u[:-6]])
+        y = lfilter([2 * -np.expm1(-0.05)], [1, -np.exp(-0.05)], held)
+        noise = lfilter([0.02], [1, -0.9], rng.standard_normal(u.size + 200))[200:]
+        record = cr.Record(0.5 * np.arange(u.size), u, y + noise)
+        fit = cr.identify(record, structures="P1D").fit
+        poles.append(fit.noise_model.coefficients.sum())
+    # bias of an autoregression about a mean: (1 + 3 0.9) / 240 = 0.016 (Kendall 1954); standard
+    # error of the mean of ten: sqrt((1 - 0.81) / 240 / 10) = 0.009
+    assert np.mean(poles) == pytest.approx(0.9, abs=0.016 + 2.6 * 0.009)
+
+
 def test_a_plant_is_disturbed_by_the_noise_of_a_fit(fit):
     plant = cr.bench.tank(dt=0.5, resolution=None)
     noisy = plant.disturbed_by(fit.noise_model)

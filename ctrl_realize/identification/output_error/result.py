@@ -352,10 +352,15 @@ class OutputErrorFit(FractionalDelayFit):
 
     @property
     def noise_model(self) -> NoiseModel:
-        """Autoregressive model of the residual, with a one-step predictor."""
+        """Autoregressive model of the noise, with a one-step predictor."""
         from ..noise import noise_of
 
-        return noise_of(self.measured - self.fitted, self.dt)
+        return noise_of(self.measured - self.fitted, self.dt, self._noise_filter)
+
+    @property
+    def _noise_filter(self) -> FloatArray | None:
+        """Polynomial that made the noise of samples white; that of means over blocks is another."""
+        return self.estimate.residual.noise if self.data.every == 1 else None
 
     @property
     def structure(self) -> tuple[int, int]:

@@ -174,17 +174,22 @@ class Residual(NamedTuple):
 
     `std` is its standard deviation, `normalized_rms` that over the noise in means over bins,
     `correlation` the number of samples that count as one. `whitened`: coloured noise was whitened
-    with its model from before the step; `noise_lags` is the order of the noise model of an input
-    other than a step. `rounded` is the noise before rounding, if the model is that of the
-    likelihood of rounded data.
+    with its model from before the step; `noise` is the polynomial (r + 1,) that was used to make
+    the noise white beside an input other than a step. `rounded` is the noise before rounding, if
+    the model is that of the likelihood of rounded data.
     """
 
     std: float
     normalized_rms: float
     correlation: float
     whitened: bool = False
-    noise_lags: int = 0
+    noise: FloatArray | None = None
     rounded: float | None = None
+
+    @property
+    def noise_lags(self) -> int:
+        """Order of that polynomial; 0 where none was used."""
+        return 0 if self.noise is None else self.noise.size - 1
 
 
 class DistributedLags(NamedTuple):

@@ -146,7 +146,7 @@ def fit_sampled(
         every = -(-max(y.size for y in outputs) // MOST_SAMPLES)
         found, fit, loads = fit_lags(cut(outputs, inputs, dt, every, requested.known), requested)
         if requested.forms or fit.better is None:
-            fit = _at_rest(found.data, _of_measured(found, fit, found.noise.size - 1))
+            fit = _at_rest(found.data, _of_measured(found, fit, found.noise))
             return SampledFit(fit, found.data, explained(found.fit), found.noise, None, loads)
     structures = requested.structures
     # How long a plant must be seen is a question to all structures.
@@ -196,9 +196,9 @@ def fit_sampled(
         later = data.after(fit.dead_time)
         if later.starts > data.starts:
             part, data = replace(part, data=later), later
-        fit = _of_measured(part, fit, 0)
+        fit = _of_measured(part, fit)
     elif part.noise.size > 1:
-        fit = replace(_of_measured(part, fit, part.noise.size - 1), unweighted=part.unweighted)
+        fit = replace(_of_measured(part, fit, part.noise), unweighted=part.unweighted)
     elif fit.distributed.chain:
         left = correlation_time(fits.window.output - fit.fitted)
         fit = replace(fit, residual=fit.residual._replace(correlation=left), adequate=left <= WHITE)
@@ -212,7 +212,7 @@ def fit_sampled(
 
 
 def _of_measured(
-    part: SampledWindow, fit: OutputErrorEstimate, noise_lags: int
+    part: SampledWindow, fit: OutputErrorEstimate, noise: FloatArray | None = None
 ) -> OutputErrorEstimate:
     """Describe a fit of filtered or condensed records in terms of those that were measured."""
     window = window_of(part.data.without_loads)
@@ -226,7 +226,7 @@ def _of_measured(
         fit,
         fitted=fitted,
         followed=followed._replace(complete=complete),
-        residual=fit.residual._replace(std=left, noise_lags=noise_lags),
+        residual=fit.residual._replace(std=left, noise=noise),
     )
 
 
