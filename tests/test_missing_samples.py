@@ -185,8 +185,7 @@ def test_dead_sensors_and_outliers_of_operating_data_are_named():
     spiked[rng.choice(800, 12, replace=False)] += 0.3  # 15 standard deviations: not left out
     assert "1.5 % of the samples are outliers" in flags(spiked)["outliers"]
     coded[[100, 400]] = -9999.0
-    with pytest.raises(DataError, match=r"2 sample.s., the first at index .*, are -9999"):
-        flags(coded)
+    assert "2 sample(s), the first at 100 s, are -9999" in flags(coded)["outliers"]
 
 
 @pytest.mark.parametrize("rows", [slice(101, 102), slice(200, 215)])

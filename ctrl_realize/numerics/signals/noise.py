@@ -281,14 +281,17 @@ def spikes(output: FloatArray, fitted: FloatArray) -> BoolArray:
     return np.asarray(np.minimum(np.abs(error), np.abs(alone)) > limit)
 
 
-def far_value(values: FloatArray) -> IntArray:
-    """Samples of a single value far beyond all others, as loggers write for missing samples."""
-    there = values[np.isfinite(values)]
+def far_value(values: FloatArray, limit: float = BEYOND) -> IntArray:
+    """Samples of a single value far beyond all others, as loggers write for missing samples.
+
+    That is, by `limit` ranges of the others.
+    """
+    there, far = values[np.isfinite(values)], []
     for end in np.unique(there)[[0, -1]] if there.size else ():
         others = there[there != end]
-        if others.size and np.abs(others - end).min() > BEYOND * np.ptp(others) > 0:
-            return np.flatnonzero(values == end)
-    return np.empty(0, dtype=np.int64)
+        if others.size and np.abs(others - end).min() > limit * np.ptp(others) > 0:
+            far.append(np.flatnonzero(values == end))
+    return min(far, key=len, default=np.empty(0, dtype=np.int64))
 
 
 def largest_excess(values: FloatArray) -> tuple[int, int]:

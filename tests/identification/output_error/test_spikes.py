@@ -52,8 +52,40 @@ def test_a_code_for_missing_values_does_not_hide_a_spike():
     fit = fitted(STEP, y)
     assert fit.structure == (1, 1)
     assert fit.interval[0] <= DELAY <= fit.interval[1]
-    (said,) = [flag.message for flag in fit.flags if flag.code == "outliers"]
-    assert said.startswith("3 sample(s), the first at 150 s were left out")
+    said = " ".join(flag.message for flag in fit.flags if flag.code == "outliers")
+    assert "1 sample(s), the first at 250 s were left out" in said
+    assert "2 sample(s), the first at 150 s, are -9999" in said
+
+
+@pytest.mark.parametrize("where", [30, 109, 150, 399])
+@pytest.mark.parametrize("value", [-999.0, -9999.0, 1e6])
+def test_a_code_for_missing_values_is_left_out_wherever_it_is(where, value):
+    y = np.ravel(PLANT.simulate(STEP)) + NOISE * np.random.default_rng(3).standard_normal(400)
+    gap, y = y.copy(), y.copy()
+    gap[where], y[where] = np.nan, value
+    fit = fitted(STEP, y)
+    told = cr.identify(cr.Record(TIME, STEP, gap, missing="keep")).fit
+    assert (fit.dead_time, fit.interval, fit.gain) == (told.dead_time, told.interval, told.gain)
+    assert codes(fit) - codes(told) == {"outliers"}
+
+
+@pytest.mark.parametrize("u", [STEP, BINARY], ids=["step", "any input"])
+@pytest.mark.parametrize(("where", "value"), [(30, 1000.0), (250, -9999.0), (250, 4.0)])
+def test_an_error_code_of_the_input_is_none_if_the_output_responds(u, where, value):
+    noise = NOISE * np.random.default_rng(3).standard_normal(u.size)
+    pulsed = u.copy()
+    pulsed[where] = value
+    plain = fitted(u, np.ravel(PLANT.simulate(u)) + noise)
+    code = fitted(pulsed, np.ravel(PLANT.simulate(u)) + noise)
+    assert (code.dead_time, code.interval, code.gain) == (
+        plain.dead_time, plain.interval, plain.gain,
+    )  # fmt: skip
+    (said,) = [flag.message for flag in code.flags if flag.code == "outliers"]
+    assert said.startswith(f"1 sample(s) of the input, the first at {where} s")
+    pulse = fitted(pulsed, np.ravel(PLANT.simulate(pulsed)) + noise)
+    assert "outliers" not in codes(pulse)
+    assert pulse.interval[0] <= DELAY <= pulse.interval[1]
+    assert pulse.gain == pytest.approx(GAIN, abs=0.01)
 
 
 def test_samples_are_spikes_where_they_are_far_from_the_model_and_from_their_neighbours():

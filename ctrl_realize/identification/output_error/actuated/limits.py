@@ -1,7 +1,7 @@
 """Samples that are no measurements of the plant are left out of the fit, and it is told.
 
-Those at a limit are bounds of what it does, spikes are the sensor's, and between two of its updates
-a held output repeats what was measured before.
+Those at a limit are bounds of what it does, spikes are the sensor's, values far beyond all others
+the logger's, and between two of its updates a held output repeats what was measured before.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from ....delayed.simulation import simulate_record
 from ....errors import DataError, UnsuitableSystemError
 from ....numerics.arrays import BoolArray, FloatArray, IntArray
 from ....numerics.constants import STRONG
-from ....numerics.signals.noise import FAR, spikes
+from ....numerics.signals.noise import BEYOND, FAR, far_value, spikes
 from ....numerics.validation.held_output import updates
 from ....numerics.validation.limits import at_limit, clips, ends, passed, plateaus
 from ..arguments import FEWEST_SAMPLES, step_data_of
@@ -28,6 +28,9 @@ from ..summary import fitted_model
 
 _TURNS = 3  # at most: time
 _MORE = 0.05  # of the samples on plateaus that a model finds besides: it is fitted anew
+
+_SELDOM = 0.05  # of the samples, up to which a value far beyond the others is no state of a plant
+_PULSE = 0.5  # ranges of the others by which an input is beyond them: the output tells what it is
 
 Fit = Callable[[Record], OutputErrorFit]
 
@@ -51,6 +54,34 @@ def without_cut_noise(record: Record) -> tuple[Record, tuple[Flag, ...]]:
             left |= samples
         flags.append(_at_limit(limit, samples, left_out=left_out))
     return _without(record, left) if left.any() else record, tuple(flags)
+
+
+def without_codes(record: Record) -> tuple[Record, tuple[Flag, ...]]:
+    """Leave out samples of the output with a value that marks missing data, and tell it."""
+    codes, flags = _codes(record, record.output, "outliers.code_left_out", BEYOND)
+    return (_without(record, codes), flags) if flags else (record, ())
+
+
+def with_held_input(record: Record) -> tuple[Record, tuple[Flag, ...]]:
+    """Hold the input where it has such a value, and tell it."""
+    codes, flags = _codes(record, record.input, "outliers.code_of_input", _PULSE)
+    if not flags:
+        return record, ()
+    last = np.maximum.accumulate(np.where(codes, 0, np.arange(codes.size)))
+    last[last == 0] = int(np.argmin(codes))
+    return record.__replace__(input=np.ravel(record.input)[last]), flags
+
+
+def _codes(
+    record: Record, signal: FloatArray, words: str, limit: float
+) -> tuple[BoolArray, tuple[Flag, ...]]:
+    values = np.ravel(signal)
+    far, codes = far_value(values, limit), np.zeros(values.size, dtype=bool)
+    if not 0 < far.size <= _SELDOM * values.size:
+        return codes, ()
+    codes[far] = True
+    first, value = in_time(record.time[far[0]]), values[far[0]]
+    return codes, (flagged(words, count=far.size, first=first, value=value, limit=limit),)
 
 
 def at_updates(record: Record) -> tuple[Record, tuple[Flag, ...]]:
