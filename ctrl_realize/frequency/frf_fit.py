@@ -163,6 +163,13 @@ class FRFFit(FractionalDelayFit):
         core = np.asarray(self.core(points, squeeze=False))[0, 0]
         return np.asarray(core * np.exp(-points * self.dead_time), dtype=np.complex128)
 
+    @property
+    def gain_resolved(self) -> bool:
+        """Whether the points tell the slowest poles from integrators, and so the gain."""
+        slow = np.abs(self.poles) < 2 * np.pi * self.frequency_hz[0]
+        slow[:1] = True
+        return not np.any(slow & (Z_95 * self.pole_std > np.abs(self.poles)))
+
     def table(self) -> pd.DataFrame:
         """List the structures that were tried, best first."""
         import pandas as pd
@@ -188,9 +195,7 @@ class FRFFit(FractionalDelayFit):
         if not self.noise_known:
             size = f"{100 * self.weighted_rms:.3g} % of"
         hold, unknown = [], ""
-        slow = np.abs(self.poles) < 2 * np.pi * self.frequency_hz[0]
-        slow[:1] = True
-        if np.any(slow & (Z_95 * self.pole_std > np.abs(self.poles))):
+        if not self.gain_resolved:
             unknown = f"not determined from {self.frequency_hz[0]:.4g} Hz on"
         if self.hold_time is not None:
             hold.append(("hold", f"zero-order hold of {in_time(self.hold_time)}, divided out"))

@@ -131,6 +131,10 @@ def chosen_model(
         flags=tuple(flags),
         stated=stated,
     )  # fmt: skip
+    if not result.gain_resolved:
+        lowest = f"{frequency[0]:.4g}"
+        open_end = flagged("gain_not_resolved.frf", gain=result.gain, lowest=lowest)
+        result = replace(result, flags=(*result.flags, open_end))
     if held is not None:
         own = result.response(2 * np.pi * frequency) + data.misfit(chosen) / data.weight * size
         result = replace(result, measured=locked(own))

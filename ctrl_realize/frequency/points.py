@@ -99,8 +99,10 @@ def _sigma(
     """Return the standard deviation of each point, and whether it was measured."""
     if weighting in ("auto", "std") and std is not None and np.any(std > 0):
         # no measurement is accurate to the last digits
-        least = max(1e-3 * float(np.median(std[std > 0])), 1e-14 * float(np.abs(response).max()))
-        return _smoothed(np.maximum(std, least)), True
+        usual = float(np.median(std[std > 0]))
+        least = max(1e-3 * usual, 1e-14 * float(np.abs(response).max()))
+        # A deviation of zero is one that was not measured, as of a single repeat.
+        return _smoothed(np.maximum(np.where(std > 0, std, usual), least)), True
     if weighting == "std":
         raise OptionError("weighting='std', but the FRF has no standard deviation")
     if weighting == "uniform":

@@ -18,7 +18,7 @@ Interval = tuple[float, float]
 
 _SMALL_LAG, _SMALL_PART = 0.1, 0.05
 """A lag whose interval includes 0 is not written in a formula up to so many samples, and up to this
-part of the upper end of the interval."""
+part of the upper end of the interval and of the total delay."""
 _OPEN = 0.5  # of a sample, least length of the interval of a dead time that is told in samples
 _HALF = 0.7  # of the sum of lags: time at which a response passes its half
 
@@ -95,12 +95,13 @@ def told(
     many `samples` is theirs.
     """
     small = _SMALL_LAG * dt if samples is None else dt
+    lags = [one for one in parameters if one.name.startswith("lag_")]
+    # Of lags that are alike none is known, and all matter.
+    total = sum(one.value for one in parameters if one in lags or one.name == "dead_time")
     out = [
         one
-        for one in parameters
-        if one.name.startswith("lag_")
-        and one.low <= 0
-        and one.value <= max(small, _SMALL_PART * one.high)
+        for one in lags
+        if one.low <= 0 and one.value <= max(small, _SMALL_PART * min(one.high, total))
     ]
     shown = [one for one in parameters if one not in out]
     if samples is not None and len(shown) == 2:

@@ -22,6 +22,7 @@ from .units import plain_unit
 
 _NAMES = facts("io/words.toml")["frf"]
 _IN_HZ = {"mHz": 1e-3, "hz": 1.0, "khz": 1e3, "MHz": 1e6, "rad/s": 1 / (2 * np.pi)}
+_SHALLOW = 60.0  # degrees, by which a lag turns the phase where it has halved the magnitude
 _UNITS = {"frequency": tuple(_IN_HZ), "magnitude": ("", "db"), "phase": ("deg", "rad")}
 
 
@@ -210,7 +211,8 @@ def _response(
         return table.numbers(columns["real"]) + 1j * table.numbers(columns["imag"])
     magnitude = _magnitude(table, columns["magnitude"], units["magnitude"])
     radians = _frequency_unit(table, columns["frequency"], units["frequency"]) == "rad/s"
-    phase = _phase(table, columns["phase"], units["phase"], radians)
+    falls = magnitude.min() < np.cos(np.deg2rad(_SHALLOW)) * magnitude.max()
+    phase = _phase(table, columns["phase"], units["phase"], radians, falls)
     return np.asarray(magnitude * np.exp(1j * phase), dtype=np.complex128)
 
 
@@ -229,15 +231,20 @@ def _magnitude(table: Table, index: int, unit: str | None) -> FloatArray:
     return values
 
 
-def _phase(table: Table, index: int, unit: str | None, radians: bool) -> FloatArray:
-    """Phase in rad; `radians` tells whether the frequency is in rad/s, as in python-control."""
+def _phase(table: Table, index: int, unit: str | None, radians: bool, falls: bool) -> FloatArray:
+    """Phase in rad; `radians` tells whether the frequency is in rad/s, as in python-control.
+
+    A response that `falls` by so much has a phase of more than `_SHALLOW` degrees: less are rad.
+    """
     values = table.numbers(index)
     unit = plain_unit(table.columns[index].unit) if unit is None else unit
     if unit not in ("", "deg", "rad"):
         raise OptionError(
             f"{table.path}: {table.title(index)} is in {unit!r}; give phase_unit='deg' or 'rad'"
         )
-    if not unit and values.any() and (radians or np.abs(values).max() <= 2 * np.pi):
+    largest = np.abs(values).max(initial=0.0)
+    doubtful = radians or largest <= 2 * np.pi or (falls and largest <= _SHALLOW)
+    if not unit and largest and doubtful:
         raise OptionError(
             f"{table.path}: {table.title(index)} could be in degrees or in radians; give "
             "phase_unit='deg' or 'rad'"

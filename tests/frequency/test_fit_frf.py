@@ -223,6 +223,26 @@ def test_two_mass_set_up_has_three_samples_beyond_its_hold(shared_data):
     assert 3.3 < fit.interval[1] / dt < 5.5
 
 
+def test_the_gain_of_an_integrating_plant_is_not_known():
+    f = np.geomspace(0.001, 0.3, 60)
+    integrating = noisy(0, f=f, level=1e-2, plant=lambda s: 0.1 * np.exp(-3 * s) / s / (10 * s + 1))
+    fit = cr.fit_frf(integrating).fit
+    assert fit.interval[0] <= 3.0 <= fit.interval[1]
+    assert "gain_not_resolved" in {flag.code for flag in fit.flags}
+    assert "not determined from 0.001 Hz on" in fit.report()
+    settling = noisy(0, f=f, level=1e-2, plant=lambda s: 2 * np.exp(-3 * s) / (10 * s + 1))
+    assert cr.fit_frf(settling).fit.flags == ()
+
+
+def test_a_standard_deviation_of_zero_is_one_that_was_not_measured():
+    whole = noisy(1)
+    std = np.array(whole.std)
+    std[40] = 0.0
+    one = cr.fit_frf(cr.MeasuredFRF(whole.complex, F, std=std)).fit
+    same = cr.fit_frf(whole).fit
+    assert (one.order, one.dead_time, one.gain) == (same.order, same.dead_time, same.gain)
+
+
 def test_times_of_a_slow_plant_are_told_in_seconds():
     slow = 1e4
     frf = cr.MeasuredFRF(second_order(S, tau=0.05), F / slow)
@@ -238,7 +258,7 @@ def test_hydrophone_answers_before_its_input_and_that_is_said(shared_data):
     frf = cr.read_frf(shared_data / "hydrophone" / "frf.csv")
     fit = cr.fit_frf(frf, 4, relative_degree=1, band_hz=(1e6, 60e6)).fit
     assert fit.dead_time == 0
-    assert [flag.code for flag in fit.flags] == ["phase_leads"]
+    assert [flag.code for flag in fit.flags] == ["phase_leads", "gain_not_resolved"]
     assert "dead time of -0.0073 µs" in str(fit.flags[0]) or "-0.00726 µs" in str(fit.flags[0])
 
 

@@ -70,6 +70,13 @@ def test_columns_and_units_are_chosen(tmp_path):
     ("text", "kwargs", "error", "match"),
     [
         (written("f,gain,phase", F, abs(G), PHASE), {}, OptionError, "in degrees or in radians"),
+        # a dead time turns the phase by more than 2 pi, and half the magnitude by more than 60 deg
+        (
+            written("f,gain,phase", F, abs(G), 10 * PHASE),
+            {},
+            OptionError,
+            "in degrees or in radians; give phase_unit",
+        ),
         # MATLAB's bode gives rad/s and degrees, python-control rad/s and radians
         (
             written("omega,mag,phase", OMEGA, abs(G), 10 * PHASE),

@@ -217,7 +217,7 @@ class LocalErrors:
         """Root R (r, s) of the covariance ``R^T R`` of some of the slopes' parameters."""
         columns, size = unit_columns(np.concatenate([self.slopes[:, seen], self.own], axis=1))
         _, singular, turned = np.linalg.svd(columns, full_matrices=False)
-        singular = np.maximum(singular, max(_NOTHING * singular[0], SMALLEST))
+        singular = np.maximum(singular, max(_NOTHING * singular.max(initial=0.0), SMALLEST))
         count = int(seen.sum())
         return np.asarray((turned / singular[:, None])[:, :count] / size[:count])
 

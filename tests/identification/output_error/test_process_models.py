@@ -11,6 +11,7 @@ from scipy.signal import lfilter
 import ctrl_realize as cr
 from benchmarks.acceptance.cases import PLANTS, made
 from ctrl_realize.identification import ProcessStructure
+from tests.rigs import codes
 
 DT, EDGE, NOISE = 0.1, 100, 0.01
 TWO_LAGS = ([2.0], [10.0, 7.0, 1.0])  # 5 s and 2 s
@@ -166,3 +167,16 @@ def test_hours_as_sample_time_give_the_model_of_seconds(name):
     slow = cr.Record(36000 * fast.time, fast.input, fast.output)
     seconds, hours = (cr.identify(one, structures=name).fit for one in (fast, slow))
     assert hours.dead_time == pytest.approx(36000 * seconds.dead_time, rel=1e-6)
+
+
+@pytest.mark.parametrize("name", ["P1D", "P2D"])
+def test_all_parameters_may_be_prescribed_and_a_contradiction_is_told(name):
+    data = record(TWO_LAGS)
+    given = {"gain": 2.0, "dead_time": DEAD_TIME, "lag_1": 5.0}
+    given |= {"lag_2": 2.0} if name == "P2D" else {}
+    every = cr.identify(data, structures=ProcessStructure(name, fixed=given)).fit
+    assert {one.name: one.value for one in every.parameters} == pytest.approx(given)
+    assert every.at_noise_level == (name == "P2D")
+    for wrong in ({"fixed": {"gain": -2.0}}, {"bounds": {"gain": (-3.0, -1.0)}}):
+        fit = cr.identify(data, structures=ProcessStructure(name, **wrong)).fit
+        assert {"structured_misfit", "apparent_dead_time"} <= codes(fit)

@@ -56,6 +56,13 @@ def test_a_stated_lag_that_the_data_contradict_is_told(record):
     assert "no lag is faster than 16 s was stated, and the data contradict it" in fit.report()
 
 
+def test_lags_that_are_alike_are_in_the_transfer_function():
+    """All of four lags of about 20 s were left out, since none of them is known."""
+    fit = cr.identify(step_record(lags=(30.0, 12.0)), fastest_lag=20.0).fit
+    assert fit.order > 1
+    assert fit.formula.partition("/ (")[2].count("s + 1") == fit.order
+
+
 def test_a_stated_range_bounds_the_search(record, plain):
     system = cr.identify(record, dead_time=(4.0, 5.0))
     assert system.fit.interval == (4.0, 5.0) or width(system.fit) < 1.0
