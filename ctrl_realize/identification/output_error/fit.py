@@ -102,8 +102,9 @@ def fit_output_error(
         reported as an apparent one.
     max_delay : float, optional
         Largest dead time in samples. Default: the visible onset of the output, which the dead time
-        cannot exceed; for inputs other than steps a quarter of the longest record, and half of it
-        where that explains nothing or is reached.
+        cannot exceed, but for the apparent one of `structures` that approximate the plant; for
+        inputs other than steps a quarter of the longest record, and half of it where that explains
+        nothing or is reached.
     known : control.TransferFunction or control.StateSpace, optional
         Known continuous dynamics between plant and record (sensor, anti-aliasing filter,
         converter). They are part of the fit, but not of the returned model.
@@ -308,8 +309,12 @@ def _requested(
 ) -> Requested:
     noise = one_of(noise, "noise", ("auto", "white"))
     limit = None if max_delay is None else positive(max_delay, "max_delay", "number of samples")
-    latest = None if limit is None else limit * records[0].sample_time
-    return replace(requested(structures), latest=latest, whiten=noise == "auto")
+    asked = requested(structures)
+    bounds = [form.bounds.get("dead_time", (0.0, np.inf))[1] for form in asked.forms]
+    latest = max(filter(np.isfinite, bounds), default=None)
+    if limit is not None:
+        latest = limit * records[0].sample_time
+    return replace(asked, latest=latest, whiten=noise == "auto")
 
 
 def _linear(

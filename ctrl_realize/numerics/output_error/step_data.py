@@ -277,8 +277,13 @@ def window(data: StepData, stop: int, known: KnownFactor) -> Window:
     )
 
 
-def step_scales(data: StepData, stop: int, latest: float | None, earliest: float = 0.0) -> Scales:
-    """Initial guesses of the times of the response, from its onset and its 63 % point."""
+def step_scales(
+    data: StepData, stop: int, latest: float | None, earliest: float = 0.0, apparent: bool = False
+) -> Scales:
+    """Initial guesses of the times of the response, from its onset and its 63 % point.
+
+    No dead time is later than the visible onset, but an `apparent` one may be: until `latest`.
+    """
     assert data.motion is not None
     motion, dt = data.motion, data.dt
     end = int(data.rows[stop - 1]) + 1
@@ -289,12 +294,13 @@ def step_scales(data: StepData, stop: int, latest: float | None, earliest: float
     if data.relaxing and data.bend:
         # Beside a motion that goes on, that of the response is not visible before it is large.
         last = max(last, since * dt)
+    latest, apparent = (last, False) if latest is None else (latest, apparent)
     return Scales(
         onset=max(motion.onset, 0.5) * dt,
         rise=max(rise, 2.0) * dt,
         length=(end - data.edges[0][0]) * dt,
         dt=dt,
-        latest=last if latest is None else min(last, latest) if earliest < last else latest,
+        latest=latest if apparent or earliest >= last else min(last, latest),
         earliest=earliest,
     )
 

@@ -317,10 +317,12 @@ def _unseen(fits: WindowFit, model: Candidate) -> float:
 def _fit_until(
     data: StepData, stop: int, structures: Sequence[Structure], requested: Requested
 ) -> WindowFit:
+    # A structure that is given may be an approximation.
+    given = requested.structures is not None and structures is not ALL_STRUCTURES
     return fit_window(
         window(data, stop, requested.known),
         structures,
-        step_scales(data, stop, requested.latest, requested.earliest),
+        step_scales(data, stop, requested.latest, requested.earliest, given),
         (data.sigma, data.quantum),
         requested.huber,
     )

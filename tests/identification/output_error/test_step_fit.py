@@ -183,7 +183,7 @@ def test_a_code_for_missing_samples_is_told_by_its_value():
     y[[350, 800]] = -9999.0
     fit = cr.fit_output_error(cr.Record(record.time, record.input, y), structures=[(1, 1)]).fit
     message = next(str(flag) for flag in fit.flags if flag.code == "outliers")
-    assert message.startswith("2 sample(s), the first at 273 ms, -9999 each, were left out")
+    assert message.startswith("2 sample(s), the first at 273 ms, are -9999")
     # One wild sample of each kind is no code.
     y[800] = 8888.0
     fit = cr.fit_output_error(cr.Record(record.time, record.input, y), structures=[(1, 1)]).fit
