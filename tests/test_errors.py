@@ -108,6 +108,7 @@ ERRORS = {
         (lambda: cr.identify(cr.Record(T, 1.0 * (T > 39.85), DRIVEN.output)), "after it"),
     ],
     UnsuitableSystemError: [
+        (lambda: VALVE / VALVE, "is not proper"),
         (lambda: fit(known=ct.tf([1], [1, -2.0])), r"2\+0j rad/s.*stable"),
         (lambda: fit(known=DISCRETE), "continuous"),
         (lambda: fit(known=3.0), "float"),
@@ -225,6 +226,8 @@ ERRORS = {
         (lambda: cr.design.pid(FOPDT, "lambda", "PID"), "has no PID; available: PI"),
         (lambda: cr.design.pid(FOPDT, "simc", closed_loop_time=-1.0), "closed_loop_time=-1"),
         (lambda: cr.design.pid(FOPDT, "optimal", max_sensitivity=1.0), "max_sensitivity=1"),
+        (lambda: cr.design.pid(FOPDT, "simc", max_sensitivity=1.2), "argument of 'optimal', not"),
+        (lambda: cr.design.predictor_lqr(VALVE, -np.eye(1), 1), "eigenvalue of -1"),
         (lambda: WIDE * VALVE.append(VALVE).append(VALVE), r"\(2, 2\) and \(3, 3\)"),
         (lambda: cr.delay("long"), "finite number"),
         (lambda: cr.delayed_ss(LAG, dead_time=np.nan, dt=TS), "finite"),

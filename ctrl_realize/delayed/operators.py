@@ -142,6 +142,8 @@ class DelayOperators(DeferredMatrices):
 
     def __truediv__(self, other: Any) -> Any:
         """Series with the inverse of `other`, if that is proper."""
+        if isinstance(other, DelayOperators):
+            return self * other**-1
         check_divisor(other)
         return super().__truediv__(other)
 

@@ -12,6 +12,8 @@ from ..._checks import numbers
 from ...errors import DataError, OptionError, UnsuitableSystemError
 from ...numerics.arrays import ComplexArray, FloatArray
 
+_ROUNDING = 1e-9  # of the largest eigenvalue, up to which a negative one counts as zero
+
 
 def weight_matrix(given: ArrayLike, size: int, name: str, of: str) -> FloatArray:
     """Return a symmetric weight or covariance of the required size."""
@@ -25,6 +27,9 @@ def weight_matrix(given: ArrayLike, size: int, name: str, of: str) -> FloatArray
         raise DataError(f"{name} has non-finite entries")
     if not np.allclose(weight, weight.T, rtol=1e-9, atol=0):
         raise OptionError(f"{name} is not symmetric")
+    least, largest = np.linalg.eigvalsh(weight)[[0, -1]]
+    if least < -_ROUNDING * abs(largest):
+        raise OptionError(f"{name} has an eigenvalue of {least:.3g}; expected none below 0")
     return weight
 
 

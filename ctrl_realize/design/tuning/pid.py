@@ -25,6 +25,7 @@ from .ultimate import critical_point
 
 RULES = (*MODEL_RULES, *SYSTEM_RULES)
 KINDS = ("P", "PI", "PD", "PID")
+_USUAL_MS = 1.4  # of the optimal rule
 SAFE = ("amigo", "simc", "lambda")
 """Rules that are suggested if the loop of another is unstable; then the optimal PI."""
 ADJUSTED = ("simc", "lambda", "imc")
@@ -41,7 +42,7 @@ def pid(
     kind: str = "PI",
     *,
     closed_loop_time: float | Literal["robust"] | None = None,
-    max_sensitivity: float = 1.4,
+    max_sensitivity: float | None = None,
     derivative_filter: float = 10.0,
     reduction: str = "optimal",
     method: str = "tustin",
@@ -71,7 +72,7 @@ def pid(
         24 times it, with Ms of at most 2 on the model and on all models that its data do not rule
         out; if there is none, that of the smallest Ms, with a warning.
     max_sensitivity : float, optional
-        Ms, for the optimal rule.
+        Ms, for the optimal rule; default: 1.4.
     derivative_filter : float, optional
         td / tf, 1...100.
     reduction : {"optimal", "half_rule"}, optional
@@ -177,7 +178,7 @@ class TuningOptions:
     """Arguments of `pid` beside system, rule and kind."""
 
     closed_loop_time: float | Literal["robust"] | None = None
-    max_sensitivity: float = 1.4
+    max_sensitivity: float | None = None
     derivative_filter: float = 10.0
     reduction: str = "optimal"
     method: str = "tustin"
@@ -206,7 +207,10 @@ def tuned(
                 f"closed_loop_time= is an argument of simc, lambda and imc, not of {rule!r}"
             )
         target = positive(options.closed_loop_time, "closed_loop_time", "time in s")
-    limit = within(options.max_sensitivity, "max_sensitivity", "Ms", 1.01, 10)
+    if options.max_sensitivity is not None and rule != "optimal":
+        raise OptionError(f"max_sensitivity= is an argument of 'optimal', not of {rule!r}")
+    given = _USUAL_MS if options.max_sensitivity is None else options.max_sensitivity
+    limit = within(given, "max_sensitivity", "Ms", 1.01, 10)
     plant, exact, step = plants or reference_plant(system, options.dt)
     model: ProcessModel | None = None
     if rule in MODEL_RULES:
@@ -250,7 +254,7 @@ def _robust(system: Any, rule: str, kind: str, options: TuningOptions) -> Tuning
 
 def _one_that_works(system: Any, rule: str, kind: str, options: TuningOptions) -> str:
     """Suggest a call whose loop is robust, on the model and over its intervals."""
-    usual = replace(options, closed_loop_time=None, max_sensitivity=1.4)
+    usual = replace(options, closed_loop_time=None, max_sensitivity=None)
     tries = [
         (name, form, replace(usual, reduction=reduction))
         for form in dict.fromkeys((kind, "PI"))
