@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from math import inf
 from typing import Any, TypeAlias
 
 from .._checks import band, real
@@ -207,8 +208,8 @@ def _value(name: str, value: Any) -> float:
 def _range(name: str) -> tuple[float, float]:
     """Possible values."""
     if name in ("gain", "lead_1"):
-        return -float("inf"), float("inf")
-    return 0.0, 1.0 if name.startswith("pair_damping") else float("inf")
+        return -inf, inf
+    return 0.0, 1.0 if name.startswith("pair_damping") else inf
 
 
 def _ends(name: str, ends: Any) -> tuple[float, float]:
@@ -217,8 +218,8 @@ def _ends(name: str, ends: Any) -> tuple[float, float]:
         first, last = ends
     except (TypeError, ValueError):
         first, last = band(ends, name, "bounds of a parameter")
-    low = least if first is None else real(first, name, "lower bound")
-    high = most if last is None else real(last, name, "upper bound")
+    low = least if first in (None, -inf) else real(first, name, "lower bound")
+    high = most if last in (None, inf) else real(last, name, "upper bound")
     if not least <= low < high <= most:
         raise OptionError(
             f"bounds of {name} are {ends!r}; expected low < high within {least:g}...{most:g}"

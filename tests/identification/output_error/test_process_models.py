@@ -177,6 +177,11 @@ def test_all_parameters_may_be_prescribed_and_a_contradiction_is_told(name):
     every = cr.identify(data, structures=ProcessStructure(name, fixed=given)).fit
     assert {one.name: one.value for one in every.parameters} == pytest.approx(given)
     assert every.at_noise_level == (name == "P2D")
+    positive, endless = (
+        cr.identify(data, structures=ProcessStructure(name, bounds={"gain": (0, end)})).fit
+        for end in (None, np.inf)
+    )
+    assert positive.dead_time == endless.dead_time
     for wrong in ({"fixed": {"gain": -2.0}}, {"bounds": {"gain": (-3.0, -1.0)}}):
         fit = cr.identify(data, structures=ProcessStructure(name, **wrong)).fit
         assert {"structured_misfit", "apparent_dead_time"} <= codes(fit)
