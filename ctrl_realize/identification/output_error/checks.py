@@ -20,6 +20,7 @@ from .loop_flags import (
     coloured_flags,
     feedback_flags,
     generalised_step,
+    in_automatic,
     set_point_flags,
     unstable_flags,
 )
@@ -64,6 +65,8 @@ def checked(fit: OutputErrorFit, *, alone: bool = True) -> OutputErrorFit:
     if complete and not stepped:
         flags += feedback_flags(complete, fit.delay_interval[1])
     in_loop = bool(flags)
+    if not complete and "closed_loop" not in codes and any(map(in_automatic, fit.records)):
+        flags.append(flagged("feedback.gaps"))
     # A stable model that leaves noise excludes an unstable plant, unless noise took what it misses.
     if complete and (fit.estimate.averaged or not fit.at_noise_level):
         flags += unstable_flags(complete, fit.delay_interval[1])

@@ -32,6 +32,7 @@ from .actuated.limits import (
     at_updates,
     fit_within_limits,
     fit_without_spikes,
+    with_gaps_filled,
     with_held_input,
     without_codes,
     without_cut_noise,
@@ -365,6 +366,9 @@ def _fit_linear(
     if requested.loop and not gaps[0] and gaps[1]:
         # Records with gaps are not tested for feedback afterwards.
         flags += tuple(feedback_flags(several, 0.0))
+    if requested.loop:
+        kept, filled = _left_out(kept, with_gaps_filled)
+        flags += filled
     several = kept
     if len(several) == 1:
         fit_one = partial(_fit_one, requested=requested, any_input=any_input)
@@ -405,6 +409,8 @@ def _left_out(
 def _fit_one(
     record: Record, requested: Requested, any_input: Callable[..., OutputErrorFit], first: int = 0
 ) -> OutputErrorFit:
+    if requested.loop:  # spikes may have been left out
+        record = with_gaps_filled(record)[0]
     # A pulse that is none for an error code is no edge of a step test.
     no_steps = requested.loop or with_held_input(record)[1]
     data = None if no_steps else step_data_of(record, first)

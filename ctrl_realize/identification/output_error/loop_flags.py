@@ -35,9 +35,14 @@ _STRETCH = 20  # samples of a stretch in manual that is worth a word
 
 
 def in_automatic(record: Record) -> bool:
-    """Whether a set point is known, and moves while it is in force."""
+    """Whether a set point is known, and moves while it is in force.
+
+    One that follows the measured value, as in manual, is none.
+    """
     wanted = record.reference
     if wanted is None or not record.issiso() or np.isnan(wanted).all():
+        return False
+    if not np.any(np.ravel(wanted - record.output)[record.seen]):
         return False
     return float(np.nanmax(wanted) - np.nanmin(wanted)) > 0.0
 

@@ -16,7 +16,7 @@ from ...._wording import in_time
 from ....data import Record
 from ....delayed.simulation import simulate_record
 from ....errors import DataError, UnsuitableSystemError
-from ....numerics.arrays import BoolArray, FloatArray, IntArray
+from ....numerics.arrays import BoolArray, FloatArray, IntArray, without_gaps
 from ....numerics.constants import STRONG
 from ....numerics.signals.noise import BEYOND, FAR, far_value, spikes
 from ....numerics.validation.held_output import updates
@@ -30,6 +30,7 @@ _TURNS = 3  # at most: time
 _MORE = 0.05  # of the samples on plateaus that a model finds besides: it is fitted anew
 
 _SELDOM = 0.05  # of the samples, up to which a value far beyond the others is no state of a plant
+_FEW_GAPS, _SHORT_GAP = 0.2, 5  # part of the samples, and samples in a row, that are interpolated
 _PULSE = 0.5  # ranges of the others by which an input is beyond them: the output tells what it is
 
 Fit = Callable[[Record], OutputErrorFit]
@@ -58,30 +59,59 @@ def without_cut_noise(record: Record) -> tuple[Record, tuple[Flag, ...]]:
 
 def without_codes(record: Record) -> tuple[Record, tuple[Flag, ...]]:
     """Leave out samples of the output with a value that marks missing data, and tell it."""
-    codes, flags = _codes(record, record.output, "outliers.code_left_out", BEYOND)
-    return (_without(record, codes), flags) if flags else (record, ())
+    values, codes, first = _codes(record, record.output, BEYOND)
+    if not codes.size:
+        return record, ()
+    flag = flagged(
+        "outliers.code_left_out",
+        count=codes.size,
+        first=first,
+        value=values[codes[0]],
+        limit=BEYOND,
+    )
+    left = np.zeros(values.size, dtype=bool)
+    left[codes] = True
+    return _without(record, left), (flag,)
 
 
 def with_held_input(record: Record) -> tuple[Record, tuple[Flag, ...]]:
     """Hold the input where it has such a value, and tell it."""
-    codes, flags = _codes(record, record.input, "outliers.code_of_input", _PULSE)
-    if not flags:
+    values, codes, first = _codes(record, record.input, _PULSE)
+    if not codes.size:
         return record, ()
-    last = np.maximum.accumulate(np.where(codes, 0, np.arange(codes.size)))
-    last[last == 0] = int(np.argmin(codes))
-    return record.__replace__(input=np.ravel(record.input)[last]), flags
+    flag = flagged(
+        "outliers.code_of_input",
+        count=codes.size,
+        first=first,
+        value=values[codes[0]],
+        limit=_PULSE,
+    )
+    index = np.arange(values.size)
+    kept = np.delete(index, codes)
+    before = kept[np.maximum(np.searchsorted(kept, index, "right") - 1, 0)]
+    return record.__replace__(input=values[before]), (flag,)
 
 
-def _codes(
-    record: Record, signal: FloatArray, words: str, limit: float
-) -> tuple[BoolArray, tuple[Flag, ...]]:
+def with_gaps_filled(record: Record) -> tuple[Record, tuple[Flag, ...]]:
+    """Interpolate few and short gaps of an output, and tell it.
+
+    The noise of a loop is modelled from sample to sample, without which its plant is biased.
+    """
+    gap, output = ~record.seen, np.ravel(record.output)
+    apart = np.diff(np.flatnonzero(np.r_[True, record.seen, True]))
+    if not gap.any() or gap.mean() > _FEW_GAPS or apart.max() - 1 > _SHORT_GAP:
+        return record, ()
+    flags = (flagged("closed_loop.filled", count=np.count_nonzero(gap)),)
+    return record.__replace__(output=without_gaps(output), missing="refuse"), flags
+
+
+def _codes(record: Record, signal: FloatArray, limit: float) -> tuple[FloatArray, IntArray, str]:
+    """Values of a signal, samples that are a code, and the time of the first in words."""
     values = np.ravel(signal)
-    far, codes = far_value(values, limit), np.zeros(values.size, dtype=bool)
+    far = far_value(values, limit)
     if not 0 < far.size <= _SELDOM * values.size:
-        return codes, ()
-    codes[far] = True
-    first, value = in_time(record.time[far[0]]), values[far[0]]
-    return codes, (flagged(words, count=far.size, first=first, value=value, limit=limit),)
+        return values, far[:0], ""
+    return values, far, in_time(record.time[far[0]])
 
 
 def at_updates(record: Record) -> tuple[Record, tuple[Flag, ...]]:
