@@ -137,8 +137,11 @@ def _checked(records: tuple[Record, ...]) -> Record:
             "structures= all channels are fitted by fit_state_space"
         )
     moves = np.diff(record.input)
+    if not (moving := moves.any(axis=1)).all():
+        name = record.input_labels[int(np.argmin(moving))]
+        raise DataError(f"the input {name!r} is constant; leave it out of the record")
     size = np.maximum(np.abs(moves).max(axis=1, keepdims=True), SMALLEST)
-    if np.linalg.matrix_rank(moves / size) < np.count_nonzero(moves.any(axis=1)):
+    if np.linalg.matrix_rank(moves / size) < len(moves):
         raise DataError(
             f"the inputs {', '.join(record.input_labels)} move alike: the responses to them "
             "cannot be told apart; expected inputs that also move on their own"

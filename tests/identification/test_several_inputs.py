@@ -74,6 +74,9 @@ def test_records_that_it_is_not_for_are_refused():
     alike = cr.Record(T, [data.input[0], 3 - 2 * data.input[0]], data.output)
     with pytest.raises(cr.errors.DataError, match="move alike"):
         cr.identify(alike, structures="FOPDT")
+    still = cr.Record(T, [data.input[0], 0 * T], data.output)
+    with pytest.raises(cr.errors.DataError, match="is constant; leave it out"):
+        cr.identify(still, structures="FOPDT")
 
 
 @pytest.mark.parametrize("structure", ["FOPDT", "P1"])
