@@ -32,6 +32,7 @@ from .actuated.limits import (
     at_updates,
     fit_within_limits,
     fit_without_spikes,
+    has_pulses,
     with_gaps_filled,
     with_held_input,
     without_codes,
@@ -411,9 +412,7 @@ def _fit_one(
 ) -> OutputErrorFit:
     if requested.loop:  # spikes may have been left out
         record = with_gaps_filled(record)[0]
-    # A pulse that is none for an error code is no edge of a step test.
-    no_steps = requested.loop or with_held_input(record)[1]
-    data = None if no_steps else step_data_of(record, first)
+    data = None if requested.loop or has_pulses(record) else step_data_of(record, first)
     if data is None:
         return any_input((record,), requested)
     data, fit = fit_step_record(data, requested)

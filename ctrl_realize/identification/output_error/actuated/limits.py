@@ -28,7 +28,6 @@ from ..summary import fitted_model
 
 _TURNS = 3  # at most: time
 _MORE = 0.05  # of the samples on plateaus that a model finds besides: it is fitted anew
-
 _SELDOM = 0.05  # of the samples, up to which a value far beyond the others is no state of a plant
 _FEW_GAPS, _SHORT_GAP = 0.2, 5  # part of the samples, and samples in a row, that are interpolated
 _PULSE = 0.5  # ranges of the others by which an input is beyond them: the output tells what it is
@@ -92,14 +91,23 @@ def with_held_input(record: Record) -> tuple[Record, tuple[Flag, ...]]:
     return record.__replace__(input=values[before]), (flag,)
 
 
+def has_pulses(record: Record) -> bool:
+    """Whether single samples of an input have such a value: they are no edges of a step test."""
+    codes = _codes(record, record.input, _PULSE)[1]
+    return codes.size > 0 and bool(np.all(np.diff(codes) > 1))
+
+
 def with_gaps_filled(record: Record) -> tuple[Record, tuple[Flag, ...]]:
     """Interpolate few and short gaps of an output, and tell it.
 
     The noise of a loop is modelled from sample to sample, without which its plant is biased.
     """
-    gap, output = ~record.seen, np.ravel(record.output)
-    apart = np.diff(np.flatnonzero(np.r_[True, record.seen, True]))
-    if not gap.any() or gap.mean() > _FEW_GAPS or apart.max() - 1 > _SHORT_GAP:
+    output = np.ravel(record.output)
+    gap = np.isnan(output)
+    apart = np.diff(np.flatnonzero(np.r_[True, ~gap, True]))
+    if np.isnan(record.input).any() or not gap.any():
+        return record, ()
+    if gap.mean() > _FEW_GAPS or apart.max() - 1 > _SHORT_GAP:
         return record, ()
     flags = (flagged("closed_loop.filled", count=np.count_nonzero(gap)),)
     return record.__replace__(output=without_gaps(output), missing="refuse"), flags
