@@ -113,6 +113,24 @@ class SeveralInputsFit(ModelFit):
         index = pd.Index(self.inputs, name="input")
         return pd.DataFrame(rows, columns=[*columns, "formula"], index=index)
 
+    def parameter_table(self, *, time_unit: str | None = None) -> Any:
+        """List the parameters of the models of all inputs, with errors and 95 % intervals.
+
+        Parameters
+        ----------
+        time_unit : {"ms", "s", "min", "h", "day"}, optional
+            Default: `time_unit` of the fits.
+
+        Returns
+        -------
+        pandas.DataFrame
+            Rows (input, parameter), as of each of `fits`.
+        """
+        import pandas as pd
+
+        tables = [fit.parameter_table(time_unit=time_unit) for fit in self.fits]
+        return pd.concat(tables, keys=self.inputs, names=["input"])
+
     def _title(self) -> str:
         return f"Process models of {len(self.fits)} inputs"
 

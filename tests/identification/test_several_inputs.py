@@ -55,6 +55,14 @@ def test_the_model_has_both_inputs_and_leaves_the_noise(sys):
     )
 
 
+def test_the_parameters_of_all_inputs_are_listed(sys):
+    table = sys.fit.parameter_table(time_unit="min")
+    for name, fit in zip(sys.fit.inputs, sys.fit.fits, strict=True):
+        assert table.loc[(name, "gain"), "value"] == fit.gain
+        assert table.loc[(name, "dead_time"), "value"] == pytest.approx(fit.dead_time / 60)
+        assert table.loc[(name, "lag_1"), "low"] < table.loc[(name, "lag_1"), "high"]
+
+
 def test_inputs_that_move_alike_have_wider_intervals(sys):
     # correlation of 0.8 between the inputs: variance inflation 1 / (1 - 0.64) for gains
     together = cr.identify(record(0, alike=0.57), structures="FOPDT").fit
