@@ -294,13 +294,16 @@ def step_scales(
     if data.relaxing and data.bend:
         # Beside a motion that goes on, that of the response is not visible before it is large.
         last = max(last, since * dt)
-    latest, apparent = (last, False) if latest is None else (latest, apparent)
+    if latest is None:
+        latest = last
+    elif earliest < last and not apparent:
+        latest = min(last, latest)
     return Scales(
         onset=max(motion.onset, 0.5) * dt,
         rise=max(rise, 2.0) * dt,
         length=(end - data.edges[0][0]) * dt,
         dt=dt,
-        latest=latest if apparent or earliest >= last else min(last, latest),
+        latest=latest,
         earliest=earliest,
     )
 

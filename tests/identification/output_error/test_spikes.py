@@ -81,7 +81,7 @@ def test_an_error_code_of_the_input_is_none_if_the_output_responds(u, where, val
         plain.dead_time, plain.interval, plain.gain,
     )  # fmt: skip
     (said,) = [flag.message for flag in code.flags if flag.code == "outliers"]
-    assert said.startswith(f"1 sample(s) of the input, the first at {where} s")
+    assert said.startswith(f"of the input 1 sample(s), the first at {where} s, are {value:g}")
     pulse = fitted(pulsed, np.ravel(PLANT.simulate(pulsed)) + noise)
     assert "outliers" not in codes(pulse)
     assert pulse.interval[0] <= DELAY <= pulse.interval[1]

@@ -58,42 +58,28 @@ def without_cut_noise(record: Record) -> tuple[Record, tuple[Flag, ...]]:
 
 def without_codes(record: Record) -> tuple[Record, tuple[Flag, ...]]:
     """Leave out samples of the output with a value that marks missing data, and tell it."""
-    values, codes, first = _codes(record, record.output, BEYOND)
+    codes, said = _codes(record, record.output, BEYOND)
     if not codes.size:
         return record, ()
-    flag = flagged(
-        "outliers.code_left_out",
-        count=codes.size,
-        first=first,
-        value=values[codes[0]],
-        limit=BEYOND,
-    )
-    left = np.zeros(values.size, dtype=bool)
-    left[codes] = True
-    return _without(record, left), (flag,)
+    left = np.isin(np.arange(record.n_samples), codes)
+    return _without(record, left), (flagged("outliers.code_left_out", said=said, limit=BEYOND),)
 
 
 def with_held_input(record: Record) -> tuple[Record, tuple[Flag, ...]]:
     """Hold the input where it has such a value, and tell it."""
-    values, codes, first = _codes(record, record.input, _PULSE)
+    codes, said = _codes(record, record.input, _PULSE)
     if not codes.size:
         return record, ()
-    flag = flagged(
-        "outliers.code_of_input",
-        count=codes.size,
-        first=first,
-        value=values[codes[0]],
-        limit=_PULSE,
-    )
-    index = np.arange(values.size)
+    index = np.arange(record.n_samples)
     kept = np.delete(index, codes)
     before = kept[np.maximum(np.searchsorted(kept, index, "right") - 1, 0)]
-    return record.__replace__(input=values[before]), (flag,)
+    flag = flagged("outliers.code_of_input", said=said, limit=_PULSE)
+    return record.__replace__(input=np.ravel(record.input)[before]), (flag,)
 
 
 def has_pulses(record: Record) -> bool:
     """Whether single samples of an input have such a value: they are no edges of a step test."""
-    codes = _codes(record, record.input, _PULSE)[1]
+    codes, _ = _codes(record, record.input, _PULSE)
     return codes.size > 0 and bool(np.all(np.diff(codes) > 1))
 
 
@@ -113,13 +99,14 @@ def with_gaps_filled(record: Record) -> tuple[Record, tuple[Flag, ...]]:
     return record.__replace__(output=without_gaps(output), missing="refuse"), flags
 
 
-def _codes(record: Record, signal: FloatArray, limit: float) -> tuple[FloatArray, IntArray, str]:
-    """Values of a signal, samples that are a code, and the time of the first in words."""
+def _codes(record: Record, signal: FloatArray, limit: float) -> tuple[IntArray, str]:
+    """Samples of a signal that are a code, and these in words."""
     values = np.ravel(signal)
     far = far_value(values, limit)
     if not 0 < far.size <= _SELDOM * values.size:
-        return values, far[:0], ""
-    return values, far, in_time(record.time[far[0]])
+        return far[:0], ""
+    first = in_time(record.time[far[0]])
+    return far, f"{far.size} sample(s), the first at {first}, are {values[far[0]]:g}"
 
 
 def at_updates(record: Record) -> tuple[Record, tuple[Flag, ...]]:
