@@ -257,7 +257,9 @@ class OutputErrorEstimate:
     `close` are decisions that rounding errors may reverse. `unweighted` is the model of
     plain least squares, if the residual was whitened. `load` is a step of a load; it is part
     of the model unless it is early. `rounding` is the standard error of the gain from that of the
-    levels before and after a step. `drawn` has the structures of which plausible models are drawn.
+    levels before and after a step. `beyond` is the estimate without samples that may be at a limit
+    of the output, which gain and total delay may exceed then. `drawn` has the structures of which
+    plausible models are drawn.
     `points` are the profiles of structures that are not ruled out. If the dead time is
     `averaged`, it is the mean over them, and the interval holds 95 % of their weight: `with_moves`
     tells both for an input that moves so many times further.
@@ -290,6 +292,7 @@ class OutputErrorEstimate:
     drawn: PlausibleDraw | None = None
     points: Mapping[Structure, Points] = field(default_factory=dict)
     rounding: float = 0.0
+    beyond: OutputErrorEstimate | None = None
     with_moves: Callable[[float], tuple[float, float, float]] | None = None
 
     @property
@@ -323,8 +326,19 @@ class OutputErrorEstimate:
         if not self.static.resolved:
             return self.static.ends
         every = ((self.static, 1.0), *self.alike)
-        return averaged_ends(
+        own = averaged_ends(
             [(one.gain, np.hypot(one.gain_std, self.rounding), weight) for one, weight in every]
+        )
+        if self.beyond is None:
+            return own
+        low, high = (-np.inf, np.inf) if self._rises_on else self.beyond.gain_ends
+        return (own[0], max(own[1], high)) if self.static.gain > 0 else (min(own[0], low), own[1])
+
+    @property
+    def _rises_on(self) -> bool:
+        """Whether it integrates without the samples that may be at a limit: its gain is a slope."""
+        return self.beyond is not None and (
+            self.beyond.static is None or self.beyond.static.integrates
         )
 
     @property
@@ -354,7 +368,10 @@ class OutputErrorEstimate:
             return self.low, np.inf
         every = ((self.static, 1.0), *self.alike)
         low, high = averaged_ends([(one.total, one.total_std, weight) for one, weight in every])
-        return (low if self.numerator.size > 1 else max(low, 0.0)), high  # a lead may be longer
+        low = low if self.numerator.size > 1 else max(low, 0.0)  # a lead may be longer
+        if self.beyond is not None:
+            high = np.inf if self._rises_on else max(high, self.beyond.total_ends[1])
+        return low, high
 
 
 def _table(fits: WindowFit, profiles: dict[Structure, Profile]) -> tuple[StructureFit, ...]:

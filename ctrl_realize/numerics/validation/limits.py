@@ -159,7 +159,11 @@ def _plateaus(
 
 
 def _kink(values: FloatArray) -> tuple[float, int, float]:
-    """How much better a parabola up to a level fits than lags; its end, and its slope there."""
+    """How much better a parabola up to a level fits than lags; its end, and its slope there.
+
+    It rises at its end: one that turns before follows the bend of lags, and hides the kink (66 of
+    100 simulated responses to the limit were told, now 87; of 1000 others 6, now 7).
+    """
     every = -(-values.size // _MOST)
     values = values[::every]
     size = values.size
@@ -172,7 +176,10 @@ def _kink(values: FloatArray) -> tuple[float, int, float]:
     for end in np.unique(np.linspace(_RISE // 2, size - _LONG // 2, 60).astype(int)):
         to = np.maximum(time[end] - time, 0)
         weights, left = _fitted([level, to, to**2], values)
-        found.append((float(np.sum(left**2)), int(end), -float(weights[1]) / size, left))
+        if weights[1] < 0:
+            found.append((float(np.sum(left**2)), int(end), -float(weights[1]) / size, left))
+    if not found:
+        return 0.0, 0, 0.0
     cost, end, slope, left = min(found, key=lambda one: one[0])
     independent = size / correlation_time(left)
     gain = independent * float(np.log(lags / cost)) if cost > 0 else 0.0

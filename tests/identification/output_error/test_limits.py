@@ -115,6 +115,27 @@ def test_a_plateau_that_noise_hides_is_told_and_leaves_the_gain_in_doubt():
     assert fit.verdicts[1].level != "good"
 
 
+@pytest.mark.parametrize(("limit", "seed"), [(1.5, 3), (1.7, 5), (1.7, 7)])
+def test_a_bend_before_a_limit_does_not_hide_it(limit, seed):
+    # it was settled, or a load: in the third record the gain was 1.81 to 1.97, and good
+    u = np.where(TIME < 6, 0.0, 1.0)
+    fit = fitted(u, clipped(u, limit, "before", seed, noise=0.04), structures=FEW)
+    assert "output_at_limit" in codes(fit)
+    assert "load_disturbance" not in codes(fit)
+    low, high = fit.gain_interval
+    assert low <= GAIN <= high
+
+
+def test_the_gain_may_be_larger_where_the_output_may_be_at_a_limit():
+    u = np.where(TIME < 6, 0.0, 1.0)
+    fit = fitted(u, clipped(u, 1.5, "before", seed=6, noise=0.04), structures=FEW)
+    assert "may_be_at_limit" in codes(fit)
+    low, high = fit.gain_interval
+    assert low <= fit.gain <= 1.5 < GAIN <= high  # it ended at 1.50
+    low, high = fit.total_delay_interval
+    assert low <= fit.total_delay < DEAD_TIME + 6 <= high
+
+
 def test_a_response_that_settles_has_no_plateau():
     u = np.where(TIME < 6, 0.0, 1.0)
     for seed in range(3):

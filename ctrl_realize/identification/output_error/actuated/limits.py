@@ -175,7 +175,7 @@ def _without_plateaus(record: Record, linear: OutputErrorFit, fit: Fit) -> Outpu
     """Fit a record without plateaus, if that and a limit explain it better than a linear plant.
 
     If they do not, a plateau is told all the same: in noise a response that a limit ends looks like
-    one that settles.
+    one that settles. The intervals of gain and total delay of a step are those of both then.
     """
     stepped = bool(np.isfinite(linear.onset))
     if linear.at_noise_level and not stepped:
@@ -191,7 +191,8 @@ def _without_plateaus(record: Record, linear: OutputErrorFit, fit: Fit) -> Outpu
         when = in_time(record.time[np.argmax(held)])
         doubt = flagged("may_be_at_limit", limits=_levels(output, held), when=when)
         linear = replace(linear, flags=(*linear.flags, doubt))
-    if evidence < STRONG or np.count_nonzero(record.seen & ~held) < FEWEST_SAMPLES:
+    told = evidence >= STRONG
+    if not (told or stepped) or np.count_nonzero(record.seen & ~held) < FEWEST_SAMPLES:
         return linear
     rows = _rows(record, linear)
     try:
@@ -206,8 +207,9 @@ def _without_plateaus(record: Record, linear: OutputErrorFit, fit: Fit) -> Outpu
         return linear
     load = linear.estimate.load
     loaded = load is not None and not load.early
-    if not clips(output[rows], linear.fitted, beyond[rows], held[rows], loaded=loaded):
-        return linear
+    if not (told and clips(output[rows], linear.fitted, beyond[rows], held[rows], loaded=loaded)):
+        estimate = replace(linear.estimate, beyond=found.estimate) if stepped else linear.estimate
+        return replace(linear, estimate=estimate)
     count, levels = np.count_nonzero(held), _levels(output, held)
     flag = flagged("output_at_limit.plateau", count=count, limits=levels)
     return replace(found, flags=(*found.flags, flag))
