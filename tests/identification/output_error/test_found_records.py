@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
 import ctrl_realize as cr
 from tests.io.plant_files import response
@@ -126,6 +127,17 @@ def test_a_record_without_response_beside_others_is_told(gains):
         ]
         told = codes(cr.identify(records, structures="P2D"))
         assert told & {"gains_differ", "no_common_gain", "outlying_records"}
+
+
+@pytest.mark.parametrize("seed", [1007, 1016])
+def test_a_narrow_maximum_in_slow_noise_is_not_all_that_a_ramp_tells(seed):
+    """The interval was 14.2 to 15.7 s, or 0 to 3.4 s: a ratio of likelihoods is no chi-square."""
+    ramp = 3 * np.clip((TIME - 50) / 60, 0, 1)
+    white = np.random.default_rng(seed).standard_normal(600)
+    slow = lfilter([np.sqrt(1 - 0.9**2)], [1, -0.9], white)[200:]
+    y = response(TIME, ramp, 2.0, 4.37, [20]) + 0.3 * slow
+    low, high = cr.fit_output_error(cr.Record(TIME, ramp, y), structures="FOPDT").fit.interval
+    assert low <= 4.37 <= high
 
 
 def test_the_errors_of_a_ramp_are_those_of_the_cramer_rao_bound():

@@ -76,14 +76,27 @@ def weighted(
     values = np.array([[charged_misfit(fits, own[float(at)]) for at in every] for own in profiles])
     cost = np.array([[own[float(at)].cost for at in every] for own in profiles])
     values += (larger**2 - 1.0) * (cost - cost.min()) / (CALIBRATED * fits.variance)
+    fine, density = _densities(every, values)
+    least = values.min(axis=1, keepdims=True)
+    weights = np.exp(-0.5 * (least - least.min()))
+    return fine, weights / weights.sum() * density
+
+
+def posterior_of(points: Points, variance: float) -> tuple[float, float, float]:
+    """Mean dead time of one structure and the ends of its interval, by its profile likelihood."""
+    every = np.array(sorted(points))
+    values = np.array([[points[float(at)].cost / variance for at in every]])
+    fine, density = _densities(every, values)
+    return known_dead_time(fine, density[0])
+
+
+def _densities(every: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Dead times (G,) and the weight (S, G) of each by profiles (S, K) at `every`."""
     part = np.arange(_BETWEEN) / _BETWEEN
     fine = np.append((every[:-1, None] + np.diff(every)[:, None] * part).ravel(), every[-1])
     between = PchipInterpolator(every, values, axis=1)(fine)
-    least = values.min(axis=1, keepdims=True)
-    density = np.exp(-0.5 * (between - least)) * np.gradient(fine)
-    weights = np.exp(-0.5 * (least - least.min()))
-    share = weights / weights.sum() / np.maximum(density.sum(axis=1, keepdims=True), SMALLEST)
-    return fine, share * density
+    density = np.exp(-0.5 * (between - values.min(axis=1, keepdims=True))) * np.gradient(fine)
+    return fine, density / np.maximum(density.sum(axis=1, keepdims=True), SMALLEST)
 
 
 def with_moves(
