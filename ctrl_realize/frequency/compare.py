@@ -9,7 +9,7 @@ import control as ct
 import numpy as np
 
 from .._checks import check_type, one_of, sample_time_of
-from .._flags import Flag, flagged
+from .._flags import Flag
 from ..data.frf_operands import same_time
 from ..delayed import DelayedStateSpace, DelaySystem
 from ..delayed.inside.conversions import check_logarithm
@@ -22,7 +22,13 @@ from ..numerics.rational.spectra import hold_response
 from ..numerics.state_space.sampling import continuous_ends
 from .comparison import FRFComparison, decibels, hertz
 from .disagreement import disagreement
-from .points import MeasuredPoints, check_single_channel, measured_points, sampled_every
+from .points import (
+    MeasuredPoints,
+    below_nyquist,
+    check_single_channel,
+    measured_points,
+    sampled_every,
+)
 from .trusted_band import trusted_points
 
 
@@ -172,21 +178,15 @@ def _comparable(
 ) -> tuple[MeasuredPoints, tuple[Flag, ...]]:
     """Leave out points at zero frequency, and those beyond the Nyquist frequency of the model."""
     frequency = points.frequency_hz
-    usable = np.abs(points.response) > SMALLEST
-    flags = []
-    if dt is not None:
-        beyond = frequency >= 0.5 / dt
-        usable &= ~beyond
-        if beyond.any():
-            nyquist = hertz(0.5 / dt)
-            flags.append(flagged("beyond_nyquist", count=beyond.sum(), nyquist=nyquist))
-    if not usable.any():
+    below, flags = below_nyquist(points, dt, "model")
+    usable = below.only(np.abs(below.response) > SMALLEST)
+    if not usable.omega.size:
         raise DataError(
             f"nothing to compare: the FRF has {frequency.size} points from "
             f"{hertz(frequency[0])} to {hertz(frequency[-1])}, none of them non-zero and "
             "below the model's Nyquist frequency"
         )
-    return points.only(usable), tuple(flags)
+    return usable, flags
 
 
 def _unwrapped_error(ratio: ComplexArray, first: int) -> FloatArray:

@@ -9,11 +9,13 @@ import control as ct
 import numpy as np
 
 from .._checks import band, check_type, one_of
+from .._flags import Flag, flagged
 from .._wording import plainly
 from ..data import MeasuredFRF
 from ..errors import DataError, OptionError, UnsuitableSystemError
 from ..numerics.arrays import BoolArray, ComplexArray, FloatArray
 from ..numerics.constants import SMALLEST
+from .comparison import hertz
 
 _SMOOTHED_POINTS = 9
 """Number of neighbours over which standard deviations are smoothed; odd."""
@@ -166,6 +168,21 @@ def measured_points(frf: Any) -> MeasuredPoints:
     response = np.asarray(frf.frdata[0, 0], dtype=np.complex128)[order]
     repeats = frf.repeats if measured else None
     return MeasuredPoints(frequency_hz, response, coherence, std, repeats)
+
+
+def below_nyquist(
+    points: MeasuredPoints, dt: float | None, whose: str
+) -> tuple[MeasuredPoints, tuple[Flag, ...]]:
+    """Leave out points that a system with sample time `dt` does not tell from others; tell it."""
+    if not dt:
+        return points, ()
+    below = points.frequency_hz < 0.5 / dt
+    if below.all():
+        return points, ()
+    count, nyquist = np.count_nonzero(~below), hertz(0.5 / dt)
+    return points.only(below), (
+        flagged("beyond_nyquist", count=count, nyquist=nyquist, whose=whose),
+    )
 
 
 def check_single_channel(system: Any, what: str) -> None:

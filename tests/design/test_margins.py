@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 from scipy.optimize import brentq, minimize_scalar
 
 import ctrl_realize as cr
+from tests.rigs import codes
 
 DT = 7.8125e-4
 DELAYS = (0, 37, 100, 300, 1000)
@@ -191,7 +192,8 @@ def test_a_loop_with_two_integrators_is_stable_in_every_unit_of_time(unit, apart
 def test_margins_of_response_data_are_those_of_the_system(valve, pi_controller, delay):
     plant, pi = valve(delay), pi_controller(0.5, 0.2)
     omega = np.geomspace(0.05, 0.99 * np.pi / DT, 500)
-    data = cr.MeasuredFRF(plant(np.exp(1j * omega * DT)), omega / (2 * np.pi))
+    hertz = omega / (2 * np.pi)
+    data = cr.MeasuredFRF(plant(np.exp(1j * omega * DT)), hertz, sample_time=DT)
     exact, found = cr.design.margins(plant, pi), cr.design.margins(data, pi)
     # Interpolation between 500 points: h^3 of a smooth curve.
     assert found.gain_margin == pytest.approx(exact.gain_margin, rel=1e-4)
@@ -199,8 +201,46 @@ def test_margins_of_response_data_are_those_of_the_system(valve, pi_controller, 
     assert found.modulus_margin == pytest.approx(exact.modulus_margin, rel=1e-3)
     assert found.delay_margin == pytest.approx(exact.delay_margin, rel=1e-4)
     assert found.stable
-    plain = cr.design.margins(ct.frd(np.asarray(data.frdata[0, 0]), omega, name="plain"), pi)
+    plain = ct.frd(np.asarray(data.frdata[0, 0]), omega, dt=DT, name="plain")
+    plain = cr.design.margins(plain, pi)
     assert plain.gain_margin == pytest.approx(found.gain_margin, rel=1e-12)  # Hz -> rad/s rounds
+
+
+@pytest.mark.parametrize("known", [None, 0.004])
+def test_a_discrete_controller_acts_on_measured_data_through_its_hold(known):
+    # gain and phase were too good by up to 26 % and 22 deg in loops that are sampled slowly
+    plant, dt = ct.tf([2.0], [0.2, 1]) * cr.delay(0.3), 0.01
+    pi = cr.design.PIDController(0.25, 0.3, dt=dt)
+    hertz = np.geomspace(0.005, 400, 800)  # above 50 Hz the controller is an alias
+    omega = 2 * np.pi * hertz
+    hold = 1.0 if known is None else -np.expm1(-1j * omega * known) / (1j * omega * known)
+    frf = cr.MeasuredFRF(plant(1j * omega) * hold, hertz, sample_time=known)
+    found, exact = cr.design.margins(frf, pi), cr.design.margins(plant.to_discrete(dt), pi)
+    # the aliases of the sampled plant are left out: 0.1 % at a thirtieth of the sampling rate
+    assert found.gain_margin == pytest.approx(exact.gain_margin, rel=2e-3)
+    assert found.phase_margin == pytest.approx(exact.phase_margin, rel=2e-3)
+    assert codes(found) == {"beyond_nyquist"}
+
+
+@pytest.mark.parametrize(
+    ("core", "limit"), [(ct.tf([1.5], [1, -1]), 2 / 3), (ct.tf([-0.8], [1, 1]), 1.25)]
+)
+def test_a_loop_that_is_lost_at_frequency_zero(core, limit):
+    # it said 3.08 and 19.9
+    loop = core * cr.delay(0.3)
+    found = cr.design.margins(loop)
+    assert found.gain_margin == pytest.approx(limit, rel=1e-9)
+    assert cr.design.margins(core).gain_margin == pytest.approx(limit, rel=1e-9)
+    for gain in (0.99 * limit, 1.01 * limit):
+        assert ct.feedback(gain * loop).is_stable() == ((gain < limit) == (limit > 1))
+
+
+def test_data_of_an_unstable_plant_need_the_number_of_its_poles():
+    hertz = np.geomspace(1e-3, 20, 400)
+    frf = cr.MeasuredFRF((ct.tf([1.5], [1, -1]) * cr.delay(0.3))(2j * np.pi * hertz), hertz)
+    with pytest.raises(cr.errors.DataError, match=r"unstable_poles=0.* 1 unstable poles"):
+        cr.design.margins(frf)
+    assert cr.design.margins(frf, unstable_poles=1).stable
 
 
 def test_response_data_of_an_unstable_loop_are_called_unstable(valve, pi_controller):
@@ -229,7 +269,8 @@ def test_intervals_of_measured_margins_cover_the_truth(valve, pi_controller, gai
     asked, hits = dict.fromkeys(names, 0), dict.fromkeys(names, 0)
     for _ in range(50):
         errors = rng.standard_normal((2, omega.size)) * std / np.sqrt(2)
-        data = cr.MeasuredFRF(clean + errors[0] + 1j * errors[1], omega / (2 * np.pi), std=std)
+        values, hertz = clean + errors[0] + 1j * errors[1], omega / (2 * np.pi)
+        data = cr.MeasuredFRF(values, hertz, std=std, sample_time=DT)
         found = cr.design.margins(data, pi)
         for name, (low, high) in found.intervals.items():
             asked[name] += 1
@@ -247,7 +288,8 @@ def test_intervals_of_faint_noise_are_those_of_the_derivative(valve, pi_controll
     clean = plant(np.exp(1j * omega * DT))
 
     def measured(values, **more):
-        return cr.design.margins(cr.MeasuredFRF(values, omega / (2 * np.pi), **more), pi)
+        hertz = omega / (2 * np.pi)
+        return cr.design.margins(cr.MeasuredFRF(values, hertz, sample_time=DT, **more), pi)
 
     found = measured(clean, std=1e-4 * np.abs(clean))
     step = 1e-5

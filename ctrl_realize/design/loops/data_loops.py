@@ -10,14 +10,16 @@ import control as ct
 import numpy as np
 from scipy.interpolate import PchipInterpolator
 
-from ..._checks import integer
+from ..._checks import integer, sample_time_of
 from ..._flags import Flag, flagged
+from ...data.frf_operands import same_time
 from ...delayed.parts import check_entries
 from ...errors import DataError
-from ...frequency.points import MeasuredPoints, measured_points
+from ...frequency.points import MeasuredPoints, below_nyquist, measured_points, sampled_every
 from ...numerics.arrays import ComplexArray, FloatArray
 from ...numerics.loops.crossings import half_turns
 from ...numerics.rational.phase import dead_time_from_phase, unwrap_with_dead_time
+from ...numerics.rational.spectra import hold_response
 from .loop import open_loop
 
 
@@ -38,6 +40,7 @@ class DataLoop:
     phase: Any
     unstable_poles: int
     integrators: int
+    left_out: tuple[Flag, ...] = ()
 
     def __call__(self, omega: FloatArray) -> ComplexArray:
         """Interpolated response."""
@@ -65,10 +68,16 @@ class DataLoop:
         # Beyond the last point the loop gain is assumed to be small, and the curve to return to 1.
         turns -= float(np.angle(1 + values[-1]) + np.angle(slow[-1])) / np.pi
         count = self.unstable_poles - turns
-        return max(0, round(count)), abs(count - round(count)) > 0.25
+        if round(count) < 0:
+            raise DataError(
+                f"unstable_poles={self.unstable_poles}, but the response goes counter-clockwise "
+                f"about -1 as often as {round(turns)} unstable poles make it; give their number"
+            )
+        return round(count), abs(count - round(count)) > 0.25
 
     def flags(self) -> Iterator[Flag]:
         """Flag assumptions about the response outside of the band."""
+        yield from self.left_out
         first, last = self.values[0], self.values[-1]
         if abs(last) > 0.9:
             yield flagged("band_ends_early", size=abs(last), omega=self.omega[-1])
@@ -80,18 +89,30 @@ class DataLoop:
 def data_loop(
     plant: Any, controller: Any, unstable_poles: int, integrators: int | None
 ) -> DataLoop:
-    """Make a `DataLoop` from measured or computed responses, with systems on their grid."""
+    """Make a `DataLoop` from measured or computed responses, with systems on their grid.
+
+    A discrete system acts on the plant through its hold, which a response of records with its
+    sample time contains already.
+    """
     data = plant if isinstance(plant, ct.FrequencyResponseData) else controller
     other = controller if data is plant else plant
     check_entries(data)
-    points = _above_zero(data)
+    points, held = _above_zero(data), sampled_every(data) or sample_time_of(data)
+    system = None if isinstance(other, ct.FrequencyResponseData | None) else open_loop(other)
+    points, left_out = below_nyquist(points, system.dt if system else None, "controller")
     _check_points(points)
     omega, values, std, known = points.omega, points.response, points.std, 0.0
     if other is not None:
-        beside, known, count = _on_grid(other, omega)
+        if system is None:
+            beside = _on_grid(other, omega)
+        else:
+            known, count, beside = system.delay, system.integrators(), system(omega)
+            if integrators is None and count:
+                integrators = count + _read_integrators(omega, points.response)
+            if system.dt and not (held and same_time(held, system.dt)):
+                beside = beside * hold_response(omega, system.dt)
+                beside = beside / hold_response(omega, held) if held else beside
         values = values * beside
-        if integrators is None and count:
-            integrators = count + _read_integrators(omega, points.response)
         std = None if std is None else std * np.abs(beside)
     # The known delay is removed before the rest is estimated.
     dead_time = known + dead_time_from_phase(omega, values * np.exp(1j * omega * known))
@@ -109,6 +130,7 @@ def data_loop(
         PchipInterpolator(x, phase),
         integer(unstable_poles, "unstable_poles", 0),
         integer(integrators, "integrators", 0),
+        left_out,
     )
 
 
@@ -129,17 +151,14 @@ def _check_points(points: MeasuredPoints) -> None:
         raise DataError("the response is 0 at some frequency; remove that point")
 
 
-def _on_grid(other: Any, omega: FloatArray) -> tuple[ComplexArray, float, int]:
-    """Evaluate the other part of the loop, with its known delay in s and its integrators."""
-    if not isinstance(other, ct.FrequencyResponseData):
-        loop = open_loop(other)
-        return loop(omega), loop.delay, loop.integrators()
+def _on_grid(other: ct.FrequencyResponseData, omega: FloatArray) -> ComplexArray:
+    """Values of another response, of the same frequencies."""
     points = _above_zero(other)
     if not np.array_equal(points.omega, omega):
         raise DataError(
             "the two responses have different frequencies; interpolate one of them first"
         )
-    return points.response, 0.0, 0
+    return points.response
 
 
 def _read_integrators(omega: FloatArray, values: ComplexArray) -> int:

@@ -80,7 +80,9 @@ def margins(
 
     Gain and phase margin and the modulus margin 1/Ms (the *stability margin* of [1]_) are computed
     at the crossovers of the loop; the delay margin is the smallest ratio of phase margin and
-    crossover frequency [2]_. Encirclements are counted by the generalized Nyquist criterion [1]_.
+    crossover frequency [2]_. Encirclements are counted by the generalized Nyquist criterion [1]_. A
+    discrete controller acts on a measured plant through its hold, which is included unless the
+    response has a ``sample_time``, whose hold is part of it.
 
     References
     ----------
@@ -128,7 +130,8 @@ def loop_margins(loop: Loop) -> Margins:
     """Margins of a loop."""
     omega, values = follow(loop, loop.grid())
     count, closest = closed_loop_count(loop, omega, values), _from_the_start(loop, omega, values)
-    plain = _collect(loop, omega, values, closest, *count, loop.dt)
+    phases = _with_ends(loop, negative_axis_crossings(loop, omega, values))
+    plain = _collect(loop, omega, values, phases, closest, *count, loop.dt)
     # So close to -1 the count is not reliable.
     stable = plain.stable and plain.modulus_margin > MARGINAL
     return replace(plain, stable=stable, delay_margin=plain.delay_margin if stable else np.nan)
@@ -156,12 +159,15 @@ def _from_the_start(loop: Loop, omega: FloatArray, values: ComplexArray) -> tupl
     return (start, 0.0) if start < distance else (distance, closest)
 
 
-def _with_ends(loop: Curve, phases: FloatArray, top: float) -> FloatArray:
+def _with_ends(loop: Loop, phases: FloatArray) -> FloatArray:
     """Add omega = 0 and the Nyquist frequency if the real response there is negative."""
     start = loop(np.zeros(1))[0]
-    end = loop(np.array([top]))[0]
     if np.isfinite(start) and start.real < 0:
         phases = np.concatenate([[0.0], phases])
+    if not loop.dt:
+        return phases
+    top = np.pi / loop.dt
+    end = loop(np.array([top]))[0]
     near = phases.size > 0 and abs(phases[-1] - top) < 1e-9 * top
     if end.real < 0 and abs(end.imag) < 1e-6 * abs(end) and not near:
         phases = np.concatenate([phases, [top]])
@@ -199,17 +205,15 @@ def _stability_flags(count: int, marginal: bool) -> tuple[Flag, ...]:
 
 
 def _collect(
-    loop: Curve, omega: FloatArray, values: ComplexArray, closest: tuple[float, float],
-    count: int, marginal: bool, dt: float,
+    loop: Curve, omega: FloatArray, values: ComplexArray, phases: FloatArray,
+    closest: tuple[float, float], count: int, marginal: bool, dt: float,
 ) -> Margins:  # fmt: skip
     """Compute the margins of a loop whose unstable poles are counted, on the grid `omega`.
 
-    `closest` is its smallest distance to -1, and the frequency where it is reached.
+    `phases` are the frequencies where it is real and negative, `closest` is its smallest distance
+    to -1, and the frequency where it is reached.
     """
     gains = unit_crossings(loop, omega, values)
-    phases = negative_axis_crossings(loop, omega, values)
-    if dt:
-        phases = _with_ends(loop, phases, np.pi / dt)
     # -1 is at 180 deg: the angle of -L is the phase margin, in -180...180.
     pm = np.degrees(np.angle(-loop(gains)))
     gm = 1 / np.abs(loop(phases))
@@ -236,7 +240,8 @@ def _collect(
 def _from_data(loop: DataLoop) -> Margins:
     omega, values = loop.dense()
     closest = _closest(loop, omega, values)
-    plain = _collect(loop, omega, values, closest, *loop.closed_loop_count(), 0.0)
+    phases = negative_axis_crossings(loop, omega, values)
+    plain = _collect(loop, omega, values, phases, closest, *loop.closed_loop_count(), 0.0)
     plain = replace(plain, flags=(*plain.flags, *loop.flags()))
     if loop.std is None:
         return plain
