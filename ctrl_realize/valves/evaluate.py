@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -23,12 +24,15 @@ from .statics import (
     dead_band_and_resolution,
     hysteresis_and_linearity,
     joined,
+    reversal_wait,
     static_curve,
 )
 from .steps import Ranges, StepMetrics, measured_steps, noise_of
 
 _KNOWN_RANGES = {"%": (0.0, 100.0), "mA": (4.0, 20.0)}
 """Range of a command by its unit."""
+_ALIKE = 2.0
+"""Ratio of sizes of steps that count as the smallest."""
 _MOST_SAMPLES = 2000
 """Samples of a record of operation that are fitted."""
 
@@ -198,20 +202,23 @@ def _statics(
     steps: tuple[StepMetrics, ...], ranges: Ranges,
 ) -> tuple[StaticCurve | None, dict[str, Interval]]:  # fmt: skip
     bands, resolutions = [], []
-    delays = [one.mean_delay for one in steps if np.isfinite(one.mean_delay) and not one.stroke]
-    delay = float(np.median(delays)) if delays else float("nan")
-    curves = []
+    delay = _slow_delay(steps)
+    curves, waits = [], []
     for k, (record, own) in enumerate(zip(records, parts, strict=True)):
         mine = [one for one in steps if one.record == k]
         band, resolution = dead_band_and_resolution(mine, own, ranges)
         bands += [band] if band.is_known else []
         resolutions += [resolution] if resolution.is_known else []
-        found = static_curve(record, own, mine, ranges, noise_of(record, own), delay)
+        noise = noise_of(record, own)
+        waits.append(reversal_wait(record, own, ranges, noise))
+        found = static_curve(record, own, mine, ranges, noise, delay)
         curves += [found] if found is not None else []
     # a ramp before levels, the longer before the shorter
     curve = max(curves, key=lambda one: (one.origin == "ramp", np.ptp(one.command)), default=None)
     band, resolution = joined(bands), joined(resolutions)
     hysteresis, linearity, width = hysteresis_and_linearity(curve, band)
+    if width.is_known and np.isfinite(waits).any():  # a stem that sticks shows less in the loop
+        width = replace(width, high=max(width.high, float(np.nanmax(waits))))
     backlash = Interval()
     if band.is_known and resolution.is_known:
         low, high = max(band.low - resolution.high, 0.0), max(band.high - resolution.low, 0.0)
@@ -225,6 +232,22 @@ def _statics(
         "hysteresis": hysteresis,
         "linearity": linearity,
     }
+
+
+def _slow_delay(steps: Sequence[StepMetrics]) -> float:
+    """Mean delay in s of small steps: those of large ones hold half of their travel at the rate.
+
+    The line through the delays over the sizes, at zero, and no more than the smallest have.
+    """
+    known = [one for one in steps if np.isfinite(one.mean_delay) and not one.stroke]
+    if not known:
+        return float("nan")
+    size = np.array([abs(one.size) for one in known])
+    delay = np.array([one.mean_delay for one in known])
+    small = float(np.median(delay[size <= _ALIKE * size.min()]))
+    if np.ptp(size) <= 0.5 * size.max():
+        return small
+    return float(np.clip(np.polyfit(size, delay, 1, w=size)[1], 0.0, small))
 
 
 def _fit_of_operation(records: tuple[Record, ...]) -> tuple[Interval, Flag] | None:

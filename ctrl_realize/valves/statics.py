@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 from scipy.special import ndtri
@@ -25,6 +26,8 @@ _FOLLOWED = 0.3
 """The stem has followed a step if it moved by this fraction of it."""
 _GOOD_FIT = 4.0
 """Residual variance over the noise up to which the play describes the levels."""
+_MOVES = 5.0
+"""Standard deviations of the noise by which the stem has moved along a ramp."""
 _LEAST_COVERED = 50.0
 """Range of the command in % of its span that linearity and hysteresis need."""
 _BINS = 40
@@ -186,6 +189,26 @@ def static_curve(
         ]  # fmt: skip
         return _binned(points, noise, scale)
     return _of_levels(steps, ranges)
+
+
+def reversal_wait(record: Record, parts: Sequence[TestPart], ranges: Ranges, noise: Noise) -> float:
+    """Largest change of the command along a ramp, after one the other way, before a movement.
+
+    In % of the command's span, with the lag along the ramp; NaN without such ramps. A stem that
+    sticks waits for its dead band and then slides, nearer to the command than that.
+    """
+    output, command = np.ravel(record.output), np.ravel(record.input)
+    ramps = [part for part in parts if part.kind == "ramp"]
+    waits = []
+    for one, two in pairwise(ramps):
+        if (one.after - one.before) * (two.after - two.before) >= 0:
+            continue
+        rest = slice(min(one.stop, two.start - 1), two.start)
+        away = np.abs(output[two.start : two.stop] - np.median(output[rest]))
+        moved = away > _MOVES * noise.sigma + noise.quantum
+        first = int(np.argmax(moved)) if moved.any() else moved.size - 1
+        waits.append(abs(command[two.start + first] - np.median(command[rest])))
+    return float(max(waits, default=np.nan)) * abs(100 / ranges.command_span)
 
 
 def _binned(

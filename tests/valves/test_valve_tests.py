@@ -114,6 +114,32 @@ def test_a_stem_that_sticks_has_the_dead_band_and_the_resolution_of_its_model(S,
     assert any(flag.code == "did_not_move" for flag in report.flags)
 
 
+@pytest.mark.parametrize("noise", [0.015, 0.03, 0.05])
+def test_steps_that_noise_hides_have_no_dead_time(noise):
+    # with 0.03 % it was 0.45 s for steps of 0.25 %, friction with p = 1e-127
+    levels = [*stairs(count=4), 52, 50, 52, 50, 60, 50, 60, 50]
+    command = command_of(levels, 4.0)
+    report = valves.valve_report(record_of(command, command, noise, 2), **QUICK)
+    assert held(report.metric("dead_time").interval, DEAD_TIME)
+    assert "dead_time_varies" not in {flag.code for flag in report.flags}
+
+
+@pytest.mark.parametrize("rate", [10.0, np.inf])
+def test_a_ramp_tells_the_dead_band_of_a_stem_that_sticks_to_its_reversal(rate):
+    """It slides nearer to the command than it waits: S - J was called the dead band, and met."""
+    S, J = 3.0, 1.0
+    steps = command_of([50, 55, 50, 60, 50], 5.0)
+    ramp = np.interp(DT * np.arange(8400), [0, 10, 200, 210, 400, 420], [50, 0, 100, 100, 0, 0])
+    command = np.concatenate([steps, ramp])
+    slewed = cr.actuators.SlewRateLimit(rate).simulate(command, DT) if rate < 100 else command
+    moved = cr.actuators.KanoStiction(S=S, J=J).simulate(slewed)
+    record = record_of(command, moved, 0.03, 1)
+    band = valves.valve_report(record, limits={"dead_band": 2.5}, **QUICK).metric("dead_band")
+    assert held(band.interval, S)
+    assert band.interval.low <= S - J + 0.05
+    assert band.judgement == "cannot tell"
+
+
 def test_hysteresis_and_linearity_of_a_slow_ramp_are_those_of_its_curve():
     u = np.interp(np.arange(6000), [0, 200, 2900, 3100, 5800, 6000], [0, 0, 100, 100, 0, 0])
     bend, wide = 3.0, 4.0

@@ -24,6 +24,9 @@ from ..signals.onset import first_motion
 
 _REACH = 0.1
 """Half height of the window about a crossing, of the whole change."""
+_SECOND, _BEGINNING = 15.0, 0.4
+"""Standard deviations of the second threshold of an onset, and part of the change that they may be:
+with 0.9 of it the dead time of a lag is 7 % too long, and beyond it is none."""
 _T86 = 1 - float(np.exp(-2))
 
 
@@ -118,8 +121,11 @@ class UnitResponse:
     def first_motion(self) -> Estimate:
         """Visible onset: the rise through one and three thresholds, extrapolated to the baseline.
 
-        The thresholds are five and fifteen standard deviations of the noise.
+        The thresholds are five and fifteen standard deviations of the noise. Where these are no
+        part of the beginning of the response, noise hides it.
         """
+        if _SECOND * self.noise.sigma > _BEGINNING:
+            return UNKNOWN
         found = first_motion(self.shape, 0, self.noise.sigma, self.noise.quantum, 0.0)
         if found is None or found.sign < 0:
             return UNKNOWN
