@@ -36,7 +36,7 @@ _MONTH = r"[^\W\d_]{3,9}\.?"
 _DATE = rf"(\d{{1,4}}[-/.]\d{{1,2}}[-/.]\d{{1,4}}\.?|\d{{1,2}}[-/. ]{_MONTH}[-/. ]\d{{2,4}})"
 _TIME = re.compile(rf"{_CLOCK}|{_DATE}([ T]+{_CLOCK})?")
 _MEASURED = re.compile(r"([+-]?[\d.,]+(?:[eE][+-]?\d+)?)[ \xa0]?([^\W\d]\S{0,7}|[%°]\S{0,3})")
-_THOUSANDS = re.compile(r"[+-]?[1-9]\d{0,2},\d{3}")
+_THOUSANDS = re.compile(r"[+-]?[1-9]\d{0,2}[.,]\d{3}")
 _WORDS = facts("io/words.toml")
 MISSING = frozenset(_WORDS["cells"]["missing"])
 BAD_VALUES = frozenset(_WORDS["cells"]["bad"])
@@ -64,25 +64,31 @@ def split_line(line: str, delimiter: str) -> list[str]:
     return [cell.strip() for cell in cells]
 
 
-def refuse_thousands(path: Path, rows: list[list[str]], delimiter: str) -> None:
-    """Refuse a file whose commas may be thousands separators as well as decimal signs.
+def refuse_thousands(path: Path, rows: list[list[str]], delimiter: str, mark: str) -> None:
+    """Refuse a file whose decimal marks may be thousands separators as well.
 
     ``1,234`` is 1.234 if each cell of its column has the same number of decimals, and 1234 for
     ``"1,234"`` between commas, or together with ``999`` in its column: this is ambiguous. One cell
-    like ``0,123``, ``12,5`` or ``1234,567`` anywhere shows that they are decimals.
+    like ``0,123``, ``12,5`` or ``1234,567`` anywhere shows that they are decimals. A point is the
+    decimal mark of most files: only whole numbers from 100 to 999 beside it leave a doubt.
     """
-    commas = {cell for row in rows for cell in row if "," in cell and NUMBER[","].fullmatch(cell)}
-    if not commas or not all(map(_THOUSANDS.fullmatch, commas)):
+    cells = {cell for row in rows for cell in row if mark in cell and NUMBER[mark].fullmatch(cell)}
+    if not cells or not all(map(_THOUSANDS.fullmatch, cells)):
         return
-    mixed = any(
-        commas.intersection(column) and any(one.isdecimal() and len(one) <= 3 for one in column)
-        for column in zip(*(row for row in rows if len(row) == len(rows[0])), strict=True)
-    )
-    if delimiter == "," or mixed:
+    least = 1 if mark == "," else 3
+    mixed = False
+    for column in zip(*(row for row in rows if len(row) == len(rows[0])), strict=True):
+        whole = {one for one in column if one.isdecimal()}
+        mixed |= bool(cells.intersection(column) and whole) and all(
+            least <= len(one) <= 3 for one in whole
+        )
+    if delimiter == mark or mixed:
+        one, other, word = min(cells), ",."[mark == ","], "comma" if mark == "," else "point"
         raise FileFormatError(
-            f"{path}: {min(commas)!r} may be {min(commas).replace(',', '.')} or "
-            f"{min(commas).replace(',', '')}; give decimal=',' if the comma is the decimal "
-            "mark, thousands=',' if it separates thousands"
+            f"{path}: {one!r} may be {one.replace(',', '.')} or {one.replace(mark, '')}; give "
+            f"decimal={mark!r} if the {word} is the decimal mark, "
+            + (f"decimal={other!r} and " if mark == "." else "")
+            + f"thousands={mark!r} if it separates thousands"
         )
 
 

@@ -135,6 +135,15 @@ def test_thousands_separators_are_told_apart_from_decimal_signs(tmp_path):
     np.testing.assert_array_equal(read(unclear, thousands=None, decimal=","), [999, 1.2, 1.3, 2])
     with pytest.raises(OptionError, match="another sign than the decimal one"):
         read(unclear, thousands=",", decimal=",")
+    # it was a jump from 999 to 1.2
+    unclear = [cell.replace(",", ".") for cell in unclear]
+    with pytest.raises(CtrlRealizeError, match=r"may be 1\.200 or 1200; .*decimal=',' and thousa"):
+        read(unclear)
+    np.testing.assert_array_equal(
+        read(unclear, thousands=".", decimal=","), [999, 1200, 1300, 2000]
+    )
+    np.testing.assert_array_equal(read(unclear, decimal="."), [999, 1.2, 1.3, 2])
+    np.testing.assert_array_equal(read(["1", "1.125", "1.250", "2"]), [1, 1.125, 1.25, 2])
 
 
 def test_columns_that_no_name_and_no_step_tell_are_asked_for(tmp_path):

@@ -89,7 +89,7 @@ def _text(path: Path, rows: Iterable[Iterable[Any]], options: TextOptions) -> st
     cells = [[_cell(cell) for cell in row] for row in rows]
     if options.decimal != "." and options.thousands != ",":
         if options.decimal == "auto":  # the numbers beside them do not tell
-            refuse_thousands(path, cells, ",")
+            refuse_thousands(path, cells, ",", ",")
         comma = NUMBER[","].fullmatch
         cells = [[one.replace(",", ".") if comma(one) else one for one in row] for row in cells]
     table = pd.DataFrame(cells, dtype=object).fillna("")

@@ -110,8 +110,8 @@ def sniff(source: TextSource, options: TextOptions) -> TextLayout:
     first = first_data_row(head, options.header)
     names, units = ([""] * width,) * 2 if options.header is False else column_names(head, first)
     names = [re.sub(r"\s*[\r\n]\s*", " ", name)[:MAX_NAME] for name in names]
-    if decimal == "," and options.decimal == options.thousands == "auto":
-        refuse_thousands(path, cells[first:], delimiter)
+    if options.decimal == options.thousands == "auto":
+        refuse_thousands(path, cells[first:], delimiter, decimal)
     begin = found[rows[first]]
     whole = len(head_bytes) < HEAD_BYTES and len(lines) < MAX_HEAD_LINES
     return TextLayout(
