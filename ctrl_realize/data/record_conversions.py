@@ -150,7 +150,8 @@ class RecordConversions(Drawable):
         """Make a record from samples with time jitter, by linear interpolation.
 
         An input that holds its levels (most of its values repeat the one before) is not
-        interpolated: it has the value of the nearest time stamp.
+        interpolated: it has the value of the nearest time stamp, which moves its steps, and with
+        them dead times, by up to half a sample. `from_samples` keeps the stamps.
 
         Parameters
         ----------

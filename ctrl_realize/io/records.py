@@ -125,7 +125,8 @@ def read_record(
         angle; the turns of the output are joined as by `numpy.unwrap`. Default: if the output jumps
         as a counter does, which is told; 0: it is none.
     resample : bool, optional
-        Resample jittering samples onto a uniform time axis, see `Record.resampled`.
+        Resample jittering samples onto a uniform time axis, see `Record.resampled`. A step is then
+        off by up to half a sample; as they are, stamps tell its moment.
     rest : (float, float), optional
         Input and output in the steady state before a record that begins with its step. See
         `Record.with_baseline`.
