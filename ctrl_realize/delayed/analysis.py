@@ -6,11 +6,15 @@ import control as ct
 import numpy as np
 
 from .._checks import integer
+from ..errors import DataWarning, warn_caller
 from ..numerics.arrays import ComplexArray, FloatArray
+from ..numerics.constants import SMALLEST
 from ..numerics.internal_delays.dominant import largest
 from ..numerics.internal_delays.form import DelayForm
 from ..numerics.state_space.responses import markov
 from .parts import CoreAndDelays, signals_of
+
+_MOST_LOST = 1e-3  # of a response, by rounding of coefficients that cancel
 
 
 class DelayedAnalysis(CoreAndDelays):
@@ -57,10 +61,14 @@ class DelayedAnalysis(CoreAndDelays):
         The denominator has the poles of the core, the numerators are its product with the Markov
         parameters, so that the relative degree is preserved. python-control's ``ct.tf(sys)``
         computes the characteristic polynomial of the augmented matrix, which has no correct digits
-        from d = 50 on. Several channels give a matrix of transfer functions.
+        from d = 50 on. Several channels give a matrix of transfer functions. The coefficients of
+        several lags that are long beside the sample time cancel each other: a `DataWarning` tells
+        if 0.1 % of a response is lost.
         """
         core, n = self._core, self._core.nstates
-        den = np.real(np.poly(np.linalg.eigvals(core.A))) if n else np.ones(1)
+        poles = np.linalg.eigvals(core.A)
+        den = np.real(np.poly(poles)) if n else np.ones(1)
+        _warn_of_cancellation(den, poles)
         pulses = markov(core.A, core.B, core.C, core.D, n + 1)
         total = np.add.outer(self.output_delays, self.input_delays)
         return ct.TransferFunction(
@@ -69,6 +77,22 @@ class DelayedAnalysis(CoreAndDelays):
             self.dt,
             name=self.name,
             **signals_of(self),
+        )
+
+
+def _warn_of_cancellation(den: FloatArray, poles: ComplexArray) -> None:
+    """Warn about a polynomial that does not have its value between the poles and the circle."""
+    turns = np.angle(poles) + 1j * np.log(np.maximum(np.abs(poles), SMALLEST))
+    least = np.clip(np.abs(turns).min(initial=1.0), 1e-8, 1.0)
+    z = np.exp(1j * np.geomspace(0.1 * least, np.pi, 50))
+    factors = np.prod(z[:, None] - poles, axis=1)
+    lost = float(np.abs(np.polyval(den, z) / factors - 1).max())
+    if lost > _MOST_LOST:
+        warn_caller(
+            f"the polynomials of order {poles.size} lose {100 * min(lost, 1):.3g} % of a response "
+            "at this sample time, since their coefficients cancel; use the state-space model, or "
+            "resample it with a larger dt",
+            DataWarning,
         )
 
 

@@ -13,6 +13,7 @@ RAISED_BY = {
     "design/loops/margins": "design.margins",
     "frequency/compare": "compare_frf",
     "frequency/disagreement": "compare_frf",
+    "frequency/points": "compare_frf",
     "frequency/from_frf": "impulse_from_frf",
     "frequency/frf_selection": "fit_frf",
     "identification/campaign": "identify_campaign",

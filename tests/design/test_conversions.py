@@ -1,6 +1,7 @@
 """Conversions against closed forms and arbitrary precision."""
 
 import math
+from contextlib import nullcontext
 
 import control as ct
 import mpmath as mp
@@ -22,6 +23,19 @@ def test_transfer_function_has_the_response_of_the_system(valve, delay):
     assert tf.den[0][0].size == 4 + delay
     np.testing.assert_array_equal(tf.den[0][0][4:], 0)
     assert tf.name == "valve"
+
+
+@pytest.mark.parametrize(
+    ("order", "dt", "lost"), [(6, 0.002, True), (6, 0.01, True), (6, 0.5, False)]
+)
+def test_coefficients_that_cancel_are_told(order, dt, lost):
+    # (s + 1)^6: gains of 0.191 and 0.994, of 1, without a word
+    plant = cr.delayed_ss(ct.tf([1], np.poly([-1] * order)), dead_time=50 * dt, dt=dt)
+    context = pytest.warns(cr.errors.DataWarning, match="cancel") if lost else nullcontext()
+    with context:
+        tf = cr.design.to_tf(plant)
+    assert (abs(tf.dcgain() - 1) > 1e-3) == lost
+    assert plant.dcgain() == pytest.approx(1, rel=1e-9)
 
 
 @pytest.mark.parametrize("dead_time", [0.0, 0.0289, 0.0289 + DT / 3, 37 * DT, 0.4 * DT])

@@ -114,6 +114,7 @@ def test_every_kind_and_sign_comes_back_from_every_form(form, kind):
     reverse = written.reversed_action
     back = PID.from_form(form, values, reversed_action=reverse, **RANGES)
     np.testing.assert_allclose(back.ideal[:3], pid.ideal[:3], rtol=1e-12)
+    assert PID.from_form(form, written, **RANGES).ideal == back.ideal
     if reverse:  # or with a sign for all gains
         parallel = cr.design.pid_forms().set_index("form")["structure"][form] == "parallel"
         gains = written.values if parallel else written.values[:1]

@@ -317,7 +317,7 @@ class PIDController(ShownSystem, BesideDelays):
     def from_form(
         cls,
         form: str,
-        values: Mapping[str, float],
+        values: Mapping[str, float] | PIDForm,
         *,
         measured_range: tuple[float, float] | None = None,
         output_range: tuple[float, float] | None = None,
@@ -332,8 +332,8 @@ class PIDController(ShownSystem, BesideDelays):
         ----------
         form, measured_range, output_range, time_unit
             As for `as_form`.
-        values : mapping of str to float
-            Parameter -> value, with the names that `as_form` lists.
+        values : mapping of str to float, or PIDForm
+            Parameter -> value, with the names that `as_form` lists; or what it returns.
         derivative_filter : float
             td / tf if the form has no filter.
         reversed_action : bool
@@ -349,6 +349,9 @@ class PIDController(ShownSystem, BesideDelays):
         >>> cr.design.PIDController.from_form("rockwell_pide_dependent", values)
         <PIDController 'PI': kp = 2, ti = 90 s, continuous>
         """
+        if isinstance(values, PIDForm):
+            reversed_action = reversed_action or values.reversed_action
+            values = {one.name: one.value for one in values.values}
         scaling = Scaling(measured_range, output_range, time_unit)
         kp, ti, td, tf = from_form(form, values, scaling)
         ratio = positive(derivative_filter, "derivative_filter", "td / tf")
