@@ -45,10 +45,13 @@ class HalfCycles:
 
 
 def half_cycles(signal: FloatArray, edges: FloatArray, period: float) -> HalfCycles | None:
-    """Cut `signal` (N,) at its zeros `edges`, and fit the shapes; None if there are too few."""
+    """Cut `signal` (N,) at its zeros `edges`, and fit the shapes; None if there are too few.
+
+    None as well if half a cycle has too few samples on average: noise would choose those that have.
+    """
     lengths = np.diff(edges)
     good = (lengths > 0.25 * period) & (lengths < period) & (lengths >= FEWEST_SAMPLES)
-    if good.sum() < 4:
+    if good.sum() < 4 or period < 2 * FEWEST_SAMPLES:
         return None
     place = np.arange(signal.size, dtype=np.float64)
     inside = np.linspace(0.0, 1.0, POINTS)

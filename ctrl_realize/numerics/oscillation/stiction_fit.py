@@ -25,6 +25,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..arrays import FloatArray
+from ..constants import Z_95
 from .cycles import resolution, without_drift
 from .stiction_model import StickingLoop, Trial
 from .stiction_region import INDEPENDENT, Region, near, near_delays
@@ -118,9 +119,13 @@ def fit_stiction(
     region = Region(loop, best, swing)
     best, margin = region.best, resolution(output)
     sticks, jumps = region.ends(valleys)
+    significance = _larger(_blocks(loop, linear), _blocks(loop, best))
+    # Without stiction the errors have a minimum of their own, apart from the region of the best.
+    if significance <= Z_95:
+        sticks, jumps = (0.0, sticks[1]), (0.0, jumps[1])
     return StictionFit(
         best.stick, (max(sticks[0] - margin, 0.0), sticks[1] + margin), best.jump, jumps, swing,
-        best.error, linear.error, _larger(_blocks(loop, linear), _blocks(loop, best)), best.gain,
+        best.error, linear.error, significance, best.gain,
         every * best.lag, every * best.delay, region.correlation_time,
     )  # fmt: skip
 
