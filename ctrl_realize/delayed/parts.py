@@ -42,7 +42,7 @@ class CoreAndDelays(DeferredMatrices):
     def _without_matrices(self) -> str:
         return (
             "sys(z), sys.step, sys.simulate and sys.markov need no matrices; "
-            "cr.design.to_discrete(*cr.design.to_continuous(sys), dt) gives a system with a "
+            "cr.design.to_discrete(cr.design.to_continuous(sys), dt=dt) gives a system with a "
             "longer sample time"
         )
 

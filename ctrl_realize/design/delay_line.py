@@ -118,7 +118,7 @@ class DelayLineController(ShownSystem, DelayOperators):
         return (
             "The controller's frequency response, design.margins, design.performance and "
             "design.delay_robustness need no matrices, given plant and controller one by one. "
-            "cr.design.to_discrete(*cr.design.to_continuous(plant), dt=...) samples the plant "
+            "cr.design.to_discrete(cr.design.to_continuous(plant), dt=...) samples the plant "
             "more slowly, for a controller with a shorter line"
         )
 

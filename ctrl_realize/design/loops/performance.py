@@ -241,8 +241,8 @@ def loop_times(plant: DelayedStateSpace, controller: Any, name: str = "") -> tup
     if not found.stable:
         raise UnsuitableSystemError(
             f"the loop{f' with {name!r}' if name else ''} is not stable: it has "
-            f"{found.unstable_poles} poles on or outside the unit circle, so its step "
-            "response does not settle; see design.margins"
+            f"{found.unstable_poles} unstable poles, so its step response does not settle; see "
+            "design.margins"
         )
     turns, slow = 1 / found.gain_crossovers, plant_time(plant)
     return float(turns.max(initial=slow)), float(turns.min(initial=slow))
