@@ -372,3 +372,12 @@ def test_samples_close_together_are_averaged():
 def test_time_that_runs_backwards_from_nothing_is_named():
     with pytest.raises(TimeAxisError, match="reverse time, input and output"):
         cr.Record([1e-300, -1e10, -2e10], [0, 1, 1], [0, 0, 1])
+
+
+@pytest.mark.parametrize(("empty", "cells"), [("output", "1,nan"), ("input", "nan,1")])
+def test_a_channel_without_a_value_is_named(empty, cells, tmp_path):
+    path = tmp_path / "logged.csv"
+    path.write_text("t,u,y\n" + "".join(f"{k},{cells}\n" for k in range(50)))
+    # it said that time has shape (0,)
+    with pytest.raises(DataError, match=f"the {empty} has no value in any of 50 rows"):
+        cr.read_record(path)

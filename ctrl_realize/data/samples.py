@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import DataWarning, OptionError, TimeAxisError, warn_caller
+from ..errors import DataError, DataWarning, OptionError, TimeAxisError, warn_caller
 from ..numerics.arrays import FloatArray
 from ..numerics.signals.counters import counter_period
 from ..numerics.signals.sample_grid import regular_step, usual_step
@@ -77,6 +77,12 @@ class Samples:
         """
         if self.time.size < 2:
             return self, "refuse"
+        for what, values in (("input", self.input), ("output", self.output)):
+            if np.isnan(values).all():
+                raise DataError(
+                    f"{path}: the {what} has no value in any of {self.time.size} rows; choose "
+                    f"another column with {what}="
+                )
         fault = axis_fault(self.time)
         lost = [np.isnan(np.atleast_2d(one)) for one in (self.input, self.output)]
         if fault is not None and (

@@ -86,7 +86,7 @@ class DelayedStateSpace(
     Up to 20 000 states, the matrices A, B, C, D are computed on demand (A is dense: 3 GB). For
     longer delays, everything that needs no matrices still works: ``sys(z)`` and plots of frequency
     responses, `step`, `simulate`, `markov`, poles and products.
-    ``cr.design.to_discrete(cr.design.to_continuous(sys), dt=dt)`` samples such a system more slowly.
+    ``cr.design.to_discrete(cr.design.to_continuous(sys), dt=dt)`` samples such a system slower.
 
     ``tf * sys``, ``tf + sys``, ``ct.feedback(tf, sys)`` and ``ct.tf(sys)`` are evaluated by
     python-control alone: it converts the augmented matrices to a transfer function, which has no

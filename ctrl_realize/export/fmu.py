@@ -7,6 +7,7 @@ import shutil
 import sys
 import tempfile
 from dataclasses import replace
+from hashlib import sha256
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -89,17 +90,20 @@ def to_fmu(system: Any, path: str | os.PathLike[str], *, name: str | None = None
             "an FMU is made by the package pythonfmu, which is not installed; "
             "pip install ctrl-realize[fmu]"
         ) from error
-    places = list(sys.path)
+    places, module = list(sys.path), ""
     try:
         with tempfile.TemporaryDirectory() as folder:
-            script = Path(folder) / f"{program.name}_unit.py"
-            script.write_text(_script(program, float(system.dt)), encoding="utf-8")
+            text = _script(program, float(system.dt))
+            # Units in one process share their modules: each needs a name of its own.
+            module = f"{program.name}_{sha256(text.encode()).hexdigest()[:16]}"
+            script = Path(folder) / f"{module}.py"
+            script.write_text(text, encoding="utf-8")
             made = builder.FmuBuilder.build_FMU(script, Path(folder) / f"{program.name}.fmu")
             with replaced_when_complete(target) as temporary:
                 shutil.copyfile(made, temporary)
     finally:
         sys.path[:] = places  # the builder adds the folder of its script
-        sys.modules.pop(f"{program.name}_unit", None)
+        sys.modules.pop(module, None)
     return target
 
 

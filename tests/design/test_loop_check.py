@@ -165,6 +165,16 @@ def test_the_loop_of_an_identified_plant_is_checked_with_models_that_fit_as_well
     assert not made.check.flags
 
 
+def test_the_gain_of_a_corner_of_an_integrating_plant_is_its_slope():
+    """It was that of the rounding of a pole at zero: 21 530 for 0.048."""
+    time = np.arange(200.0)
+    y = 0.05 * np.clip(time - 52, 0, None) + 0.01 * np.random.default_rng(1).standard_normal(200)
+    sys = cr.identify(cr.Record(time, np.where(time < 40, 0.0, 1.0), y))
+    assert sys.fit.integrators == 1
+    for corner in cr.design.pid(sys).check.corners:
+        assert corner.gain == pytest.approx(0.05, rel=0.02)
+
+
 def test_a_gain_that_makes_the_loop_unstable_is_said_with_the_corner():
     fit = fit_with_interval((0.0289, 0.0291), gain=1.0, gain_interval=(0.5, 4.0))
     with pytest.warns(ModelWarning, match=r"unstable at a dead time of .* and a gain of 4, ends"):

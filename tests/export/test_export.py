@@ -231,6 +231,19 @@ def test_an_fmu_runs_under_any_name(name, tmp_path):
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="pythonfmu brings libraries for this machine")
+def test_two_fmus_of_one_name_in_a_process_are_two_plants(tmp_path):
+    pytest.importorskip("pythonfmu", reason="pythonfmu makes FMUs")
+    fmpy = pytest.importorskip("fmpy", reason="fmpy runs FMUs")
+    held = np.array([(0.0, 1.0)], dtype=[("time", float), ("u", float)])
+    options = {"stop_time": 1.0, "step_size": 0.25, "output_interval": 0.25, "output": ["y"]}
+    for gain in (2.0, 3.0):  # the second ran the code of the first
+        plant = cr.delayed_ss(ct.ss([], [], [], [[gain]], 0.25), 1)
+        path = export.to_fmu(plant, tmp_path / f"{gain}.fmu", name="plant")
+        result = fmpy.simulate_fmu(str(path), input=held, **options)
+        assert result["y"][-1] == gain
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="pythonfmu brings libraries for this machine")
 def test_an_fmu_is_valid_and_simulates_the_model(tmp_path):
     pytest.importorskip("pythonfmu", reason="pythonfmu makes FMUs")
     fmpy = pytest.importorskip("fmpy", reason="fmpy runs FMUs")

@@ -173,8 +173,8 @@ def _corners(
 ) -> tuple[Corner, ...]:
     """Ms at the ends of the intervals of dead time and gain; the gain scales the whole loop."""
     models = _models_of(plant)
-    if models is not None:
-        return _of_models(loop, models)
+    if models is not None and plant.fit is not None:
+        return _of_models(loop, models, plant.fit.integrators)
     gains = _gains(plant)
     if robust is None and not gains:
         return ()
@@ -197,13 +197,17 @@ def _models_of(plant: DelayedStateSpace) -> PlausibleModels | None:
     return None if plant.fit is None else plant.fit.plausible_models
 
 
-def _of_models(loop: Loop, models: PlausibleModels) -> tuple[Corner, ...]:
+def _of_models(loop: Loop, models: PlausibleModels, integrators: int) -> tuple[Corner, ...]:
     """Ms with other models of the plant, in the place of the first factor of a loop."""
     found = []
     for one, system in zip(models.models, models.systems, strict=True):
         plant = factor(system, loop.dt)
         ms = _ms(distance_if_stable(replace(loop, factors=(plant, *loop.factors[1:]))))
-        gain = float(plant.response(np.zeros(1, dtype=np.complex128))[0].real)
+        if integrators:  # the slope per second, as that of the model
+            moving = one.poles[np.argsort(np.abs(one.poles))[integrators:]]
+            gain = float(one.numerator[0] / np.prod(-moving).real)
+        else:
+            gain = float(plant.response(np.zeros(1, dtype=np.complex128))[0].real)
         found.append(Corner(one.dead_time, gain if np.isfinite(gain) else None, ms))
     worst = max(found, key=lambda corner: corner.ms)
     return tuple(corner for corner in found if corner is not worst)

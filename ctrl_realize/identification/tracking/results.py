@@ -17,7 +17,7 @@ class TrackPoint(ModelFit):
     """Estimate of a delay tracker at one time.
 
     ``dead_time`` is ``delay * dt`` with the delay interpolated between samples; if `resolved` is
-    true it lies inside ``interval``, to half a sample. Otherwise `reason` states what is missing,
+    true it lies inside ``interval``. Otherwise `reason` states what is missing,
     and the numbers are only the best guess.
 
     Attributes
@@ -97,8 +97,9 @@ class TrackPoint(ModelFit):
 
     @property
     def interval(self) -> tuple[float, float]:
-        """Interval of the dead time in s."""
-        return self.delay_interval[0] * self.dt, self.delay_interval[1] * self.dt
+        """Interval of the dead time in s; it may end between two whole delays."""
+        low, high = (delay * self.dt for delay in self.delay_interval)
+        return min(low, self.dead_time), max(high, self.dead_time)
 
     @property
     def dead_time_interval(self) -> tuple[float, float] | None:
