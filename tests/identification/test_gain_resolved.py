@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import ctrl_realize as cr
+from benchmarks.verdicts.cases import case
 from ctrl_realize import report
 from ctrl_realize.errors import DataError, UnresolvedWarning, UnsuitableSystemError
 from tests import measured
@@ -259,3 +260,13 @@ def test_a_washout_has_no_total_delay(moves):
     assert fit.gain_interval[0] < 0 < fit.gain_interval[1]
     assert fit.total_delay_interval[1] == np.inf
     assert "total delay         not determined" in fit.report()
+
+
+@pytest.mark.parametrize("kind", ["rising at its end", "clipped"])
+def test_an_integrator_that_may_be_a_lag_leaves_the_gain_open(kind):
+    """It was the slope of an integrator, -0.052 and -0.028 per second, for -2.04 and -1.67."""
+    one = case(kind, 115)
+    fit = cr.fit_output_error(one.record).fit
+    assert fit.integrators == 0
+    assert fit.gain_interval[0] <= one.plant.gain <= fit.gain_interval[1]
+    assert fit.verdicts[1].level == "no"
