@@ -119,8 +119,11 @@ class Bound:
 
     def gradient(self, wanted: Sequence[Wanted]) -> FloatArray:
         """Derivatives (k, p) of quantities by dead time, pole parameters and numerator."""
+        return self.derivatives(quantities(self.model, self.dt, wanted))
+
+    def derivatives(self, value: Callable[[PlausibleModel], FloatArray]) -> FloatArray:
+        """The same of values (k,) of a model."""
         theta, numerator, _ = self._parts(1)
-        value = quantities(self.model, self.dt, wanted)
         there = Candidate(Structure(theta.size - 1, theta.size - numerator.size), theta, 0.0)
         steps, point = parameter_steps(there, numerator, self.dt), self.point
 

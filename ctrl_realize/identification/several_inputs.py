@@ -19,7 +19,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from functools import reduce
+from functools import partial, reduce
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
@@ -34,6 +34,10 @@ from ..errors import DataError, DataWarning
 from ..numerics.arrays import BoolArray, FloatArray
 from ..numerics.blas_threads import single_threaded
 from ..numerics.constants import SMALLEST
+from ..numerics.engine.plausible_models import PlausibleModel
+from ..numerics.engine.static_gain import StaticGain
+from ..numerics.families.physical import ProcessParameter, process_parameters
+from ..numerics.output_error.result import ProcessEstimate
 from .impulse.from_io import impulse_from_io
 from .output_error.actuated.limits import at_updates
 from .output_error.fit import fit_output_error, model_alone
@@ -214,15 +218,46 @@ def _wider(
         low = max(at - factor * (at - estimate.low), 0.0)
         high = at + factor * (estimate.high - at)
         estimate = replace(estimate, low=low, high=high, std=factor * estimate.std)
+        slopes = bounds[i].derivatives(_values)
+        names = ["total", *(one.name for one in _named(bounds[i].model))]
+        wider = {
+            name: _ratio(own, others, slope) for name, slope in zip(names, slopes, strict=True)
+        }
         if estimate.static is not None:
-            more = _ratio(own, others, bounds[i].gradient(("gain",))[0])
-            static = replace(estimate.static, gain_std=more * estimate.static.gain_std)
-            alike = tuple(
-                (replace(other, gain_std=more * other.gain_std), weight)
-                for other, weight in estimate.alike
-            )
-            estimate = replace(estimate, static=static, alike=alike)
-        found.append(replace(fit, estimate=estimate))
+
+            def widened(one: StaticGain, wider: dict[str, float] = wider) -> StaticGain:
+                gain_std, total_std = wider["gain"] * one.gain_std, wider["total"] * one.total_std
+                return replace(one, gain_std=gain_std, total_std=total_std)
+
+            alike = tuple((widened(other), weight) for other, weight in estimate.alike)
+            estimate = replace(estimate, static=widened(estimate.static), alike=alike)
+        process = replace(estimate.process, find=partial(_widened, estimate.process, wider))
+        found.append(replace(fit, estimate=replace(estimate, process=process)))
+    return tuple(found)
+
+
+def _named(model: PlausibleModel) -> tuple[ProcessParameter, ...]:
+    # poles of integrators are exactly zero
+    return process_parameters(model.poles, model.numerator, model.dead_time, 1 / SMALLEST)
+
+
+def _values(model: PlausibleModel) -> FloatArray:
+    """Total delay and parameters (k,) of a model."""
+    moving = model.poles[model.poles != 0]
+    total = model.dead_time - float(np.sum(1 / moving).real)
+    total -= float(model.numerator[1] / model.numerator[0]) if model.numerator.size > 1 else 0.0
+    return np.array([total, *(one.value for one in _named(model))])
+
+
+def _widened(process: ProcessEstimate, wider: dict[str, float]) -> tuple[ProcessParameter, ...]:
+    """Parameters with wider errors; a time constant does not reach below zero."""
+    found = []
+    for one in process.parameters:
+        factor, ends = wider.get(one.name, 1.0), one.ends
+        if ends is not None:
+            low, high = (one.value + factor * (end - one.value) for end in ends)
+            ends = (max(low, 0.0) if ends[0] >= 0 else low, high)
+        found.append(one._replace(std=factor * one.std, ends=ends))
     return tuple(found)
 
 

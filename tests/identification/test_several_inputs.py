@@ -155,3 +155,33 @@ def test_fits_that_leave_out_the_first_samples_have_intervals_of_both_together()
     for fit, (gain, _, dead_time) in zip(fits, plants, strict=True):
         assert fit.interval[0] <= dead_time <= fit.interval[1]
         assert abs(fit.gain - gain) < 0.05
+
+
+def test_errors_of_lags_and_total_delays_are_those_of_all_parameters_together():
+    """Steps 30 s apart: those of an input alone are a fifth of it, and held in 3 of 20 records."""
+    steps = np.stack([1.0 * (T > 40), 1.0 * (T > 70)])
+    truth = np.array([2.0, 5.3, 20.0, -1.2, 3.0, 30.0])
+
+    def plant(p):
+        first, second = (
+            response(T, u, *two) for u, two in zip(steps, p.reshape(2, 3), strict=True)
+        )
+        return first + second
+
+    def response(time, u, gain, dead_time, lag):
+        since = np.clip(time - time[np.argmax(u > 0)] - dead_time, 0, None)
+        return -gain * np.expm1(-since / lag)
+
+    moves = 1e-3 * np.eye(6)
+    slopes = [(plant(truth + one) - plant(truth - one)) / 2e-3 for one in moves]
+    columns = np.stack([*slopes, np.ones(T.size)], axis=1)
+    bound = 0.03**2 * np.linalg.inv(columns.T @ columns)
+    y = plant(truth) + 0.03 * np.random.default_rng(2).standard_normal(T.size)
+    fits = cr.identify(cr.Record(T, steps, y), structures="FOPDT").fit.fits
+    for fit, first in zip(fits, (0, 3), strict=True):
+        lag = next(one for one in fit.parameters if one.name == "lag_1")
+        # the bound at the truth; the fit has that at its own parameters
+        assert lag.std == pytest.approx(np.sqrt(bound[first + 2, first + 2]), rel=0.2)
+        both = bound[first + 1 : first + 3, first + 1 : first + 3].sum()
+        low, high = fit.total_delay_interval
+        assert (high - low) / 3.92 == pytest.approx(np.sqrt(both), rel=0.2)

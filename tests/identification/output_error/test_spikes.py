@@ -88,6 +88,18 @@ def test_an_error_code_of_the_input_is_none_if_the_output_responds(u, where, val
     assert pulse.gain == pytest.approx(GAIN, abs=0.01)
 
 
+@pytest.mark.parametrize(("heights", "hold"), [((1.0, -1.0), 25), ((1.0, 0.0, 2.0), 15)])
+def test_pulses_of_a_test_are_no_error_codes_of_the_input(heights, hold):
+    """Their first or last was held: gains of 0.02 and 4.7, a dead time of 120 s."""
+    u = np.zeros(600)
+    u[60 : 60 + hold * len(heights)] = np.repeat(heights, hold)
+    y = np.ravel(PLANT.simulate(u)) + 2 * NOISE * np.random.default_rng(0).standard_normal(600)
+    fit = cr.identify(cr.Record(np.arange(600.0), u, y)).fit
+    assert "outliers" not in codes(fit)
+    assert fit.gain_interval[0] <= GAIN <= fit.gain_interval[1]
+    assert fit.interval[0] <= DELAY <= fit.interval[1]
+
+
 def test_samples_are_spikes_where_they_are_far_from_the_model_and_from_their_neighbours():
     rng = np.random.default_rng(0)
     fitted = np.where(np.arange(300) < 150, 0.0, 1.0)

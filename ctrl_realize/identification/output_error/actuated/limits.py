@@ -66,14 +66,21 @@ def without_codes(record: Record) -> tuple[Record, tuple[Flag, ...]]:
 
 
 def with_held_input(record: Record) -> tuple[Record, tuple[Flag, ...]]:
-    """Hold the input where it has such a value, and tell it."""
-    codes, said = _codes(record, record.input, _PULSE)
+    """Hold the input where it has such a value, and tell it.
+
+    A few ranges are enough for single samples; what lasts is a pulse of a test.
+    """
+    limit = _PULSE
+    codes, said = _codes(record, record.input, limit)
+    if np.any(np.diff(codes) == 1):
+        limit = BEYOND
+        codes, said = _codes(record, record.input, limit)
     if not codes.size:
         return record, ()
     index = np.arange(record.n_samples)
     kept = np.delete(index, codes)
     before = kept[np.maximum(np.searchsorted(kept, index, "right") - 1, 0)]
-    flag = flagged("outliers.code_of_input", said=said, limit=_PULSE)
+    flag = flagged("outliers.code_of_input", said=said, limit=limit)
     return record.__replace__(input=np.ravel(record.input)[before]), (flag,)
 
 
