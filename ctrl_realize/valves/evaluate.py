@@ -210,15 +210,17 @@ def _statics(
         bands += [band] if band.is_known else []
         resolutions += [resolution] if resolution.is_known else []
         noise = noise_of(record, own)
-        waits.append(reversal_wait(record, own, ranges, noise))
+        waits.append(reversal_wait(record, own, ranges, noise, delay))
         found = static_curve(record, own, mine, ranges, noise, delay)
         curves += [found] if found is not None else []
     # a ramp before levels, the longer before the shorter
     curve = max(curves, key=lambda one: (one.origin == "ramp", np.ptp(one.command)), default=None)
     band, resolution = joined(bands), joined(resolutions)
     hysteresis, linearity, width = hysteresis_and_linearity(curve, band)
-    if width.is_known and np.isfinite(waits).any():  # a stem that sticks shows less in the loop
-        width = replace(width, high=max(width.high, float(np.nanmax(waits))))
+    # A stem that sticks shows less of its dead band in the loop than at the reversal.
+    sticks = [wait for wait, least in waits if least > width.high]
+    if width.is_known and sticks:
+        width = replace(width, high=max(sticks))
     backlash = Interval()
     if band.is_known and resolution.is_known:
         low, high = max(band.low - resolution.high, 0.0), max(band.high - resolution.low, 0.0)

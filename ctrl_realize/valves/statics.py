@@ -191,24 +191,29 @@ def static_curve(
     return _of_levels(steps, ranges)
 
 
-def reversal_wait(record: Record, parts: Sequence[TestPart], ranges: Ranges, noise: Noise) -> float:
+def reversal_wait(
+    record: Record, parts: Sequence[TestPart], ranges: Ranges, noise: Noise, delay: float
+) -> tuple[float, float]:
     """Largest change of the command along a ramp, after one the other way, before a movement.
 
-    In % of the command's span, with the lag along the ramp; NaN without such ramps. A stem that
-    sticks waits for its dead band and then slides, nearer to the command than that.
+    In % of the command's span, and without what lag and noise may have added; NaN without such
+    ramps. A stem that sticks waits for its dead band and then slides, nearer to the command.
     """
     output, command = np.ravel(record.output), np.ravel(record.input)
+    scale, least = abs(100 / ranges.command_span), _MOVES * noise.sigma + noise.quantum
     ramps = [part for part in parts if part.kind == "ramp"]
-    waits = []
+    waits = [(np.nan, np.nan)]
     for one, two in pairwise(ramps):
         if (one.after - one.before) * (two.after - two.before) >= 0:
             continue
         rest = slice(min(one.stop, two.start - 1), two.start)
-        away = np.abs(output[two.start : two.stop] - np.median(output[rest]))
-        moved = away > _MOVES * noise.sigma + noise.quantum
+        moved = np.abs(output[two.start : two.stop] - np.median(output[rest])) > least
         first = int(np.argmax(moved)) if moved.any() else moved.size - 1
-        waits.append(abs(command[two.start + first] - np.median(command[rest])))
-    return float(max(waits, default=np.nan)) * abs(100 / ranges.command_span)
+        wait = abs(command[two.start + first] - np.median(command[rest])) * scale
+        rate = abs(two.after - two.before) * scale / (two.stop - two.start)
+        late = (delay if np.isfinite(delay) else 0.0) / record.dt + 2
+        waits.append((wait, wait - rate * late - least * abs(100 / ranges.travel_span)))
+    return max(waits, key=lambda pair: np.nan_to_num(pair[0]))
 
 
 def _binned(
