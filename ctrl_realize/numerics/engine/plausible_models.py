@@ -108,9 +108,18 @@ def _about(
     widest = np.full(n + free, np.inf)
     widest[0], widest[1:n] = 0.5 * (scales.latest - scales.earliest), _WIDEST
     if isinstance(structure, Family):
-        drawn = _normal(covariance, widest, count, rng) + np.r_[theta, numerator]
-        drawn[:, 0] = np.clip(drawn[:, 0], scales.earliest, scales.latest)
-        return [_model(row[:n], row[n:]) for row in drawn]
+        # Far from the fit, which is one of them, its tangent is no guide: what fits worse than it
+        # says is left out, and numerators are those that fit.
+        moves = rng.standard_normal((_PROPOSED * count, n))
+        moves[0] = 0.0
+        tried = theta + moves @ _directions(covariance[:n, :n], widest[:n])
+        tried[:, 0] = np.clip(tried[:, 0], scales.earliest, scales.latest)
+        found = eliminate(problem, structure.plain, tried)
+        value = -0.5 * np.maximum(found.cost - candidate.cost, 0.0) / variance
+        chances = np.cumsum(np.exp(np.minimum(value + 0.5 * np.sum(moves**2, axis=1), 0.0)))
+        places = (np.arange(count) + rng.random()) / count * chances[-1]
+        chosen = np.searchsorted(chances, places).clip(0, len(tried) - 1)
+        return [_model(tried[k], found.numerator[k]) for k in chosen]
     bounds = parameter_bounds(structure, scales)
     rows = _WIDER * _directions(covariance[:n, :n], widest[:n])
 

@@ -129,6 +129,19 @@ def test_a_record_without_response_beside_others_is_told(gains):
         assert told & {"gains_differ", "no_common_gain", "outlying_records"}
 
 
+@pytest.mark.parametrize("seed", [2, 4])
+def test_models_drawn_beside_a_stated_lag_fit_the_record(seed):
+    """Two of 39 had a lead of -40 s and no dead time: a true statement made tuning impossible."""
+    rng = np.random.default_rng(seed)
+    u = np.repeat(rng.choice([-1.0, 1.0], 27), 15)[:400]
+    y = response(TIME, u, 2.0, 6.3, [12, 4]) + 0.1 * rng.standard_normal(400)
+    fit = cr.fit_output_error(cr.Record(TIME, u, y), fastest_lag=3.0).fit
+    assert fit.verdicts[2].level == "good"
+    for model in fit.plausible_models.systems:
+        left = (y - model.simulate(u - u[0]))[60:]  # from then on the past is forgotten
+        assert np.std(left) < 0.12
+
+
 @pytest.mark.parametrize("seed", [1007, 1016])
 def test_a_narrow_maximum_in_slow_noise_is_not_all_that_a_ramp_tells(seed):
     """The interval was 14.2 to 15.7 s, or 0 to 3.4 s: a ratio of likelihoods is no chi-square."""
