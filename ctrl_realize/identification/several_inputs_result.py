@@ -24,7 +24,8 @@ class SeveralInputsFit(ModelFit):
     ----------
     fits : tuple of OutputErrorFit
         One for each input, of the output without the responses to the others. Intervals of dead
-        time and gain are wider than for these alone, by what the others leave open.
+        time, gain, total delay and lags are wider than for these alone, by what the others leave
+        open.
     records : tuple of Record
         The record.
     responses : ndarray, shape (inputs, N)
