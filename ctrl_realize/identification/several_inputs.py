@@ -35,6 +35,7 @@ from ..numerics.arrays import BoolArray, FloatArray
 from ..numerics.blas_threads import single_threaded
 from ..numerics.constants import SMALLEST
 from ..numerics.engine.plausible_models import PlausibleModel
+from ..numerics.engine.poles import lag_sum
 from ..numerics.engine.static_gain import StaticGain
 from ..numerics.families.physical import ProcessParameter, process_parameters
 from ..numerics.output_error.result import ProcessEstimate
@@ -212,17 +213,16 @@ def _wider(
     for i, fit in enumerate(fits):
         own = np.column_stack([tangents[i][seen], own_columns(fit, clock, of_step(fit))])
         others = np.column_stack([*(t[seen] for t in tangents[:i] + tangents[i + 1 :]), *every])
-        factor = _ratio(own, others, np.ones(1))  # of the dead time, which comes first
-        estimate = fit.estimate
-        at = estimate.dead_time
-        low = max(at - factor * (at - estimate.low), 0.0)
-        high = at + factor * (estimate.high - at)
-        estimate = replace(estimate, low=low, high=high, std=factor * estimate.std)
         slopes = bounds[i].derivatives(_values)
         names = ["total", *(one.name for one in _named(bounds[i].model))]
         wider = {
             name: _ratio(own, others, slope) for name, slope in zip(names, slopes, strict=True)
         }
+        estimate, factor = fit.estimate, wider["dead_time"]
+        at = estimate.dead_time
+        low = max(at - factor * (at - estimate.low), 0.0)
+        high = at + factor * (estimate.high - at)
+        estimate = replace(estimate, low=low, high=high, std=factor * estimate.std)
         if estimate.static is not None:
 
             def widened(one: StaticGain, wider: dict[str, float] = wider) -> StaticGain:
@@ -243,9 +243,7 @@ def _named(model: PlausibleModel) -> tuple[ProcessParameter, ...]:
 
 def _values(model: PlausibleModel) -> FloatArray:
     """Total delay and parameters (k,) of a model."""
-    moving = model.poles[model.poles != 0]
-    total = model.dead_time - float(np.sum(1 / moving).real)
-    total -= float(model.numerator[1] / model.numerator[0]) if model.numerator.size > 1 else 0.0
+    total = model.dead_time + lag_sum(model.poles[model.poles != 0], model.numerator)
     return np.array([total, *(one.value for one in _named(model))])
 
 

@@ -85,7 +85,7 @@ def with_held_input(record: Record) -> tuple[Record, tuple[Flag, ...]]:
 
 
 def has_pulses(record: Record) -> bool:
-    """Whether single samples of an input have such a value: they are no edges of a step test."""
+    """Whether all samples of an input with such a value are single: no edges of a step test."""
     codes, _ = _codes(record, record.input, _PULSE)
     return codes.size > 0 and bool(np.all(np.diff(codes) > 1))
 
