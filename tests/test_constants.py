@@ -1,12 +1,10 @@
-"""Every tuned constant of the fits says where it comes from; every rule has its switch."""
+"""Every tuned constant of the fits says where it comes from; every rule is asked somewhere."""
 
 import ast
 import re
 from pathlib import Path
 
-import pytest
-
-from benchmarks.ablation.switches import SWITCHES
+from ctrl_realize.numerics.rules import Rule
 
 PACKAGE = Path(__file__).parents[1] / "ctrl_realize"
 NUMERICS = [
@@ -53,7 +51,7 @@ def test_every_constant_of_the_fits_is_explained():
 
 
 def test_rules_that_constants_name_are_in_the_table():
-    names = {switch.name for switch in SWITCHES}
+    names = {rule.value for rule in Rule}
     unknown = []
     for path in MODULES:
         text = re.sub(r"\s*\n#?\s*", " ", path.read_text(encoding="utf-8"))
@@ -63,7 +61,8 @@ def test_rules_that_constants_name_are_in_the_table():
     assert not unknown, unknown
 
 
-@pytest.mark.parametrize("switch", SWITCHES, ids=lambda switch: switch.name)
-def test_a_switch_finds_what_it_switches_off(switch):
-    with switch.off():
-        pass
+def test_every_rule_is_asked_somewhere_in_the_package_and_has_a_name_of_its_own():
+    source = "\n".join(path.read_text(encoding="utf-8") for path in PACKAGE.rglob("*.py"))
+    asked = set(re.findall(r"\bRule\.([A-Z_]+)\.on\b", source))
+    assert asked == set(Rule.__members__)
+    assert len(Rule) == len(Rule.__members__)  # two of the same value would be one

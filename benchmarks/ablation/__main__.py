@@ -1,9 +1,9 @@
 """Make the tables of rules: ``python -m benchmarks.ablation``.
 
-Every rule is switched off by itself, and the records that it touches are identified again, at most
-`MOST` of each kind. CPU time is that of `identify`, over that with all rules on, on the same
-records. With `--made-for` each of the rules for rare records is tried on records of its own world
-alone: what it does where it is needed.
+Every rule is switched off by itself, and the records that it touches (those on which it is asked
+for) are identified again, at most `MOST` of each kind. CPU time is that of `identify`, over that
+with all rules on, on the same records. With `--made-for` each of the rules for rare records is
+tried on records of its own world alone: what it does where it is needed.
 """
 
 from __future__ import annotations
@@ -12,8 +12,7 @@ import argparse
 import json
 import time
 from collections.abc import Iterator
-from contextlib import nullcontext
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from itertools import zip_longest
 from pathlib import Path
 
@@ -22,19 +21,18 @@ import numpy as np
 import ctrl_realize as cr
 from benchmarks.honesty.trial import quietly
 from benchmarks.worlds.judge import DELAY
+from ctrl_realize.numerics.rules import Rule, asked, without
 
 from . import rare
 from .cases import Case, cases, of_world
 from .page import KINDS, Seen, page
-from .switches import MODES, SWITCHES, Switch
-from .touched import watched
 
 DOCS = Path(__file__).parents[2] / "docs" / "tables"
 PAGE, OWN_WORLDS = DOCS / "ablation_table.md", DOCS / "ablation_worlds_table.md"
 MOST, FEW = 6, 12
 """Records of a kind on which a rule is tried, evenly among those that it touches; where these are
 few, all of them."""
-BASE = SWITCHES[0]
+BASE = "all rules on"
 
 
 def main() -> None:
@@ -48,9 +46,7 @@ def main() -> None:
     given = parser.parse_args()
     seen = stored(given.store)
     rules = [
-        rule
-        for rule in SWITCHES[1:]
-        if not given.only or any(word in rule.name for word in given.only)
+        rule for rule in Rule if not given.only or any(word in rule.value for word in given.only)
     ]
 
     def keep(one: Seen) -> None:
@@ -62,10 +58,11 @@ def main() -> None:
     if given.made_for:
         own = in_own_worlds(rules, given.made_for)
         for rule, case in own:
-            for one in (BASE, rule):
-                if (one.name, case.name) not in seen:
-                    keep(judged(one, case))
-        wanted = {(one.name, case.name) for rule, case in own for one in (BASE, rule)}
+            if (BASE, case.name) not in seen:
+                keep(judged(case))
+            if (rule.value, case.name) not in seen:
+                keep(judged(case, rule))
+        wanted = {(one, case.name) for rule, case in own for one in (BASE, rule.value)}
         found = [one for key, one in seen.items() if key in wanted]
         write(found, given.output or OWN_WORLDS, all_rules=False)
         return
@@ -73,34 +70,35 @@ def main() -> None:
         case for case in cases(given.seeds) if not given.kinds or case.kind in given.kinds
     )
     for case in in_turn(every):
-        if (BASE.name, case.name) not in seen:
-            keep(judged(BASE, case))
+        if (BASE, case.name) not in seen:
+            keep(judged(case))
     # Without modes first: that is what other rules are compared with where inputs are no steps.
     for case in every:
-        if MODES.name in seen[BASE.name, case.name].touched and (MODES.name, case.name) not in seen:
-            keep(judged(MODES, case))
+        touched = seen[BASE, case.name].touched
+        if Rule.MODES.value in touched and (Rule.MODES.value, case.name) not in seen:
+            keep(judged(case, Rule.MODES))
     for case, rule in pairs(every, rules, seen):
-        if (rule.name, case.name) not in seen:
-            keep(judged(rule, case))
+        if (rule.value, case.name) not in seen:
+            keep(judged(case, rule))
     names = {case.name for case in every}
-    wanted = [rule.name for rule in (BASE, *rules)]
+    wanted = [BASE, *(rule.value for rule in rules)]
     found = [one for one in seen.values() if one.name in names and one.rule in wanted]
     write(found, given.output or PAGE, all_rules=not given.only)
 
 
 def write(seen: list[Seen], output: Path, *, all_rules: bool = True) -> None:
     """Write the table of what was judged."""
-    names = [rule.name for rule in SWITCHES]
-    lines = page(seen, names, MODES.name, all_rules=all_rules)
+    names = [BASE, *(rule.value for rule in Rule)]
+    lines = page(seen, names, Rule.MODES.value, all_rules=all_rules)
     output.write_text("\n".join(lines), encoding="utf-8")
 
 
-def in_own_worlds(rules: list[Switch], count: int) -> list[tuple[Switch, Case]]:
+def in_own_worlds(rules: list[Rule], count: int) -> list[tuple[Rule, Case]]:
     """Rules for rare records, with some records of the world that each was made for."""
     return [
-        (rule, of_world("rare", rare.MADE_FOR[rule.name], seed))
+        (rule, of_world("rare", rare.MADE_FOR[rule], seed))
         for rule in rules
-        if rule.name in rare.MADE_FOR
+        if rule in rare.MADE_FOR
         for seed in range(count)
     ]
 
@@ -113,16 +111,16 @@ def in_turn(every: tuple[Case, ...]) -> Iterator[Case]:
 
 
 def pairs(
-    every: tuple[Case, ...], rules: list[Switch], seen: dict[tuple[str, str], Seen]
-) -> Iterator[tuple[Case, Switch]]:
+    every: tuple[Case, ...], rules: list[Rule], seen: dict[tuple[str, str], Seen]
+) -> Iterator[tuple[Case, Rule]]:
     """Records and the rules that are tried on them."""
-    tried: dict[str, list[Switch]] = {case.name: [] for case in every}
+    tried: dict[str, list[Rule]] = {case.name: [] for case in every}
     for rule in rules:
         for kind in KINDS:
             touched = [
                 case.name
                 for case in every
-                if case.kind == kind and rule.name in seen[BASE.name, case.name].touched
+                if case.kind == kind and rule.value in seen[BASE, case.name].touched
             ]
             count = len(touched) if len(touched) <= FEW else MOST
             for i in np.linspace(0, len(touched) - 1, count).round().astype(int):
@@ -142,32 +140,35 @@ def stored(path: Path | None) -> dict[tuple[str, str], Seen]:
     return {(one.rule, one.name): one for one in found}
 
 
-def judged(rule: Switch, case: Case) -> Seen:
+def judged(case: Case, rule: Rule | None = None) -> Seen:
     """Identify a record with a rule off; with all rules on, see which of them touch it."""
     low, high = case.band
-    plain = rule.changes and case.kind == "driven" and rule is not MODES
-    watching = watched(() if rule.changes else SWITCHES[1:])
-    with quietly(), rule.off(), MODES.off() if plain else nullcontext(), watching as touched:
+    off = set() if rule is None else {rule}
+    if off and case.kind == "driven":
+        off.add(Rule.MODES)
+    one = Seen(BASE if rule is None else rule.value, case.name, case.kind)
+    fit = None
+    with quietly(), without(*off), asked() as rules:
         start = time.process_time()
         try:
-            system = cr.identify(case.records)
+            fit = cr.identify(case.records).fit
         except cr.CtrlRealizeError as error:
-            refused = str(error)
-            return Seen(rule.name, case.name, case.kind, refused=refused, touched=touched.names)
+            one = replace(one, refused=str(error))
         except Exception as error:  # what stands on a rule may break without it
-            if not rule.changes:
+            if not off:
                 raise
-            return Seen(rule.name, case.name, case.kind, refused=f"breaks: {error!r}")
-        cpu = time.process_time() - start - touched.spent
-    fit = system.fit
+            one = replace(one, refused=f"breaks: {error!r}")
+        cpu = time.process_time() - start
+    if not off:
+        one = replace(one, touched=tuple(sorted(each.value for each in rules)))
+    if fit is None:
+        return one
     outside = min(fit.dead_time - low, 0.0) + max(fit.dead_time - high, 0.0)
     first, last = fit.interval
     slack = 1e-9 * last
     codes = {flag.code for flag in fit.flags}
-    return Seen(
-        rule.name,
-        case.name,
-        case.kind,
+    return replace(
+        one,
         error=outside / case.dt,
         width=(last - first) / case.dt,
         held=bool(first - slack <= high and low <= last + slack),
@@ -175,7 +176,6 @@ def judged(rule: Switch, case: Case) -> Seen:
         cpu=cpu,
         flags=tuple(sorted(codes)),
         interval=(first / case.dt, last / case.dt),
-        touched=touched.names,
     )
 
 

@@ -23,6 +23,7 @@ from ..errors import DataError, OrderError, UnsuitableSystemError
 from ..numerics.arrays import FloatArray
 from ..numerics.constants import VERY_STRONG
 from ..numerics.output_error.any_input.data import MOST_SAMPLES
+from ..numerics.rules import Rule
 from ..numerics.signals.noise import correlation_time
 from ..numerics.signals.noise_model import coloured_criterion
 from .long_records import lively_parts
@@ -68,7 +69,7 @@ def with_modes_judged(
         related = [bool(check.flags) for check in checks]
     except UnsuitableSystemError:  # an unstable model is not simulated
         related, follows, left = [True] * len(records), [True] * len(records), None
-    if not any(related):
+    if not any(related) or not Rule.MODES.on:
         return system
     why = "nothing else could be fitted"
     outlying = fit.repeatability is not None and fit.repeatability.outlying

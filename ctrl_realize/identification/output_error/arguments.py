@@ -16,6 +16,7 @@ from ...numerics.arrays import FloatArray
 from ...numerics.constants import SMALLEST
 from ...numerics.engine.problem import KnownFactor
 from ...numerics.output_error.step_data import StepData, step_data
+from ...numerics.rules import Rule
 from ...numerics.signals.edges import despike, difference_noise
 from ...numerics.signals.noise import mad_sigma
 from ...numerics.signals.step_sequence import MOST_MOVES
@@ -179,7 +180,8 @@ def _curved(held: list[FloatArray]) -> bool:
     """
     way = np.concatenate([np.sign(np.diff(part)) for part in held])
     way = way[way != 0]
-    return bool(way.size > MOST_MOVES and np.mean(way[1:] == way[:-1]) > _ONE_WAY)
+    curved = way.size > MOST_MOVES and np.mean(way[1:] == way[:-1]) > _ONE_WAY
+    return bool(curved) and Rule.CURVES.on
 
 
 def _holds_between(held: list[FloatArray], largest: float) -> bool:
@@ -195,7 +197,7 @@ def _holds_between(held: list[FloatArray], largest: float) -> bool:
     whole = (despike(part, _SPIKE)[: part.size // _MEAN * _MEAN] for part in away)
     means = np.concatenate([part.reshape(-1, _MEAN).mean(axis=1) for part in whole])
     noise = _UNLIKELY * mad_sigma(means) if means.size else 0.0
-    return bool(
-        np.quantile(np.abs(np.concatenate(away)), 0.9) <= _HOLDS * largest
-        and np.abs(means).max(initial=0.0) <= max(_MOVES * largest, noise)
-    )
+    if np.quantile(np.abs(np.concatenate(away)), 0.9) > _HOLDS * largest:
+        return False
+    moves = bool(np.abs(means).max(initial=0.0) > max(_MOVES * largest, noise))
+    return not (moves and Rule.HELD_STEPS.on)

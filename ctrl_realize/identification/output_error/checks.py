@@ -14,6 +14,7 @@ from ..._flags import Flag, flagged
 from ..._wording import chosen
 from ...numerics.arrays import FloatArray, IntArray
 from ...numerics.constants import Z_95
+from ...numerics.rules import Rule
 from ...numerics.validation.innovations import RARE, REGRESSED, nonlinear_chance, past_inputs
 from ...numerics.validation.parameter_change import ParameterChange, parameter_change
 from .loop_flags import (
@@ -75,7 +76,7 @@ def checked(fit: OutputErrorFit, *, alone: bool = True) -> OutputErrorFit:
         shown = _shown(fit)
         flags += sensor_flags(fit, shown.output, shown.fitted)
         held = hold_time(shown.output, shown.fitted, fit.data.dt * shown.spacing)
-        if held is not None and "coarse_quantisation" not in codes:
+        if held is not None and "coarse_quantisation" not in codes and Rule.HELD_OUTPUT.on:
             low = max(low - held[0], 0.0)
             flags.append(held[1])
         white = bool(fit.estimate.residual.noise_lags)

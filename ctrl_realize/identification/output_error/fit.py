@@ -23,6 +23,7 @@ from ...numerics.output_error.other_structures import Requested
 from ...numerics.output_error.result import OutputErrorEstimate
 from ...numerics.output_error.step_data import StepData
 from ...numerics.output_error.step_fit import fit_step_record
+from ...numerics.rules import Rule
 from ...numerics.validation.own_response import OwnResponse
 from ...results import Flag
 from ..process_structures import Structures, requested
@@ -265,14 +266,15 @@ def fit_output_error(
             )
     factor = known_factor(known)
     several = on_common_axis(checked_records(records))
+    # Of long records every sample tells, where the response is not fitted by means of blocks.
+    short = max(one.n_samples for one in several) <= MOST_SAMPLES
     tried = replace(
         _requested(several, structures, max_delay, noise),
         known=factor,
         huber=loss == "huber",
         simulates=focus == "simulation",
-        # Of long records every sample tells, where the response is not fitted by means of blocks.
         loop=any(map(in_automatic, several))
-        or (max(one.n_samples for one in several) <= MOST_SAMPLES and answers_the_output(several)),
+        or (short and answers_the_output(several) and Rule.LOOP.on),
     )
     setting = {"own_gains": gains == "own", "may_clip": actuator is None}
     free = partial(_linear, several, tried, **setting)

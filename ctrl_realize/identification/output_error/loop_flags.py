@@ -14,6 +14,7 @@ from ...numerics.arrays import BoolArray, FloatArray
 from ...numerics.constants import Z_95
 from ...numerics.engine.plausible_models import PlausibleModel
 from ...numerics.loops.relay import switched_by_relay
+from ...numerics.rules import Rule
 from ...numerics.signals.excitation import lively_start
 from ...numerics.validation.innovations import (
     RARE,
@@ -171,7 +172,7 @@ def generalised_step(
     fit: OutputErrorFit, output: FloatArray, drive: FloatArray
 ) -> WhiteStep | None:
     """One step of generalised least squares, from a fit with coloured residual."""
-    if not np.all(fit.poles) or not fit.gain:
+    if not np.all(fit.poles) or not fit.gain or not Rule.GENERALISED.on:
         return None
     model = PlausibleModel(fit.dead_time, fit.poles, fit.estimate.numerator)
     return _step(fit, model, output, drive)

@@ -17,6 +17,7 @@ import numpy as np
 
 from ..arrays import FloatArray
 from ..constants import VERY_STRONG
+from ..rules import Rule
 from .descend import descend
 from .eliminate import eliminate
 from .newton import settle
@@ -204,7 +205,7 @@ def _with_a_pole_more(
     course of a search.
     """
     smaller = found.get(Structure(structure.order - 1, structure.relative_degree))
-    if smaller is None:
+    if smaller is None or not Rule.POLE.on:
         return []
     rates = np.geomspace(_SLOWEST / scales.length, _FASTEST / scales.rise, _RATES)
     poles = [np.append(smaller.poles, -rate) for rate in rates]

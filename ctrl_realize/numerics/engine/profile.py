@@ -22,6 +22,7 @@ import numpy as np
 
 from ..arrays import FloatArray
 from ..constants import CHI2_95, Z_95
+from ..rules import Rule
 from .descend import descend
 from .eliminate import evaluate
 from .newton import solve_level
@@ -127,7 +128,7 @@ def profile_points(
         # A start that was followed before leads where it led before.
         wanted &= new_start[near]
         at, near = at[wanted], near[wanted]
-        if not at.size:
+        if not at.size or not Rule.SWEPT.on:
             break  # also where all of the grid lies outside of the interval
         starts = fitted[near]
         starts[:, 0] = grid[at]

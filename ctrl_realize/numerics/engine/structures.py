@@ -23,6 +23,7 @@ import numpy as np
 
 from ..arrays import ComplexArray, FloatArray
 from ..constants import SMALLEST, VERY_STRONG
+from ..rules import Rule
 from .batch_search import fit_batch
 from .poles import parameters_from_poles, poles_from_parameters
 from .problem import Bounds, Family, Problem, Structure
@@ -166,12 +167,12 @@ def _worth_a_search(
     significantly, one more will not.
     """
     if structure.zeros:
-        return False
+        return not Rule.HOPELESS.on
     best = [
         min((c.cost for s, c in found.items() if s.order == order), default=np.inf)
         for order in (structure.order - 2, structure.order - 1)
     ]
-    return not best[1] > best[0] * (1 - 4 / problem.data.size)
+    return not (best[1] > best[0] * (1 - 4 / problem.data.size) and Rule.HOPELESS.on)
 
 
 def parameter_bounds(structure: Structure, scales: Scales) -> Bounds:
@@ -185,7 +186,8 @@ def parameter_bounds(structure: Structure, scales: Scales) -> Bounds:
     order = structure.order
     if scales.bounds is not None:
         return scales.bounds(order)
-    fast = np.log((SLOWER_WITH_ZEROS if structure.zeros else FASTEST) / scales.dt)
+    slower = structure.zeros and Rule.SLOWER.on
+    fast = np.log((SLOWER_WITH_ZEROS if slower else FASTEST) / scales.dt)
     slow = np.log(max(SLOWEST / scales.length, scales.slowest))
     slow_pair = np.log(max(SLOWEST_PAIR / scales.length, scales.slowest))
     low, high = [scales.earliest], [scales.latest]
@@ -194,7 +196,7 @@ def parameter_bounds(structure: Structure, scales: Scales) -> Bounds:
         high.append(fast)
     for pair in range(order // 2):
         size, damping = fast, np.log(_DAMPING)
-        if scales.integrating and pair == 0 and order % 2 == 0:
+        if scales.integrating and pair == 0 and order % 2 == 0 and Rule.INTEGRATOR.on:
             # An integrator and a lag: the bounds of their sum and of its inverse, as of a pair.
             total = np.log(2 * _DAMPING) + fast
             size = (total + slow) / 2
@@ -256,19 +258,25 @@ def plausible(
         if value <= limit
         or value + needless_parameters(s) <= weighed
         or candidates[s] is chosen
-        or (s.zeros == 0 and s.order <= lags and candidates[s].cost <= fits)
+        or (s.zeros == 0 and s.order <= lags and candidates[s].cost <= fits and Rule.SIMPLER.on)
     ]
 
 
 def charged(criterion: dict[Structure, float], penalty: float) -> dict[Structure, float]:
     """Criterion with at least the penalty per parameter used for ruling out."""
-    more = max(LEAST_CHARGE - penalty, 0.0)
+    more = least_charge(penalty) - penalty
     return {s: value + more * s.free for s, value in criterion.items()}
+
+
+def least_charge(penalty: float) -> float:
+    """Charge for a parameter where structures are ruled out: the penalty at least."""
+    return LEAST_CHARGE if penalty < LEAST_CHARGE and Rule.LEAST_CHARGE.on else penalty
 
 
 def needless_parameters(structure: Structure) -> float:
     """Penalty on zeros, and on poles beyond the third, when a structure is chosen."""
-    return NEEDLESS_ZERO * structure.zeros + NEEDLESS_POLE * max(structure.order - 3, 0)
+    charge = NEEDLESS_ZERO * structure.zeros + NEEDLESS_POLE * max(structure.order - 3, 0)
+    return charge if charge and Rule.NEEDLESS.on else 0.0
 
 
 def pattern_starts(structure: Structure, scales: Scales, alone: bool = False) -> list[FloatArray]:

@@ -28,6 +28,7 @@ from scipy.special import ndtr, stdtrit
 
 from ..arrays import FloatArray
 from ..constants import HUBER, SMALLEST, VERY_STRONG, Z_95
+from ..rules import Rule
 from ..signals.noise import correlation_of_noise, correlation_time, is_coarse, mad_sigma
 from .compared_fits import converged, on_new_data, settled
 from .problem import Problem, Structure
@@ -130,8 +131,9 @@ class WindowFit:
             structure = choose(left)
             candidate = self.candidates[structure]
             resolved = replace(self, taken=1.0).static(candidate).resolved
-            if resolved and not at_nyquist(candidate, self.scales):
-                return candidate
+            if resolved and not (at_nyquist(candidate, self.scales) and Rule.NYQUIST.on):
+                kept = structure if structure == first or Rule.RESOLVED.on else first
+                return self.candidates[kept]
             del left[structure]
         return self.candidates[first]
 
@@ -190,7 +192,7 @@ def with_noise_of_residual(fit: WindowFit) -> WindowFit:
     correlation, missing = fit.correlation, 0.0
     if fit.colour is None:  # otherwise it is that of the noise already
         correlation, missing = correlation_of_noise(correlation, parameters / count)
-    if correlation <= 1.0:
+    if correlation <= 1.0 or not Rule.TAKEN.on:
         return fit
     freedom = max(count / correlation - parameters, _LEAST_FREEDOM)
     wider = (float(stdtrit(freedom, ndtr(Z_95))) / Z_95) ** 2
@@ -209,7 +211,8 @@ def weighted_correlation(correlation: float, counted: float) -> float:
 
     Ablation: correlation in units of weight.
     """
-    return max(correlation * counted, 1.0)
+    weighted = max(correlation * counted, 1.0)
+    return weighted if weighted > 0.999 * correlation or Rule.WEIGHT.on else correlation
 
 
 def fit_window(
@@ -247,7 +250,7 @@ def fit_window(
     spacing = window.spacing * scales.dt
     scales = replace(
         scales,
-        ringing=_ringing(error[window.start :], spacing),
+        ringing=_ringing(error[window.start :], spacing) if Rule.RINGING.on else 0.0,
         integrating=bool(np.abs(rough.poles[0]) * scales.length < RAMP),
     )
     others = [s for s in structures if s not in first]

@@ -32,6 +32,7 @@ from ..engine.problem import Bounds, Mapped, Problem, Structure
 from ..engine.profile import dead_time_error
 from ..engine.structures import Candidate, Scales
 from ..engine.window_fit import WindowFit
+from ..rules import Rule
 from .shaped import LagFamily, lowest, paired
 
 SHORTEST, LONGEST = 4, 8
@@ -148,7 +149,8 @@ def fit_diffusion(fits: WindowFit) -> list[LagChain]:
     root = float(np.sqrt(second / slowest))  # (2 - c) / (1 - c)
     first = 1 / (root - 1)  # 1 - c
     truncated = first**2 / (LONGEST - 0.5 + first) / float(slowest)
-    return [replace(chain, criterion=chain.criterion + _DIFFUSION_CHARGE, truncated=truncated)]
+    charge = _DIFFUSION_CHARGE if Rule.DIFFUSION_CHARGE.on else 0.0
+    return [replace(chain, criterion=chain.criterion + charge, truncated=truncated)]
 
 
 def _over_within_a_sample(chain: LagChain, scales: Scales) -> bool:

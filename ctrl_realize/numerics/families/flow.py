@@ -27,6 +27,7 @@ from ..engine.problem import Bounds, KnownFactor, Problem
 from ..engine.responses import StepSequence
 from ..engine.structures import Candidate
 from ..engine.window_fit import WindowFit
+from ..rules import Rule
 from .equal_lags import time_moments
 from .residence import flow_modes
 from .shaped import ShapedFamily, UnitResponse, lowest
@@ -214,7 +215,7 @@ def fit_flows(fits: WindowFit, level: float) -> list[DispersedFlow]:
         if not starts.size:  # responses that begin the other way have a short mean, or none
             break
         promising = starts[np.argsort(eliminate(problem, family, starts).cost)[:_FOLLOWED]]
-        charge = (family.bounds.low.size + 1) * penalty + _CHARGE
+        charge = (family.bounds.low.size + 1) * penalty + (_CHARGE if Rule.FLOW_CHARGE.on else 0.0)
         most = (level + REACH - charge) * fits.variance
         fit = lowest(problem, family, promising, scales.dt, most)
         criterion = fit.cost / fits.variance + charge

@@ -24,6 +24,7 @@ from ..engine.modal import respond
 from ..engine.problem import Structure
 from ..engine.structures import SIMPLE_STRUCTURES, needless_parameters
 from ..engine.window_fit import WindowFit
+from ..rules import Rule
 from .step_data import StepData
 
 _OUTLIER = 3.0  # standard deviations at which residuals are cut where explanations are compared
@@ -75,7 +76,9 @@ def _most_evident(ways: list[tuple[StepData, WindowFit]]) -> StepData:
         terms = best.order + best.zeros + 2 * len(data.hum)
         terms += best.order if data.relaxing else bool(data.drift)
         value = squares / closest.variance + closest.penalty * terms + needless_parameters(best)
-        return value + (VERY_STRONG if data.drift else STRONG if data.relaxing else 0.0)
+        if data.drift:
+            return value + (VERY_STRONG if Rule.DRIFT_EVIDENCE.on else STRONG)
+        return value + (STRONG if data.relaxing and Rule.MOTION_EVIDENCE.on else 0.0)
 
     return min(ways, key=criterion)[0]
 
@@ -93,7 +96,7 @@ def _takes_the_gain(data: StepData, fits: WindowFit) -> bool:
         return True
     static = fits.static(fits.best)
     unresolved = bool(data.drift) and not static.resolved
-    return unresolved or static.reached * static.gain < 0
+    return (unresolved or static.reached * static.gain < 0) and Rule.TAKES_GAIN.on
 
 
 def _dies_away(data: StepData, fits: WindowFit) -> bool:

@@ -26,6 +26,7 @@ from ..engine.problem import Problem, Structure
 from ..engine.static_gain import local_errors
 from ..engine.structures import Candidate, Scales, choose, neighbour_starts, parameter_bounds
 from ..engine.window_fit import WindowFit
+from ..rules import Rule
 from ..signals.noise import correlation_time, mad_sigma
 from ..signals.noise_model import noise_covariance, noise_lags, whitener, whitening_filter
 from .step_data import StepData, settled_at
@@ -68,10 +69,11 @@ def in_coloured_noise(fits: WindowFit, data: StepData) -> WindowFit:
     limit = _OUTLIER * max(mad_sigma(error), fits.sigma)
     plain = fits.window.with_output(fits.window.output - error + np.clip(error, -limit, limit))
     quiet = _quiet(error.size, data) if told else np.arange(error.size)
-    if not told and whitening_filter(error, noise_lags(error.size)).size != 2:
+    lags = 0 if told else whitening_filter(error, noise_lags(error.size)).size - 1
+    if not told and (lags != 1 or not Rule.SHORT_REST.on):
         return fits
     covariance = noise_covariance(error[quiet], error.size, _followed(fits)[quiet])
-    if covariance.size == 1:
+    if covariance.size == 1 or not Rule.WHITENED.on:
         return fits
     problem = replace(plain, whitener=whitener(bins, covariance))
     candidates = _fitted_again(fits, problem)
@@ -80,7 +82,7 @@ def in_coloured_noise(fits: WindowFit, data: StepData) -> WindowFit:
     chosen = candidates[choose(refit.criteria(candidates))]
     lost = 1 + chosen.structure.order + chosen.structure.zeros + fits.window.columns.shape[1]
     colour = chosen.cost / max(problem.data.size - lost, 1) / fits.sigma**2
-    if colour > _UNLIKE**2:
+    if colour > _UNLIKE**2 and Rule.UNLIKE.on:
         return fits
     slowness = 2 * float(np.sum(covariance)) - 1.0
     return refit.of(candidates, colour=max(colour, 1.0), correlation=max(slowness, 1.0))

@@ -28,6 +28,7 @@ from ..engine.problem import Family, KnownFactor, Structure
 from ..engine.static_gain import StaticGain
 from ..engine.structures import Candidate, parameter_bounds
 from ..engine.window_fit import WindowFit
+from ..rules import Rule
 
 _FASTEST = 4.0  # over the length of the record: 2 % of such a mode are left at its end
 _BENDS = 0.6
@@ -59,7 +60,7 @@ def least_extrapolating(
     plain = structure.order > 1 and not isinstance(structure, Family)
     plain = plain and problem.segments is None and not poles[slow].imag
     slope = static.integrates and static.significant
-    if not plain or (static.significant and not slope):
+    if not (plain and (slope or not static.significant) and Rule.EXTRAPOLATION.on):
         return candidate, static
     rest = Structure(structure.order - 1, structure.relative_degree - 1)
     bounds = parameter_bounds(rest, scales)

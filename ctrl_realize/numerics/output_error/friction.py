@@ -27,7 +27,7 @@ from ..constants import VERY_STRONG
 from ..engine.descend import descend
 from ..engine.problem import Structure
 from ..engine.profile import profile_limits
-from ..engine.structures import LEAST_CHARGE, Candidate, parameter_bounds
+from ..engine.structures import Candidate, least_charge, parameter_bounds
 from ..engine.window_fit import WindowFit
 
 _S_AND_J = 2  # parameters of friction; behind a single lag the dead time takes the place of one
@@ -61,7 +61,7 @@ def latest_slip(fits: WindowFit, lags: Candidate) -> float | None:
     box = parameter_bounds(slips, scales)
     costs = descend(fits.problem, slips, starts, box, scales.dt, dead_time_fixed=True)[1]
     gained = (lags.cost - costs.min()) / fits.variance
-    charge = max(slips.zeros, _S_AND_J) * max(LEAST_CHARGE, fits.penalty)
+    charge = max(slips.zeros, _S_AND_J) * least_charge(fits.penalty)
     if charge - gained <= VERY_STRONG:
         return profile_limits(grid, (costs - costs.min()) / fits.variance)[1]
     if slips.zeros != _S_AND_J:

@@ -24,7 +24,7 @@ from dataclasses import dataclass, replace
 from ..constants import VERY_STRONG, Z_95
 from ..engine.problem import Structure
 from ..engine.profile import Points, profile_limits
-from ..engine.structures import LEAST_CHARGE, Scales, charged, plausible
+from ..engine.structures import Scales, charged, least_charge, plausible
 from ..engine.window_fit import WindowFit
 from ..families.equal_lags import (
     FREE_IN_A_CHAIN,
@@ -34,6 +34,7 @@ from ..families.equal_lags import (
     still_improving,
 )
 from ..families.flow import DispersedFlow
+from ..rules import Rule
 from .extrapolation import least_extrapolating
 from .friction import latest_slip
 from .margins import CloseDecision, close_choices, close_exclusions
@@ -78,26 +79,27 @@ def likelihood_fit(
     limits += [(other.low, other.high) for other in others]
     low = min(chosen.dead_time, *(first for first, _ in limits))
     high = max(chosen.dead_time, *(last for _, last in limits))
-    if unlimited := still_improving(equal_lags):
+    if unlimited := still_improving(equal_lags) and Rule.IMPROVING.on:
         low = scales.earliest
     open_start = onset is not None and choice.flow is None and chosen.structure.zeros > 0
-    if onset is not None and open_start:
+    if onset is not None and open_start and Rule.OPEN_START.on:
         low, high = _opened(low, high, chosen.dead_time, onset, scales)
-    if may_stick and choice.chain is None and choice.flow is None and not chosen.structure.zeros:
+    free = choice.chain is None and choice.flow is None
+    if may_stick and free and not chosen.structure.zeros and Rule.FRICTION.on:
         high = max(high, latest_slip(fits, chosen) or high)
     first, last = profile_limits(*own)
     interval = DelayInterval(low, high, (last - first) / (2 * Z_95))
     static = None
-    if choice.chain is None and choice.flow is None:
+    if free:
         chosen, static = least_extrapolating(fits, chosen)
     found = assembled(fits, chosen, adequate, (), kept.profiles, interval, own, static=static)
     close: tuple[CloseDecision, ...] = near
-    if choice.chain is None and choice.flow is None:
+    if free:
         own_structure = chosen.structure
         close += close_choices(fits, choice.level, own_structure)
         close += close_exclusions(fits, _charged_level(fits, choice), own_structure)
     process = found.process
-    if choice.chain is not None or choice.flow is not None:
+    if not free:
         process = process.without_errors()
     distributed = DistributedLags(
         choice.chain,
@@ -154,6 +156,7 @@ def _compared(
         values = charged(fits.criterion, fits.penalty)
         level = _charged_level(fits, choice)
         free = plausible(fits.candidates, values, fits.variance, choice.model, level)
+        free = [s for s in free if fits.candidates[s] is choice.model or Rule.STRUCTURES.on]
         points |= laid_profiles(fits, [s for s in free if s not in points])
         kept = {s: points[s] for s in free}
         lower = lower_minima(fits, kept)
@@ -174,7 +177,7 @@ def _not_ruled_out(
     flows: Sequence[DispersedFlow],
     points: dict[Structure, Points],
 ) -> _Kept:
-    more = max(LEAST_CHARGE - fits.penalty, 0.0)
+    more = least_charge(fits.penalty) - fits.penalty
     limit = _charged_level(fits, choice) + VERY_STRONG
     return _Kept(
         curves(fits, points),
@@ -190,7 +193,7 @@ def _not_ruled_out(
 
 def _charged_level(fits: WindowFit, choice: Choice) -> float:
     """Value of the criterion relative to which structures are ruled out."""
-    return choice.level + max(LEAST_CHARGE - fits.penalty, 0.0) * choice.parameters
+    return choice.level + (least_charge(fits.penalty) - fits.penalty) * choice.parameters
 
 
 def _opened(

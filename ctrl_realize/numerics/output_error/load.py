@@ -47,6 +47,7 @@ from ..engine.structures import (
     pattern_starts,
 )
 from ..engine.window_fit import WindowFit
+from ..rules import Rule
 from ..signals.load_step import LoadStep
 from ..signals.noise import correlation_time, mad_sigma
 from .step_data import StepData, stop_at
@@ -126,7 +127,8 @@ def load_of(
     if few and (not is_noise(data, fits, fits.best) or _suspects(data, fits)):
         fits = free()
     times = _times(data, fits)
-    followed = [_followed(fits, one, data.clock, times) for one in _suspects(data, fits)]
+    suspects = [one for one in _suspects(data, fits) if Rule.LOAD.on]
+    followed = [_followed(fits, one, data.clock, times) for one in suspects]
     promising = [one for one in followed if _judged(fits, *one, data.clock)[0] > 0]
     if not promising:
         return None

@@ -20,9 +20,9 @@ from ..engine.problem import KnownFactor, Structure
 from ..engine.profile import profile_limits
 from ..engine.structures import (
     ALL_STRUCTURES,
-    LEAST_CHARGE,
     Candidate,
     charged,
+    least_charge,
     needless_parameters,
     plausible,
     search,
@@ -166,7 +166,7 @@ def _kept(fits: WindowFit, found: dict[Structure, Candidate], slack: float) -> l
     """Structures that the data do not rule out beside the best of those requested."""
     given, values = fits.best, fits.criteria(found)
     level = _charged(fits.criterion, given.structure)
-    least = level + max(LEAST_CHARGE - fits.penalty, 0.0) * given.structure.free
+    least = level + (least_charge(fits.penalty) - fits.penalty) * given.structure.free
     return plausible(found, charged(values, fits.penalty), fits.variance, given, least, slack)
 
 

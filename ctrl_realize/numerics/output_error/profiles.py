@@ -30,6 +30,7 @@ from ..engine.profile import (
 )
 from ..engine.structures import Candidate
 from ..engine.window_fit import WindowFit
+from ..rules import Rule
 
 LOWER = 0.01
 """Variances by which a profile must lead below a minimum to be followed.
@@ -91,6 +92,6 @@ def lower_minima(fits: WindowFit, points: dict[Structure, Points]) -> dict[Struc
     found = {}
     for s, own in points.items():
         best = min(own.values(), key=lambda point: point.cost)
-        if fits.candidates[s].cost - best.cost > LOWER * fits.variance:
+        if fits.candidates[s].cost - best.cost > LOWER * fits.variance and Rule.LOWER.on:
             found[s] = settled(fits.problem, best, fits.scales)
     return found

@@ -29,6 +29,7 @@ from ..engine.problem import Structure
 from ..engine.structures import Candidate, parameter_bounds
 from ..engine.window_fit import WindowFit
 from ..families.physical import fitted_parameters
+from ..rules import Rule
 from ..signals.noise import correlation_time
 from .result import OutputErrorEstimate, followed_by
 
@@ -58,8 +59,8 @@ def in_rounded_data(
     window, scales = fits.window, fits.scales
     many = found.distributed
     special = many.chain is not None or many.follows_flow or found.residual.whitened
-    special |= found.structure.zeros > 0
-    if special or window.own is not None or window.output.size > _LONGEST:
+    special |= found.structure.zeros > 0 or window.own is not None
+    if special or window.output.size > _LONGEST or not Rule.ROUNDED.on:
         return found
     start = fits.candidates[found.structure]
     best = fit_rounded(fits, start, step)

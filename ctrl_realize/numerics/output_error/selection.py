@@ -28,6 +28,7 @@ from ..engine.structures import Candidate, choose, needless_parameters, search
 from ..engine.window_fit import WindowFit
 from ..families.equal_lags import FREE_IN_A_CHAIN, LagChain, fit_chains, fit_diffusion
 from ..families.flow import DispersedFlow, fit_flows
+from ..rules import Rule
 
 _LAGS_OF_TANKS, _LAGS_OF_DIFFUSION = 3, 2
 """Poles from which on there may be more lags than show; the second mode of diffusion is fast: of
@@ -60,13 +61,14 @@ class Choice:
 def chains_of(fits: WindowFit) -> list[LagChain]:
     """Fit chains of lags if the best order suggests more lags than were tried."""
     order = fits.best.structure.order
-    equal_lags = fit_chains(fits) if order >= _LAGS_OF_TANKS else []
-    return equal_lags + (fit_diffusion(fits) if order >= _LAGS_OF_DIFFUSION else [])
+    equal_lags = fit_chains(fits) if order >= _LAGS_OF_TANKS and Rule.CHAINS.on else []
+    diffuses = order >= _LAGS_OF_DIFFUSION and Rule.DIFFUSION.on
+    return equal_lags + (fit_diffusion(fits) if diffuses else [])
 
 
 def flows_of(fits: WindowFit, chains: Sequence[LagChain]) -> list[DispersedFlow]:
     """Fit dispersion if there is more than one lag."""
-    if fits.best.structure.order < _LAGS_OF_DIFFUSION:
+    if fits.best.structure.order < _LAGS_OF_DIFFUSION or not Rule.FLOWS.on:
         return []
     level = min([*fits.criterion.values(), *(chain.criterion for chain in chains)])
     return fit_flows(fits, level)
@@ -105,7 +107,8 @@ def _beside_own_terms(fits: WindowFit, equal_lags: Sequence[LagChain]) -> Sequen
     response to the step: gains 5 to 20 % too small in three of 22 simulated heaters, 0.20 for 0.27
     to 0.32 of a measured one. Ablation: no chain beside a free response.
     """
-    return equal_lags if fits.problem.segments is None else ()
+    moves = bool(equal_lags) and fits.problem.segments is not None
+    return () if moves and Rule.NO_CHAIN.on else equal_lags
 
 
 def _behind(fits: WindowFit, flow: DispersedFlow) -> Candidate | None:

@@ -20,6 +20,7 @@ from ..engine.problem import KnownFactor, Problem
 from ..engine.responses import StepSequence
 from ..engine.structures import Scales
 from ..engine.window import Window
+from ..rules import Rule
 from ..signals.baseline import noise_about_a_motion, relaxation
 from ..signals.bins import response_bins
 from ..signals.filters import moving_mean
@@ -131,7 +132,7 @@ class StepData:
         # A baseline between two levels jumps between both, however small the noise: this is not
         # dither, which needs more levels (95 % of its samples are within two, half a step high).
         two_levels = rest.size >= _MANY and np.ptp(rest) < 1.5 * self.quantum
-        return bool(is_coarse(self.sigma, self.quantum) or two_levels)
+        return bool(is_coarse(self.sigma, self.quantum) or two_levels) and Rule.COARSE.on
 
     def with_load(self, load: LoadStep, response: FloatArray) -> StepData:
         """Add a load, with its part (N,) of the output, without which the response is seen."""
@@ -147,11 +148,14 @@ class StepData:
         and its noise is that about the motion if it is a free response.
         """
         if self.bend:
-            return [replace(self, relaxing=True, hum=[], sigma=self.bend, colour=1.0), self]
-        if not self.drift:
+            ways = [replace(self, relaxing=True, hum=[], sigma=self.bend, colour=1.0), self]
+        elif self.drift:
+            still = replace(self, drift=0.0)
+            ways = [self, replace(still, relaxing=True), still]
+        else:
             return [self]
-        still = replace(self, drift=0.0)
-        return [self, replace(still, relaxing=True), still]
+        ways = [way for way in ways if not way.relaxing or Rule.FREE_RESPONSE.on]
+        return [way for way in ways if way.drift or way.relaxing or Rule.NO_SLOPE.on] or [self]
 
 
 def step_data(
@@ -175,7 +179,7 @@ def step_data(
     if edge >= 8:
         columns = np.stack([np.ones(edge), since[:edge] / edge], axis=1)
         line = columns @ np.linalg.lstsq(columns, output[:edge], rcond=None)[0]
-        hum = _hum(output[:edge] - line, at_rest)
+        hum = [wave for wave in _hum(output[:edge] - line, at_rest) if Rule.HUM.on]
         curve = None if hum else relaxation(output, edge, gaps)
         if hum:
             waves = _hum_columns(rows, hum)
@@ -195,6 +199,8 @@ def step_data(
     sigma = max(sigma, 1e-4 * span)
     loud = sigma * _unseen_at_rest(quiet[:edge] - line) if edge >= 8 else sigma
     motion = first_motion(quiet, edge, loud, quantum, drift, gaps)
+    if (drift or relaxing) and not Rule.DRIFT.on:
+        drift, relaxing = 0.0, False
     seen = sigma, quantum, drift, colour, hum, motion, quiet, relaxing
     return StepData(output, signal, dt, edges, rows, *seen, bend=bend)
 
@@ -207,7 +213,8 @@ def _unseen_at_rest(rest: FloatArray) -> float:
     Ablation: first motion in slow noise.
     """
     _, lost = correlation_of_noise(correlation_time(rest), 2 / rest.size)
-    return float(np.sqrt((1.0 + 0.5 * lost) / (1.0 - lost)))
+    wider = float(np.sqrt((1.0 + 0.5 * lost) / (1.0 - lost)))
+    return wider if lost and Rule.SLOW_REST.on else 1.0
 
 
 def bare_data(

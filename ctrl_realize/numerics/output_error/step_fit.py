@@ -71,6 +71,7 @@ from ..engine.structures import ALL_STRUCTURES, SIMPLE_STRUCTURES, Candidate, Sc
 from ..engine.window_fit import WindowFit, among, fit_window, with_noise_of_residual
 from ..families.equal_lags import LagChain
 from ..families.flow import DispersedFlow
+from ..rules import Rule
 from ..signals.edges import difference_noise, level_error
 from ..signals.noise import rounding_of_level
 from ..signals.noise_model import continues
@@ -205,7 +206,7 @@ def _free_choice(
             likely = in_rounded_data(likely, fits, data.quantum)
         at_the_end = pinned(likely, data, plain)
         likely = with_close_decision(likely, at_the_end)
-        if at_the_end > 1:
+        if at_the_end > 1 or not Rule.PINNED.on:
             return likely
     early = fit(data, stop_at(data, 0.15), _LAGS)
     if likely is not None:
@@ -229,7 +230,7 @@ def _simple_ones_suffice(fits: WindowFit) -> bool:
     """Whether structures of up to three poles follow the output about as well as any."""
     least = min(c.cost for c in fits.candidates.values())
     simple = min(fits.candidates[s].cost for s in SIMPLE_STRUCTURES)
-    return simple <= _FAR_POORER**2 * least
+    return simple <= _FAR_POORER**2 * least or not Rule.SIMPLE.on
 
 
 def _close_to_noise(data: StepData, fits: WindowFit) -> tuple[CloseDecision, ...]:
@@ -253,15 +254,19 @@ def _at_noise_level(data: StepData, fits: WindowFit) -> WindowFit | None:
 
 def _is_noise(data: StepData, fits: WindowFit, candidate: Candidate) -> bool:
     """Whether the residual is at the noise level before the step, or at that long after it."""
-    rms = fits.misfit(candidate)
-    if rms <= ADEQUATE * data.colour:
-        return True
-    if rms > ADEQUATE * data.colour * _LOUDER:
-        return False
+    rms, level = fits.misfit(candidate), ADEQUATE * data.colour
+    noise = rms <= level or (
+        rms <= level * _LOUDER and _is_louder_noise(data, fits, candidate) and Rule.LOUDER.on
+    )
+    return Rule.LIKELIHOOD.on if noise else not Rule.VIEWS.on
+
+
+def _is_louder_noise(data: StepData, fits: WindowFit, candidate: Candidate) -> bool:
+    """Whether a residual is noise that the rest does not show: white, slow, or as large later."""
     if fits.correlation == 1.0 and candidate is fits.best:
         return True
     error = fits.residual(candidate)
-    if continues(error[: data.edge], error[data.edge :], ADEQUATE):
+    if continues(error[: data.edge], error[data.edge :], ADEQUATE) and Rule.GOES_ON.on:
         return True
     state = evaluate(fits.problem, candidate.structure, candidate.parameters[None])
     assert fits.window.bins is not None
@@ -278,7 +283,7 @@ def _is_noise(data: StepData, fits: WindowFit, candidate: Candidate) -> bool:
 
 def _flows(data: StepData, fits: WindowFit, chains: Sequence[LagChain]) -> Sequence[DispersedFlow]:
     """Dispersion, unless rounding decides on how smoothly a response begins."""
-    return [] if data.coarse else flows_of(fits, chains)
+    return [] if data.coarse and Rule.NO_DISPERSION.on else flows_of(fits, chains)
 
 
 def _robust_fit(
@@ -291,7 +296,7 @@ def _robust_fit(
     profiles = {chosen.structure: profile_of(fits, chosen)}
     fixed = at_dead_time(fits.problem, chosen, fits.scales, dead_time)
     fixed, static = least_extrapolating(fits, fixed, dead_time_fixed=True)
-    unseen = _unseen(fits, fixed)
+    unseen = _unseen(fits, fixed) if Rule.MISFIT.on else 0.0
     low = max(min(float(dead_times[1]), onset, dead_time - unseen), fits.scales.earliest)
     high = min(max(float(dead_times[-1]), dead_time + unseen), fits.scales.latest)
     interval = DelayInterval(low, high, (high - low) / (2 * Z_95))
@@ -324,7 +329,7 @@ def _fit_until(
         structures,
         step_scales(data, stop, requested.latest, requested.earliest, given),
         (data.sigma, data.quantum),
-        requested.huber,
+        requested.huber and Rule.HUBER.on,
     )
 
 
@@ -335,12 +340,15 @@ def _views(
     assert data.motion is not None
     onset = data.motion.onset * data.dt
     one, two, three = (early.candidates[lags].dead_time for lags in _LAGS)
-    return (
-        ("onset", max(min(onset, scales.latest), scales.earliest)),
-        ("one_lag_early", one),
-        ("two_lags_early", two),
-        # by the criterion alone: the first part of a response does not show the gain
-        ("model_of_rise", rise.candidates[choose(rise.criterion)].dead_time),
-        ("model_of_record", fits.dead_time),
-        ("three_lags_early", three),
+    # by the criterion alone: the first part of a response does not show the gain
+    of_rise = rise.candidates[choose(rise.criterion)].dead_time
+    views: tuple[tuple[RobustKey, float, bool], ...] = (
+        ("onset", max(min(onset, scales.latest), scales.earliest), Rule.VIEW_ONSET.on),
+        ("one_lag_early", one, Rule.VIEW_ONE_LAG.on),
+        ("two_lags_early", two, Rule.VIEW_TWO_LAGS.on),
+        ("model_of_rise", of_rise, Rule.VIEW_RISE.on),
+        ("model_of_record", fits.dead_time, Rule.VIEW_RECORD.on),
+        ("three_lags_early", three, Rule.VIEW_THREE_LAGS.on),
     )
+    amid = float(np.median([at for _, at, on in views[:-1] if on]))
+    return tuple((key, at if on else amid) for key, at, on in views)

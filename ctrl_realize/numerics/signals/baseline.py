@@ -15,6 +15,7 @@ import numpy as np
 from scipy.ndimage import median_filter
 
 from ..arrays import FloatArray, IntArray
+from ..rules import Rule
 from .edges import difference_noise
 from .noise import (
     DRIFT_ERRORS,
@@ -123,7 +124,7 @@ def relaxation(output: FloatArray, edge: int, rows: IntArray | None = None) -> F
     # On one level of a quantiser the residual is zero, and rounding would decide.
     noise = max(best / (edge - 3), rounding_error(output) ** 2)
     variance = noise * correlation_time(residual)
-    if float(straight @ straight) - best <= _SIGNIFICANT * variance:
+    if not (float(straight @ straight) - best > _SIGNIFICANT * variance and Rule.EXPONENTIAL.on):
         return None
     return np.asarray(_level_and_decay(rate, clock) @ weights)
 
@@ -157,13 +158,13 @@ def noise_about_a_motion(before: FloatArray, quantum: float, rows: IntArray | No
     sigma = max(winsorised_sigma(left, quantum, lost=5), quantum / np.sqrt(12))
     error = sigma * np.sqrt(correlation_time(left))
     if np.abs(weights[2:]).max() > DRIFT_ERRORS * error:
-        return float(sigma)
+        return float(sigma) if Rule.BEND.on else 0.0
     if rows is not None:
         return 0.0
     # 70 is the sum of the squared coefficients of a fourth difference.
     rough = mad_sigma(np.diff(before, 4)) / np.sqrt(70)
     noise = max(rough, quantum / np.sqrt(12), _LEAST * size)
-    return float(noise) if size > _SMOOTH * noise else 0.0
+    return float(noise) if size > _SMOOTH * noise and Rule.SWING.on and Rule.BEND.on else 0.0
 
 
 def _level_and_decay(rate: float, time: FloatArray) -> FloatArray:

@@ -31,6 +31,7 @@ from scipy.optimize import fminbound
 from ..arrays import BoolArray, FloatArray, IntArray
 from ..constants import PIECE, VERY_STRONG
 from ..hankel.matrix import fft_length
+from ..rules import Rule
 
 _DITHER = 0.6
 """Noise, rounding included, in quantisation steps, from which means are unbiased: half a step of
@@ -139,7 +140,8 @@ def rest_noise(
     if before.size < _FEW or np.ptp(before) <= rounding_error(record):
         # 1, -3, 3, -1: white noise has 20 times its variance in these differences.
         third = np.diff(record, 3) / np.sqrt(20)
-        return max(winsorised_sigma(third, quantum / np.sqrt(20)), floor), 0.0
+        told = before.size < _FEW or Rule.CONSTANT_REST.on
+        return max(winsorised_sigma(third, quantum / np.sqrt(20)), floor) if told else floor, 0.0
     index = np.arange(before.size) if rows is None else rows
     slope, left = _robust_line(before, index.astype(np.float64), quantum)
     sigma = max(winsorised_sigma(left, quantum, lost=2), floor)
@@ -324,7 +326,7 @@ def colouring(rest: FloatArray, sigma: float) -> float:
         if count >= 12 and sigma > 0:
             means = rest[: count * width].reshape(count, width).mean(axis=1)
             worst = max(worst, float(means.std()) * np.sqrt(width) / sigma)
-    return worst if worst > 1.4 else 1.0
+    return worst if worst > 1.4 and Rule.COLOUR.on else 1.0
 
 
 def hum_frequencies(rest: FloatArray, most: int = 3) -> list[float]:
@@ -369,7 +371,7 @@ def _is_line(values: FloatArray, wave: FloatArray) -> bool:
     if not without > 0:
         return False
     gain = values.size * np.log(without / max(beside, 1e-30 * without))
-    return bool(gain > 3 * np.log(values.size) + VERY_STRONG)
+    return bool(gain > 3 * np.log(values.size) + VERY_STRONG) or not Rule.HUM_IN_NOISE.on
 
 
 def _innovation_variance(values: FloatArray) -> float:

@@ -25,6 +25,7 @@ from scipy.special import ndtri
 
 from ..arrays import FloatArray, IntArray
 from ..constants import PIECE
+from ..rules import Rule
 from .correlation import autoregression, correlation
 from .filters import moving_mean
 
@@ -163,9 +164,9 @@ def first_motion(
             sigma = noise / np.sqrt(smoothing)
         threshold = max(5 * sigma, 1.5 * quantum, 0.005 * span)
         crossing = _lasting_excursion(moved[edge:], threshold, smoothing)
-        if crossing is not None:
+        if crossing is not None or not Rule.MEANS.on:
             break
-    else:
+    if crossing is None:
         return None
     lasting = int(_lasting(np.array(crossing), smoothing))
     stretch = moved[edge + crossing : edge + crossing + lasting]

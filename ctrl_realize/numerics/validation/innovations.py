@@ -30,6 +30,7 @@ from scipy.special import fdtrc
 
 from ..arrays import FloatArray, IntArray, unit_columns
 from ..constants import LEAST_FREEDOM, SMALLEST
+from ..rules import Rule
 from ..signals.noise import mad_sigma, quantisation_step
 
 RARE = 1e-4
@@ -147,7 +148,9 @@ def shows_feedback(records: Sequence[tuple[FloatArray, FloatArray]]) -> bool:
         past = past_inputs(y.size, 0.0)
         if feedback_chance(y, u, past) >= rare:
             return False
-        return _told(y, u) or (_mostly_rests(u) and _answer_chance(y, u, past, first=1) < rare)
+        if _told(y, u):
+            return True
+        return _mostly_rests(u) and _answer_chance(y, u, past, first=1) < rare and Rule.PAST.on
 
     return all(answers(y, u) for y, u in pairs)
 
@@ -166,8 +169,9 @@ def _told(output: FloatArray, drive: FloatArray) -> bool:
     weights[0] = 1.0
     rounding = float(np.linalg.norm(steps * weights)) / np.sqrt(12)
     size = float(np.median(np.abs(left)))
-    exactly = _ROUNDED if mad_sigma(left) <= _AS_ROUNDED * rounding else _EXACTLY
-    return size < exactly * min(float(np.median(np.abs(alone))), float(np.std(left)))
+    least = min(float(np.median(np.abs(alone))), float(np.std(left)))
+    rounded = size < _ROUNDED * least and mad_sigma(left) <= _AS_ROUNDED * rounding
+    return size < _EXACTLY * least or (rounded and Rule.LOOP_ROUNDED.on)
 
 
 def _mostly_rests(drive: FloatArray) -> bool:

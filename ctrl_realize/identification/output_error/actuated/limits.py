@@ -18,6 +18,7 @@ from ....delayed.simulation import simulate_record
 from ....errors import DataError, UnsuitableSystemError
 from ....numerics.arrays import BoolArray, FloatArray, IntArray, without_gaps
 from ....numerics.constants import STRONG
+from ....numerics.rules import Rule
 from ....numerics.signals.noise import BEYOND, FAR, far_value, spikes
 from ....numerics.validation.held_output import updates
 from ....numerics.validation.limits import at_limit, clips, ends, passed, plateaus
@@ -120,7 +121,7 @@ def at_updates(record: Record) -> tuple[Record, tuple[Flag, ...]]:
     """Leave out samples that repeat an output between two of its updates, and tell it."""
     output = np.ravel(record.output)
     new = updates(output, np.atleast_2d(record.input))
-    if not np.any(record.seen & ~new):
+    if not np.any(record.seen & ~new) or not Rule.REPEATS.on:
         return record, ()
     apart, count = np.diff(np.flatnonzero(new)), np.count_nonzero(record.seen & new)
     longest = in_time(int(apart.max()) * record.dt)
@@ -166,7 +167,8 @@ def fit_without_spikes(record: Record, fit: Fit) -> OutputErrorFit:
     found, left = fit(record), np.zeros(record.n_samples, dtype=bool)
     for _ in range(_TURNS):  # large ones hide smaller ones
         far = spikes(found.measured, found.fitted)
-        if not far.any() or np.sum(~far) < FEWEST_SAMPLES or found.data.every > 1:
+        enough = np.sum(~far) >= FEWEST_SAMPLES and found.data.every == 1
+        if not (far.any() and enough and Rule.SPIKES.on):
             break
         left[_rows(record, found)[far]] = True
         found = fit(_without(record, left))

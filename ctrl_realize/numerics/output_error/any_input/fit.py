@@ -35,6 +35,7 @@ from ...engine.profile import dead_time_error
 from ...engine.structures import Candidate, search
 from ...engine.window import window_of_rows
 from ...engine.window_fit import WindowFit, extended, with_known_noise
+from ...rules import Rule
 from ...signals.correlation import fit_percent
 from ...signals.noise import correlation_time, winsorised_sigma
 from ...validation.own_response import OwnResponse, matched, response_slopes
@@ -168,7 +169,7 @@ def fit_sampled(
         of_all = _of_all_samples(y, u, dt, stretch, requested)
         if of_all is not None:
             fits, sums = of_all
-    if structures is None and fits.best.structure.order == ORDERS[-1].order:
+    if structures is None and fits.best.structure.order == ORDERS[-1].order and Rule.MORE_LAGS.on:
         fits = extended(fits, MORE_LAGS)
     others = Compared() if structures is not None else None
     if structures is not None and requested.fastest is None and requested.compared:

@@ -38,6 +38,7 @@ from ...engine.window_fit import RAMP, WindowFit, clipped, has_outliers
 from ...families.form_fit import fit_form
 from ...families.lag_profiles import with_profiled_lags
 from ...families.process_form import ProcessForm
+from ...rules import Rule
 from ...signals.noise import correlation_time
 from ...signals.noise_model import coloured_criterion, noise_lags
 from ..load import IN_SLOW_NOISE
@@ -100,7 +101,7 @@ def fit_lags(
     for turn in range(_TURNS):
         fit = partial(_turn, data, forms, requested.whiten, within, early)
         made = fit(like, loads, noise, like.left if like else ())
-        if turn == 0 and made.noise.size > 1:
+        if turn == 0 and made.noise.size > 1 and Rule.SLOW_TURN.on:
             made = _likelier(made, fit(None, loads, _SLOW))
         placed, load = sought(data, made.part, made.lags, made.loads)
         # Where one was not told in noise like the residual, none is in the next turn.

@@ -20,6 +20,7 @@ from ...arrays import FloatArray
 from ...engine.problem import Structure
 from ...engine.structures import Candidate
 from ...engine.window_fit import WindowFit
+from ...rules import Rule
 from ..other_structures import Requested
 from .condensed import MOST_LAGS
 from .data import BEYOND, SOUGHT, SampledData, cut
@@ -58,7 +59,8 @@ def fit_stretch(
 
 def made_white(part: SampledWindow, requested: Requested) -> SampledWindow:
     """Fit again with the noise made white, if it is coloured and the records are complete."""
-    if not (part.fit.correlation > WHITE and requested.whiten and part.data.complete):
+    coloured = part.fit.correlation > WHITE and requested.whiten and part.data.complete
+    if not (coloured and Rule.COLOURED.on):
         return part
     weighted = in_coloured_noise(part, requested.structures)
     # In a loop the noise model is needed for consistency [1]_.

@@ -34,6 +34,7 @@ from ...engine.static_gain import StaticGain, local_errors
 from ...engine.structures import Candidate, Scales, pattern_starts, search
 from ...engine.window import Window, window_of_rows
 from ...engine.window_fit import WindowFit, fit_window
+from ...rules import Rule
 from ...signals.noise import correlation_time, quantisation_step, winsorised_sigma
 from ...signals.noise_model import noise_lags, whitening_filter
 from ...signals.onset import correlation_onset
@@ -113,7 +114,7 @@ def fit_windows(
     scales = Scales(onset, rise, length, dt, within[1], within[0])
     fits = _fit(data.whitened(noise, residual), structures, scales, huber, like)
     levels = _noise_levels(data.whitened(noise, residual), fits)
-    if levels.max() > _UNLIKE * levels.min():
+    if levels.max() > _UNLIKE * levels.min() and Rule.RECORD_NOISE.on:
         mean = float(np.exp(np.mean(np.log(levels))))
         data = replace(data, scales=tuple(float(level) / mean for level in levels))
         fits = _fit(data.whitened(noise, residual), structures, scales, huber, fits)
@@ -162,7 +163,8 @@ def noise_model(part: SampledWindow, model: Candidate, error: FloatArray, lags: 
     slopes = local_errors(problem, model, state.numerator[0], part.scales.length).slopes
     own = np.split(local_columns(problem.segments, model.poles[None])[0], edges[1:-1])[:stop]
     columns = unit_columns(np.hstack([slopes[: edges[stop]], block_diag(*own)]))[0]
-    return whitening_filter(error[: edges[stop]], lags, columns=columns)
+    followed = columns if Rule.FOLLOWED.on else None
+    return whitening_filter(error[: edges[stop]], lags, columns=followed)
 
 
 def simulates_worse(weighted: SampledWindow, plain: SampledWindow) -> bool:
@@ -246,7 +248,7 @@ def _seen(data: SampledData, limit: float) -> list[float]:
         if most > 1 and np.ptp(u) > 0:
             found.append(correlation_onset(u, without_gaps(y), most, _CONFIDENCE).onset)
     onsets = [float(lag) for lag in found if lag > 0]
-    return [float(np.median(onsets))] if onsets else []
+    return [float(np.median(onsets))] if onsets and Rule.CORRELATION.on else []
 
 
 def _first_order(
