@@ -186,3 +186,20 @@ def test_a_robust_closed_loop_time_is_as_long_as_the_data_ask_for():
 def test_cohen_and_coon_have_no_pd_beyond_three_lags():
     with pytest.raises(cr.errors.UnsuitableSystemError, match="below 3 lags; this model has 5"):
         cr.design.pid(cr.design.ProcessModel(1, 1, 5), "cohen_coon", "PD")
+
+
+@pytest.mark.parametrize("core", [([0.5, 2.0], [2.0, 1.0]), ([0.5, 1.0, 1.0], [2.0, 3.0, 1.0])])
+@pytest.mark.parametrize("kind", ["PI", "PID"])
+def test_an_optimal_controller_holds_where_feedthrough_and_dead_time_turn_the_loop(core, kind):
+    # at high frequencies the loop is a circle about 0, which no sampled plant shows
+    limit, dead_time = 1.4, 1.0
+    found = cr.design.pid(
+        cr.exp(-dead_time * ct.tf("s")) * ct.tf(*core), "optimal", kind, max_sensitivity=limit
+    )
+    s = 1j * np.geomspace(1e-3, 1e6, 400_000)
+    controller = found.kp * (1 + 1 / (found.ti * s) + found.td * s / (found.tf * s + 1))
+    plant = np.polyval(core[0], s) / np.polyval(core[1], s)
+    # the points meet all phases of the circle to less than a hundredth of a turn
+    assert np.max(1 / np.abs(1 + controller * plant * np.exp(-dead_time * s))) < 1.01 * limit
+    assert 0 < found.ti < 60
+    assert found.td < 60

@@ -31,7 +31,8 @@ LONGEST = 2**18
 @dataclass(frozen=True)
 class _Problem:
     """Response of the plant on two sets of points: on `omega` for the limit on the sensitivity, on
-    `circle` for the step response of `count` samples; `distance` is 1 / Ms.
+    `circle` for the step response of `count` samples; `distance` is 1 / Ms. `direct` is the
+    size of a feedthrough of a continuous plant.
     """
 
     plant: DelayedStateSpace
@@ -45,6 +46,7 @@ class _Problem:
     count: int
     sign: float
     integrating: bool
+    direct: float
 
     def controller(self, kp: float, ti: float, td: float) -> PIDController:
         tf = td / self.filter_ratio
@@ -52,6 +54,15 @@ class _Problem:
 
     def gain(self, ti: float, td: float) -> float:
         """Largest gain within the limit, for given times."""
+        return min(self._at_all_samples(ti, td), self._at_infinity(td))
+
+    def _at_infinity(self, td: float) -> float:
+        """Largest gain of a continuous loop that ends with a gain, which its dead time turns."""
+        if not self.direct:
+            return INF
+        return (1 - self.distance) / (self.direct * (1 + self.filter_ratio * (td > 0)))
+
+    def _at_all_samples(self, ti: float, td: float) -> float:
         unit = self.controller(self.sign, ti, td)
         z = np.exp(1j * self.omega * self.plant.dt)
         shape = self.loop * _values(unit, z)
@@ -97,6 +108,7 @@ def optimal(
     max_sensitivity: float,
     filter_ratio: float,
     method: str,
+    direct: float = 0.0,
 ) -> Parameters:
     """Minimize the integrated absolute error after a load step, subject to Ms.
 
@@ -116,12 +128,15 @@ def optimal(
         td / tf.
     method : str
         Discretization of the integral.
+    direct : float, optional
+        |D| of the continuous plant that is sampled finely: dead time turns the loop there by any
+        angle, at frequencies that the samples do not show.
 
     Returns
     -------
     (kp, ti, td)
     """
-    problem = _problem(plant, total_time, max_sensitivity, filter_ratio, method)
+    problem = _problem(plant, total_time, max_sensitivity, filter_ratio, method, direct)
     # behind a short dead time all times are short: 30 / omega at the limit of a P controller
     _, at = largest_gain(problem.sign * problem.loop, problem.distance)
     short = min(total_time, 30 / float(problem.omega[at]))
@@ -150,6 +165,7 @@ def _problem(
     max_sensitivity: float,
     filter_ratio: float,
     method: str,
+    direct: float,
 ) -> _Problem:
     poles = np.abs(np.asarray(plant.delay_free.poles()))
     if np.any(poles > 1 + 1e-9):
@@ -174,6 +190,7 @@ def _problem(
         count,
         loop.sign(),
         loop.integrators() > 0,
+        direct,
     )
 
 
@@ -195,6 +212,7 @@ def _two_times(problem: _Problem, low: float, high: float) -> tuple[float, float
             error,
             start,
             method="Nelder-Mead",
+            bounds=[np.log([0.05 * low, high])] * 2,  # a very long td is none
             options={"xatol": 1e-3, "fatol": 1e-7 * error(start), "initial_simplex": simplex},
         )
     best = np.exp(found.x)

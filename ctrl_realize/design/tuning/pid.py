@@ -19,7 +19,7 @@ from ..models.reduction import METHODS as REDUCTIONS
 from .algorithm import DISCRETIZATIONS
 from .controller import PIDController
 from .optimal import optimal
-from .plant import gain_and_time_units, reduced, reference_plant, total_time
+from .plant import gain_and_time_units, reduced, reference_plant, total_time, turned_feedthrough
 from .rules import MODEL_RULES, SYSTEM_RULES, from_ultimate, kinds_of
 from .ultimate import critical_point
 
@@ -219,8 +219,9 @@ def tuned(
     elif rule == "optimal":
         total = total_time(system, plant)
         kp, ti, td = optimal(
-            plant, total, kind, max_sensitivity=limit, filter_ratio=ratio, method=method
-        )
+            plant, total, kind, max_sensitivity=limit, filter_ratio=ratio, method=method,
+            direct=0.0 if step else turned_feedthrough(exact),
+        )  # fmt: skip
     else:
         kp, ti, td = from_ultimate(rule, kind, *critical_point(exact))
     units = gain_and_time_units(plant)

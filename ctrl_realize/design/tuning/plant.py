@@ -53,6 +53,12 @@ def finely_sampled(exact: DelaySystem, time: float) -> DelayedStateSpace:
     return both_forms(exact, longest=time / FINE or float("inf"))[1]
 
 
+def turned_feedthrough(exact: Any) -> float:
+    """|D| of a continuous plant with dead time, 0 without: its loops have that gain at infinity."""
+    core, dead_time = core_and_dead_time(exact, "a PID controller")
+    return abs(float(core.D[0, 0])) if dead_time else 0.0
+
+
 def reduced(
     system: Any, plant: DelayedStateSpace, rule: str, kind: str, reduction: str, step: float
 ) -> ProcessModel:
