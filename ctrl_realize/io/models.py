@@ -49,7 +49,8 @@ def save_model(
     path : path-like
         File to write; an existing one is replaced.
     system : DelayedStateSpace, DelaySystem or control.StateSpace
-        A plain model is stored with delay 0; a discrete one needs a sample time.
+        A plain model is stored with delay 0; a discrete one needs a sample time. Of a controller
+        the system is stored, without its tuning parameters.
     settings : mapping, optional
         Numbers, text and lists of them to store, such as how the model was found.
     note : str, optional
