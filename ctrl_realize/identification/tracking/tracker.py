@@ -62,7 +62,8 @@ class DelayTracker:
     drift_time : float, optional
         Time constant in s of a high-pass filter on input and output, for outputs with a drifting
         disturbance (a random walk). Changes within this time are kept: the sum of the plant's lags
-        is a good choice. Without it, a drift of three times the noise is taken for a lost track.
+        is a good choice. Without it, a drift of three times the noise is taken for a lost track. A
+        model with an integrator needs it: what a load adds to its output does not die away.
 
     Raises
     ------
