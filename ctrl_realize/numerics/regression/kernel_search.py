@@ -41,7 +41,7 @@ FLOOR = 1e-13
 
 _WORST = 1e300  # misfit of a prior too wide to be computed
 _ROUNDING = 1e-13
-"""Added to the squares, relative to their mean, so that rounding makes none negative."""
+"""Added to the squares of an input, relative to their mean: rounding makes none negative then."""
 
 WIDE, CLOSE = 0.7, 0.15
 """Initial steps of a search from a guess, and of one that starts near its end."""
@@ -80,11 +80,11 @@ class KernelProblem:
 
     @classmethod
     def of(cls, equations: NormalEquations, lags: int, kernel: str) -> KernelProblem:
-        """Correct the sums for rounding of the squares."""
+        """Correct the sums for rounding of the squares, of every input in its own unit."""
         size = equations.gram.shape[0]
-        diagonal = np.full(size, _ROUNDING * np.trace(equations.gram) / size)
+        squares = np.diag(equations.gram).reshape(-1, lags).mean(axis=1)
         return cls(
-            equations.gram + np.diag(diagonal),
+            equations.gram + np.diag(_ROUNDING * np.repeat(squares, lags)),
             equations.cross[:, 0],
             float(equations.power[0, 0]),
             equations.freedom,

@@ -125,3 +125,14 @@ def test_a_response_that_begins_behind_the_first_window_is_found(delay):
     # the largest value is 0.1 behind the delay, its noise 0.05 / sqrt(700)
     assert abs(int(np.argmax(g.markov)) - delay - 1) <= 1
     assert np.abs(g.markov[: delay - 5]).max() < 0.02
+
+
+@pytest.mark.parametrize("options", METHODS)
+def test_units_of_inputs_change_nothing_but_those_of_their_responses(options):
+    core = ct.ss([[0.9, 0.1], [0, 0.7]], np.eye(2), [[1.0, 1.0]], np.zeros((1, 2)), DT)
+    usual = record(plant=cr.DelayedStateSpace(core, (3, 9)))
+    size = np.array([1e6, 1e-5])  # as Pa and m^3/s
+    other = cr.Record(usual.time, size[:, None] * usual.input, usual.output)
+    expected, found = (cr.impulse_from_io(one, 40, **options).markov for one in (usual, other))
+    # the prior is sought to 0.02 of its logarithms, where rounding may lead the search elsewhere
+    assert_allclose(found * size[:, None], expected, rtol=0, atol=0.01 * np.abs(expected).max())
