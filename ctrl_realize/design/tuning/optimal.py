@@ -212,7 +212,7 @@ def _two_times(problem: _Problem, low: float, high: float) -> tuple[float, float
             error,
             start,
             method="Nelder-Mead",
-            bounds=[np.log([0.05 * low, high])] * 2,  # a very long td is none
+            bounds=[(np.log(0.05 * low), np.log(high))] * 2,  # a very long td is none
             options={"xatol": 1e-3, "fatol": 1e-7 * error(start), "initial_simplex": simplex},
         )
     best = np.exp(found.x)
