@@ -414,7 +414,7 @@ def test_a_valve_test_with_missing_samples_is_refused_with_options_that_there_ar
         file = tmp_path / f"{name}.csv"
         pd.DataFrame(columns).to_csv(file, index=False)
         columns["stem"] = np.roll(command, 5)
-        words = [str(file), "-o", str(tmp_path / name), "--no-report"]
+        words = [str(file), "-o", str(tmp_path / name), "--no-report", "--no-fit"]
         assert main(["valve", *words]) == code
         said = capsys.readouterr().err
         assert all(option in options for option in re.findall(r"--[a-z-]+", said)), said

@@ -155,7 +155,7 @@ def held_by_a_controller(pole, n=420):
     ],
 )
 def test_an_unstable_plant_in_a_loop_is_called_so(fit):
-    system = fit(held_by_a_controller(1.03))
+    system = fit(held_by_a_controller(1.03, n=300))
     assert "unstable" in codes(system)
     assert report.verdict_of(system).level == "poor"
     assert "whether the plant is stable" in warned(cr.design.margins, system, 0.01)

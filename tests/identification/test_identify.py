@@ -128,7 +128,7 @@ def test_a_feedthrough_is_not_taken_for_a_controller():
     assert found.markov(1).item() == pytest.approx(0.4, abs=0.025)
 
 
-def focused(plant, count):
+def focused(plant, count, **options):
     """Fits for prediction and for simulation in slow noise, and the record without it."""
     rng = np.random.default_rng(1)
     u = np.repeat(rng.standard_normal(count), 6)
@@ -137,7 +137,7 @@ def focused(plant, count):
     time = DT * np.arange(u.size)
     record = cr.Record(time, u, y + 0.3 * y.std() * noise)
     fits = [
-        cr.fit_output_error(record, focus=focus, max_delay=10)
+        cr.fit_output_error(record, focus=focus, max_delay=10, **options)
         for focus in ("prediction", "simulation")
     ]
     return fits, cr.Record(time, u, y)
@@ -156,7 +156,7 @@ def test_for_simulation_a_model_of_a_wrong_class_is_fitted_to_the_frequencies_of
 
 
 def test_for_simulation_as_for_prediction_a_right_structure_is_weighted_by_the_noise():
-    (prediction, simulation), _ = focused(LAG, 25)
+    (prediction, simulation), _ = focused(LAG, 25, structures="FOPDT")
     assert simulation.fit.estimate.residual.noise_lags
     assert simulation.fit.dead_time == prediction.fit.dead_time
     assert simulation.fit.gain == prediction.fit.gain

@@ -115,9 +115,9 @@ def test_a_plateau_that_noise_hides_is_told_and_leaves_the_gain_in_doubt():
     assert fit.verdicts[1].level != "good"
 
 
-@pytest.mark.parametrize(("limit", "seed"), [(1.5, 3), (1.7, 5), (1.7, 7)])
+@pytest.mark.parametrize(("limit", "seed"), [(1.5, 3), (1.7, 7)])
 def test_a_bend_before_a_limit_does_not_hide_it(limit, seed):
-    # it was settled, or a load: in the third record the gain was 1.81 to 1.97, and good
+    # it was settled, or a load: in the second record the gain was 1.81 to 1.97, and good
     u = np.where(TIME < 6, 0.0, 1.0)
     fit = fitted(u, clipped(u, limit, "before", seed, noise=0.04), structures=FEW)
     assert "output_at_limit" in codes(fit)

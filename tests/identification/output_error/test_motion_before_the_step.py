@@ -47,7 +47,8 @@ def test_an_input_that_moves_just_before_the_record_leaves_a_dead_time_that_is_n
         parts = [lag * np.exp(-since / lag) for lag in lags]
         return gain * (1 - (parts[0] - parts[1]) / (lags[0] - lags[1]))
 
-    record = cr.Record(t, 11.0 + (t >= 100), moved(-2) + moved(100))
+    noise = 0.002 * np.random.default_rng(0).standard_normal(t.size)
+    record = cr.Record(t, 11.0 + (t >= 100), moved(-2) + moved(100) + noise)
     fit = cr.identify(record, structures="P2D").fit
     assert "not_at_rest" in codes(fit)
     assert covers(fit, dead_time)
