@@ -36,6 +36,9 @@ _NEAR = np.array([-3, -1.7, -1.2, -0.9, 0.9, 1.2, 1.7, 3])  # in half intervals,
 _FAR = 9  # points all over the range, where it is none
 _SHORT = 0.1  # samples by which the optimum of a jump may lie before the sample that it belongs to
 _LATE = 0.2  # samples before a jump is over; a lag of a twentieth of that fits noise of 1 %
+_CHANCE = 0.02
+"""Part of a jump by which it seems to begin a sample early, as noise makes it: intervals of a
+thousandth of a sample before it were those of 2 in 32 plants with feedthrough."""
 _INSIDE = np.array([-0.5, 0.02, 0.4, 1 - _LATE, 1.2])  # of the sample in which the optimum lies
 JUMP = 4.0  # pole, in 1/samples, whose response is over within a sample
 _NOTHING = 1e-9  # part of a sensitivity that is rounding
@@ -178,7 +181,10 @@ def profile_curve(
         late = end - _LATE * scales.dt
         dead_times = np.array(sorted(points))
         costs = np.array([points[at].cost for at in dead_times])
-        points = points | {end: replace(candidate, cost=float(np.interp(late, dead_times, costs)))}
+        cost = float(np.interp(late, dead_times, costs))
+        if 0 < _before_the_jump(candidate, scales) < _CHANCE:
+            cost = candidate.cost
+        points = points | {end: replace(candidate, cost=cost)}
     dead_time = np.array(sorted(points))
     excess = np.array([points[at].cost for at in dead_time])
     return dead_time, (excess - excess.min()) / variance
@@ -198,6 +204,12 @@ def _jumps(candidate: Candidate, scales: Scales) -> bool:
 
 def _jump_sample(candidate: Candidate, scales: Scales) -> float:
     return float(np.floor(candidate.dead_time / scales.dt + _SHORT))
+
+
+def _before_the_jump(candidate: Candidate, scales: Scales) -> float:
+    """Part of a jump that is over at the sample before it, where the dead time ends just then."""
+    early = _jump_sample(candidate, scales) * scales.dt - candidate.dead_time
+    return float(1 - np.exp(-max(early, 0.0) * np.abs(candidate.poles).max()))
 
 
 def _end(
