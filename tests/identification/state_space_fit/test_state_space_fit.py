@@ -149,3 +149,26 @@ def test_refining_brings_a_rough_model_to_the_fit(model):
     expected = model.markov(60)
     assert_allclose(found.markov(60), expected, rtol=0, atol=2e-3 * np.abs(expected).max())
     assert rough.delay_free.B[0, 0] == 0.5
+
+
+@pytest.mark.parametrize("seed", [100, 104, 105])
+def test_a_short_record_is_fitted_from_the_better_of_two_starts(seed):
+    # the first start alone ended at an integrator (100), or all were refused: "no output responds"
+    rng = np.random.default_rng(seed)
+    u = np.repeat(rng.choice([-1.0, 1.0], 31), 3)[:90]
+    plant = cr.delayed_ss(ct.tf([2.0], np.polymul([1, 0.6, 1], [0.5, 1])), 3, dt=0.1)
+    y = plant.simulate(u)
+    y = 5 + y + 0.05 * y.std() * rng.standard_normal(90)
+    found = cr.fit_state_space(cr.Record(0.1 * np.arange(90), u, y))
+    z = np.exp(0.1j * np.geomspace(0.29, 25.0, 60))  # from the lowest frequency of the record on
+    truth = plant(z)
+    # noise of 5 % and 90 samples leave 1 to 5 % of the peak
+    assert np.abs(found(z) - truth).max() < 0.1 * np.abs(truth).max()
+
+
+@pytest.mark.parametrize("seed", range(6, 10))
+def test_noise_beside_a_short_input_shows_no_response(seed):
+    rng = np.random.default_rng(seed)
+    u = np.repeat(rng.choice([-1.0, 1.0], 31), 3)[:90]
+    with pytest.raises(DataError, match="no output shows a response"):
+        cr.fit_state_space(cr.Record(0.1 * np.arange(90), u, rng.standard_normal(90)))
