@@ -10,6 +10,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
+from .._checks import integer
 from .._wording import interval_in_time, time_within
 from ..data import Record
 from ..delayed import DelayedStateSpace
@@ -164,6 +165,7 @@ def each_record_plot(
         raise OptionError(
             "no records with a complete input; expected a model with its fit, or records"
         )
+    row = integer(output, "output", 0, shown[0].noutputs - 1)
     names = distinct(record.name for record in shown)
     columns = 1 if len(shown) == 1 else 2
     rows = each_record_rows(len(given))
@@ -172,10 +174,10 @@ def each_record_plot(
     ) as axes:
         lines: list[list[Line2D]] = []
         for axis, record, name in zip(axes, shown, names, strict=False):
-            measured = np.atleast_2d(record.output)[output]
-            model = simulate_record(system, record, "estimate", gaps=True)[output]
+            measured = np.atleast_2d(record.output)[row]
+            model = simulate_record(system, record, "estimate", gaps=True)[row]
             seen = ~np.isnan(measured)
-            lines.append(draw_beside(axis, record, output, [(model, {"label": "model", **kwargs})]))
+            lines.append(draw_beside(axis, record, row, [(model, {"label": "model", **kwargs})]))
             fit = float(fit_percent(measured[seen], model[seen]))
             axis.set_title(f"{plain(name, 30)}, {fit:.1f} %", loc="left", fontsize=10)
         for axis in axes[len(shown) :]:

@@ -17,6 +17,7 @@ from .._wording import time_unit
 from ..data import Record, StepResponse
 from ..data.given import as_record
 from ..delayed import DelayedStateSpace
+from ..design.siso import delayed_system
 from ..errors import DataError
 from ..experiment.result import ExperimentPlan
 from ..identification.step.steps import unit_step
@@ -241,9 +242,10 @@ def _measured_steps(
 
 
 def _model_step(axes: Axes, system: DelayedStateSpace, until: float, factor: float) -> list[Line2D]:
-    count = max(int(np.ceil(until / system.dt)) + 1, 2)
-    response = np.reshape(system.step(count), (-1, count))[0]
-    time = factor * system.dt * np.arange(count)
+    plant = delayed_system(system, "the response of a step record")
+    count = max(int(np.ceil(until / plant.dt)) + 1, 2)
+    response = np.ravel(plant.step(count))
+    time = factor * plant.dt * np.arange(count)
     return list(axes.plot(time, response, label="model", **style.model_looks()))
 
 

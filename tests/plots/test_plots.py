@@ -10,7 +10,7 @@ from numpy.testing import assert_allclose
 
 import ctrl_realize as cr
 from ctrl_realize import plots
-from ctrl_realize.errors import OptionError
+from ctrl_realize.errors import OptionError, UnsuitableSystemError
 from ctrl_realize.plots import style
 
 AFTER = "time after the step "
@@ -184,3 +184,13 @@ def test_times_of_a_record_in_minutes_are_in_minutes_on_plots_of_what_comes_of_i
     shaded = drawn[-1].figure.axes[0].patches[0].get_extents()
     ends = drawn[-1].figure.axes[0].transData.inverted().transform(shaded)[:, 0]
     assert_allclose(ends, [low / 60, high / 60])
+
+
+def test_plots_of_one_channel_refuse_others_than_there_are(record, fitted):
+    for output in (1, -1, 0.5):
+        with pytest.raises(OptionError, match="output"):
+            plots.each_record_plot(fitted, [record], output=output)
+    two = fitted.append(fitted)
+    for plot in (plots.step_plot, plots.onset_plot):
+        with pytest.raises(UnsuitableSystemError, match="2 inputs and 2 outputs"):
+            plot(record, two)
