@@ -68,8 +68,9 @@ def checked(fit: OutputErrorFit, *, alone: bool = True) -> OutputErrorFit:
     in_loop = bool(flags)
     if not complete and "closed_loop" not in codes and any(map(in_automatic, fit.records)):
         flags.append(flagged("feedback.gaps"))
-    # A stable model that leaves noise excludes an unstable plant, unless noise took what it misses.
-    if complete and (fit.estimate.averaged or not fit.at_noise_level):
+    # A stable model that leaves noise excludes an unstable plant, unless noise took what it misses
+    # or integrators imitate it.
+    if complete and (fit.estimate.averaged or fit.integrators or not fit.at_noise_level):
         flags += unstable_flags(complete, fit.delay_interval[1])
     flags += set_point_flags(fit)
     if len(fit.records) == 1:

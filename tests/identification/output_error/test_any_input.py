@@ -363,3 +363,14 @@ def test_a_jump_behind_a_dead_time_is_known_to_its_sample(seed):
     first, last = fit.interval
     assert first <= dt * delay / fine <= last
     assert dt < last - first < 1.1 * dt
+
+
+@pytest.mark.parametrize(("pole", "structure"), [(1.01, (3, 1)), (1.0, "IPDT")])
+def test_integrators_that_imitate_an_unstable_plant_are_told(pole, structure):
+    # with one integrator and a slow pair the residual is noise, and the dead time was good
+    rng = np.random.default_rng(1)
+    u = np.repeat(rng.choice([-1.0, 1.0], 101), 4)[:400]
+    y = lfilter([0, 0, 0, 0, 0.05], [1, -pole], u) + 0.02 * rng.standard_normal(400)
+    fit = cr.fit_output_error(cr.Record(0.1 * np.arange(400), u, y), structures=[structure]).fit
+    assert fit.integrators == 1
+    assert ("unstable" in [flag.code for flag in fit.flags]) == (pole > 1)

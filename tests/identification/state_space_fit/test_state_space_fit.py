@@ -4,6 +4,7 @@ import control as ct
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from scipy.signal import lfilter
 
 import ctrl_realize as cr
 from ctrl_realize.errors import DataError
@@ -172,3 +173,13 @@ def test_noise_beside_a_short_input_shows_no_response(seed):
     u = np.repeat(rng.choice([-1.0, 1.0], 31), 3)[:90]
     with pytest.raises(DataError, match="no output shows a response"):
         cr.fit_state_space(cr.Record(0.1 * np.arange(90), u, rng.standard_normal(90)))
+
+
+@pytest.mark.parametrize(("pole", "order", "seed"), [(1.003, 3, 0), (1.01, 5, 1), (1.0, 2, 0)])
+def test_slow_poles_that_imitate_an_unstable_plant_are_told(pole, order, seed):
+    # they follow 99 % of the output; of the second a drift of 5000 times its range was told instead
+    rng = np.random.default_rng(seed)
+    u = np.repeat(rng.choice([-1.0, 1.0], 101), 4)[:400]
+    y = lfilter([0, 0, 0, 0, 0.05], [1, -pole], u) + 0.02 * rng.standard_normal(400)
+    found = cr.fit_state_space(cr.Record(0.1 * np.arange(400), u, y), order)
+    assert ("unstable" in [flag.code for flag in found.fit.flags]) == (pole > 1)
