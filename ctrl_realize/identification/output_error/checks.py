@@ -70,8 +70,9 @@ def checked(fit: OutputErrorFit, *, alone: bool = True) -> OutputErrorFit:
         flags.append(flagged("feedback.gaps"))
     # A stable model that leaves noise excludes an unstable plant, unless noise took what it misses
     # or integrators imitate it.
-    if complete and (fit.estimate.averaged or fit.integrators or not fit.at_noise_level):
-        flags += unstable_flags(complete, fit.delay_interval[1])
+    seen = fit.estimate.averaged or not fit.at_noise_level
+    if complete and (seen or fit.integrators):
+        flags += unstable_flags(complete, fit.delay_interval[1], imitated=not seen)
     flags += set_point_flags(fit)
     if len(fit.records) == 1:
         shown = _shown(fit)

@@ -142,8 +142,17 @@ def _regulates(record: Record) -> bool:
     return wanted is not None and np.ptp(wanted) == 0 and np.unique(record.input).size > _LEVELS
 
 
-def unstable_flags(records: tuple[Record, ...], delay: float) -> Iterator[Flag]:
-    """Test whether a plant of any channels is unstable; `delay` in samples is an upper bound."""
+def unstable_flags(
+    records: tuple[Record, ...], delay: float, *, imitated: bool = False
+) -> Iterator[Flag]:
+    """Test whether a plant of any channels is unstable; `delay` in samples is an upper bound.
+
+    Where a model with slow poles leaves noise, and they may have `imitated` it, inputs must have
+    moved both ways: behind steps and ramps from rest lags look alike (6 of 480 integrators).
+    """
+    moves = [np.diff(record.input, axis=-1) for record in records]
+    if imitated and not any(move.max() > 0 > move.min() for move in moves):
+        return
     chances = [
         unstable_chance(own, u, past_inputs(own.size // len(u), delay))
         for y, u in _stretches(records)

@@ -184,7 +184,8 @@ def fitted_system(
     if slow or neighbours > COLOURED:  # stable poles imitate an unstable one, or cannot follow it
         # with their drifts, which the test has as well: beside slow poles those of a fit are huge
         whole = tuple(r for r in group if not r.n_missing)
-        loop = tuple(unstable_flags(whole, max(best.inputs) + max(best.outputs))) if whole else ()
+        latest, imitated = max(best.inputs) + max(best.outputs), neighbours <= COLOURED
+        loop = tuple(unstable_flags(whole, latest, imitated=imitated)) if whole else ()
     if neighbours > COLOURED:
         advice = "compare with a lower order on other data"
         if slow and group[0].issiso():
