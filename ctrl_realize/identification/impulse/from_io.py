@@ -95,7 +95,9 @@ def impulse_from_io(
 
     Notes
     -----
-    The regularized method is that of [1]_ (kernel SS: [2]_), ``"okid"`` that of [3]_.
+    The regularized method is that of [1]_ (kernel SS: [2]_), ``"okid"`` that of [3]_; its `std`
+    contains the difference from an ARX model of twice the order, since noise of the output biases
+    every order.
 
     The normal equations are summed by FFT, so 1e5 samples and 1000 lags take seconds. White noise
     is assumed: coloured noise does not bias the estimate, but `std` is then too small at
