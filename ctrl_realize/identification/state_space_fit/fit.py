@@ -85,6 +85,10 @@ def fit_state_space(
     (flags "coloured_residual", "highest_order"). The delays are whole samples; delays that
     cannot be split into those of inputs and outputs are modelled by states.
 
+    Models are stable. Where slow poles imitate an unstable plant, the flag "unstable" says so, if
+    inputs have moved both ways. A record shorter than the slowest period or lag is fitted, but its
+    gain and its slow poles are hardly known.
+
     References
     ----------
     .. [1] M. Verhaegen and V. Verdult, Filtering and System Identification, Cambridge 2007,
