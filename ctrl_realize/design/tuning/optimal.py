@@ -108,7 +108,7 @@ def optimal(
     max_sensitivity: float,
     filter_ratio: float,
     method: str,
-    direct: float = 0.0,
+    direct: float,
 ) -> Parameters:
     """Minimize the integrated absolute error after a load step, subject to Ms.
 
@@ -128,7 +128,7 @@ def optimal(
         td / tf.
     method : str
         Discretization of the integral.
-    direct : float, optional
+    direct : float
         |D| of the continuous plant that is sampled finely: dead time turns the loop there by any
         angle, at frequencies that the samples do not show.
 

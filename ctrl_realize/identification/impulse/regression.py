@@ -170,9 +170,8 @@ def through_arx(group: tuple[Record, ...], count: int, start: str) -> PulseRegre
     level = -float(ndtri(SILENT / 2 / (m * count)))
     silent = np.all(np.abs(markov) <= level * std, axis=(1, 2))
     # What a low order leaves out is no noise: with a feedthrough, a third of a band held.
-    longer = min((n for n, _ in fits.values() if n >= 2 * order), default=None)
-    for other in (found for n, found in fits.values() if n == longer):
-        std = np.hypot(std, markov - arx_markov(other, count))
+    for longer in [found for n, found in fits.values() if n >= 2 * order][:1]:
+        std = np.hypot(std, markov - arx_markov(longer, count))
     return PulseRegression(
         markov=markov,
         std=std,

@@ -70,9 +70,9 @@ def checked(fit: OutputErrorFit, *, alone: bool = True) -> OutputErrorFit:
         flags.append(flagged("feedback.gaps"))
     # A stable model that leaves noise excludes an unstable plant, unless noise took what it misses
     # or integrators imitate it.
-    seen = fit.estimate.averaged or not fit.at_noise_level
-    if complete and (seen or fit.integrators):
-        flags += unstable_flags(complete, fit.delay_interval[1], imitated=not seen)
+    noise = fit.at_noise_level and not fit.estimate.averaged
+    if complete and (fit.integrators or not noise):
+        flags += unstable_flags(complete, fit.delay_interval[1], imitated=noise)
     flags += set_point_flags(fit)
     if len(fit.records) == 1:
         shown = _shown(fit)

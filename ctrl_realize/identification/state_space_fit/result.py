@@ -181,11 +181,11 @@ def fitted_system(
     neighbours = max((float(c.autocorrelation[:, 1].max()) for c in checks), default=0.0)
     longest = max(r.n_samples for r in group)
     slow = longest * (1 - float(np.abs(core.poles()).max(initial=0.0))) < INTEGRATES
-    if slow or neighbours > COLOURED:  # stable poles imitate an unstable one, or cannot follow it
-        # with their drifts, which the test has as well: beside slow poles those of a fit are huge
-        whole = tuple(r for r in group if not r.n_missing)
+    # With their drifts, which the test has as well: beside slow poles those of a fit are huge.
+    whole = tuple(r for r in group if not r.n_missing)
+    if whole and (slow or neighbours > COLOURED):
         latest, imitated = max(best.inputs) + max(best.outputs), neighbours <= COLOURED
-        loop = tuple(unstable_flags(whole, latest, imitated=imitated)) if whole else ()
+        loop = tuple(unstable_flags(whole, latest, imitated=imitated))
     if neighbours > COLOURED:
         advice = "compare with a lower order on other data"
         if slow and group[0].issiso():

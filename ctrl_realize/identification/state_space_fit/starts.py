@@ -69,8 +69,7 @@ def from_starts(
 ) -> Outcome:
     """Fit from one estimate of the impulse response after another, until the residual is clean.
 
-    Of a short record two are always tried. Where none shows a response, a fit tells whether the
-    record does.
+    Of a short record two are always tried.
     """
     best: Outcome | None = None
     refused: list[DataError] = []
@@ -78,12 +77,9 @@ def from_starts(
     at_rest = all(np.ptp(r.input[..., :STILL], axis=-1).max() == 0 for r in group)
     still = [without_drift(record, slopes_of(record)) for record in group]
     starts = sorted(STARTS, key=lambda way: way[0] != "rest") if at_rest else list(STARTS)
-    tries = [(way, True) for way in starts[:most_starts]] + [(way, False) for way in starts[:2]]
-    for tried, (way, seen) in enumerate(tries, start=1):
-        if not seen and best is not None:
-            break
+    for tried, way in enumerate(starts[:most_starts], start=1):
         try:
-            found = _from_start(group, still, way, seen, asked, delays, feedthrough, enough)
+            found = _from_start(group, still, way, asked, delays, feedthrough, enough)
         except DataError as error:
             refused.append(error)
             continue
@@ -102,7 +98,6 @@ def _from_start(
     group: tuple[Record, ...],
     still: Sequence[Record],
     way: tuple[Start, Method],
-    seen: bool,
     asked: tuple[int, ...] | None,
     delays: ArrayLike | None,
     feedthrough: bool | None,
@@ -110,7 +105,7 @@ def _from_start(
 ) -> Outcome:
     """Fit from one estimate of the impulse response, that of records that stand still.
 
-    If it shows no response of any output, it is refused if one was to be `seen` in it.
+    If it shows no response of any output, the fit tells whether the record does.
     """
     start, method = way
     with warnings.catch_warnings():
@@ -119,11 +114,6 @@ def _from_start(
         impulse = impulse_from_io(still, method=method, start=start)
     markov = np.reshape(impulse.markov, (group[0].noutputs, group[0].ninputs, -1))
     unseen = sum(flag.code == "no_response" for flag in impulse.flags)
-    nothing = DataError(
-        "no output shows a response to the inputs above the noise level; check the columns"
-    )
-    if unseen == group[0].noutputs and seen:
-        raise nothing
     drift = any(one is not record for one, record in zip(still, group, strict=True))
     search = Search(group, markov, max(asked or ORDERS), enough, drift=drift)
     orders = search.orders(asked)
@@ -136,7 +126,9 @@ def _from_start(
         moved = search.lowered(moved, orders, delays=delays is None)
     bic = {c.order: c.bic for c in fits} | {moved.order: moved.bic}
     if unseen == group[0].noutputs == len(_silence(moved, FOLLOWS)):
-        raise nothing
+        raise DataError(
+            "no output shows a response to the inputs above the noise level; check the columns"
+        )
     flags = _silence(moved)
     if len(orders) > 1 and best.order == max(asked or ORDERS):
         flags += (flagged("highest_order", order=best.order),)
