@@ -108,11 +108,6 @@ TABLES = {
         "python -m benchmarks.ablation --made-for 24 --only ... "
         "--output docs/tables/ablation_slow_noise_table.md",
     ),
-    "ablation_nyquist": (
-        "docs/tables/ablation_nyquist_table.md",
-        "python -m benchmarks.ablation --made-for 24 --only Nyquist "
-        "--output docs/tables/ablation_nyquist_table.md",
-    ),
     "ablation_loop": (
         "docs/tables/ablation_loop_table.md",
         "python -m benchmarks.ablation --made-for 24 --only held loop 'behind rounding' "

@@ -7,7 +7,6 @@ from scipy.signal import lfilter
 
 import ctrl_realize as cr
 from benchmarks.closed_loop import cases as loops
-from benchmarks.relay import __main__ as tests
 from benchmarks.worlds import driven, sensors, steps
 from benchmarks.worlds import loops as answered
 from benchmarks.worlds.simulation import (
@@ -266,22 +265,6 @@ WORLDS = (
 )
 
 
-def relay_test(rng: Rng) -> Case:
-    """A biased relay test of a plant with a dead time of twice its lag; noise of 2 % of its swing.
-
-    The output of such a plant is exponentials from corner to corner, whose errors are of the
-    highest frequencies.
-    """
-    noise = 0.02 * tests.AMPLITUDE / 2
-    plant = tests.plant("twice a lag", noise, 0.0, 1.0)
-    width, bias = 3 * noise, 0.3 * tests.AMPLITUDE
-    test = cr.bench.relay_test(
-        plant, tests.AMPLITUDE, rng, hysteresis=width, bias=bias, cycles=tests.CYCLES
-    )
-    truth = plant.truth
-    return Case(test, truth.dead_time, truth.gain, truth.dead_time + 6.0)
-
-
 def running_loop(rng: Rng) -> Case:
     """A gain of 0.5 to 1.5, with an integral or not, and 6 to 15 levels of a set point.
 
@@ -359,7 +342,6 @@ MADE_FOR = {
     Rule.NO_SLOPE: rest_like_a_slope,
     Rule.NO_DISPERSION: sensors.coarse,
     Rule.PINNED: drive_with_friction,
-    Rule.NYQUIST: relay_test,
     Rule.HELD_STEPS: running_loop,
     Rule.LOOP: running_loop,
     Rule.LOOP_ROUNDED: rounded_loop,

@@ -83,7 +83,6 @@ class Rule(Enum):
     FOLLOWED = "noise that a model follows"
     MORE_LAGS = "fourth and fifth lag"
     CORRELATION = "start from the correlation"
-    NYQUIST = "no pair at the Nyquist frequency"
     HELD_STEPS = "steps that are held"
     CURVES = "curves are no steps"
     SPIKES = "spikes left out"

@@ -48,7 +48,6 @@ _PASSES = 2  # of modified residuals; see `fit_window`
 RAMP = 0.1
 """Slowest pole times the length of the record, below which there may be an integrator
 beside a lag that is faster by any ratio. Ablation: integrator beside a lag of any ratio."""
-_HALF_A_TURN = 0.95 * np.pi  # rad a sample; a pair of that frequency moves by some hundredths
 _LEAST_FREEDOM = 3.0  # of a variance that is estimated: fewer tell none
 _LONG = 2**18  # samples that tell a frequency, for time and memory
 
@@ -120,18 +119,14 @@ class WindowFit:
 
         A structure with a pole slower than the record, or an integrator, whose gain is not
         significant is replaced by the best one without that is not ruled out: a slow drift is not a
-        response. So is one with a pair at the Nyquist frequency or above: what changes its sign
-        from sample to sample is noise, or an oscillation of another frequency. Ablation: no pair
-        at the Nyquist frequency.
+        response.
         """
         first = choose(criterion)
         limit = criterion[first] + VERY_STRONG
         left = {s: value for s, value in criterion.items() if value <= limit}
         while left:
             structure = choose(left)
-            candidate = self.candidates[structure]
-            resolved = replace(self, taken=1.0).static(candidate).resolved
-            if resolved and not (at_nyquist(candidate, self.scales) and Rule.NYQUIST.on):
+            if replace(self, taken=1.0).static(self.candidates[structure]).resolved:
                 kept = structure if structure == first or Rule.RESOLVED.on else first
                 return self.candidates[kept]
             del left[structure]
@@ -159,12 +154,6 @@ class WindowFit:
         """Information criterion of other candidates on the same data."""
         values = criteria(candidates, self.variance, self.independent)
         return {s: value + self.problem.local_count(s.order) for s, value in values.items()}
-
-
-def at_nyquist(candidate: Candidate, scales: Scales) -> bool:
-    """Whether a pair turns by half a turn from sample to sample, or more."""
-    fastest = float(candidate.poles.imag.max())
-    return scales.bounds is None and fastest * scales.dt > _HALF_A_TURN
 
 
 def with_known_noise(
