@@ -75,11 +75,15 @@ def test_the_richest_structure_is_looked_at_before_none_is_called_right():
     assert fit.fit_percent > 95
 
 
-def test_an_arm_that_swings_is_followed():
+def test_an_arm_that_swings_and_a_heater_that_cools_are_followed():
     arm = measured.fitted("aeroshield/k2200")
     assert arm.data.relaxing
     assert arm.fit_percent > 92.7  # of a pair with dead time
     assert 0 <= arm.delay <= 6
+    heater = measured.fitted("heatshield/k4049")
+    assert heater.fit_percent > 98
+    assert np.abs(heater.measured - heater.fitted).max() < np.ptp(heater.measured)
+    assert heater.interval[0] <= 3 * heater.dt
 
 
 def test_a_drift_before_the_step_does_not_make_an_integrator_of_a_lamp():
