@@ -14,6 +14,9 @@ _MIN_LINE_POWER = 1e-4
 """Relative to the strongest line."""
 _MIN_LINE_TO_NOISE = 10.0
 """Least power of a line relative to the variance of its mean."""
+_MOST_SCATTER = 1 / 3
+"""Part of the power of an input that may differ from period to period: half of that of a multisine
+does over half of its period, more over any other wrong one, and 1/3 is noise of half its power."""
 
 
 def from_periods(stream: Stream, period: int, skip: int) -> tuple[MeasuredPoints, float]:
@@ -65,6 +68,12 @@ def _excited_lines(stats: PeriodStatistics, period: int) -> BoolArray:
     strongest = power[inside].max()
     if strongest == 0:
         raise DataError("the input is constant: it does not excite the plant")
+    scatter = stats.var_u[inside].sum() / (stats.var_u + power)[inside].sum()
+    if scatter > _MOST_SCATTER:
+        raise DataError(
+            f"{100 * scatter:.0f} % of the power of the input does not repeat after {period} "
+            "samples; expected the samples of one period. Without period, the input may be any"
+        )
     excited = inside & (power > _MIN_LINE_POWER * strongest)
     excited &= power > _MIN_LINE_TO_NOISE * stats.var_u / stats.count
     excited &= np.abs(stats.mean_y) > 0

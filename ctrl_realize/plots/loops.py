@@ -27,6 +27,7 @@ from ..design.siso import delayed_system
 from ..design.tuning.algorithm import PIDAlgorithm
 from ..design.tuning.controller import PIDController
 from ..design.tuning.simulated import simulate_loop
+from ..errors import OptionError
 from ..numerics.arrays import FloatArray
 from . import style
 from .names import plain, with_unit
@@ -187,6 +188,8 @@ def closed_loop_plot(
     ------
     UnsuitableSystemError
         A continuous plant; without `span`, a loop that is not stable.
+    OptionError
+        No controllers.
 
     Examples
     --------
@@ -198,6 +201,8 @@ def closed_loop_plot(
     ['measured value', '', 'controller output', '']
     """
     plant = delayed_system(plant, "closed_loop_plot")
+    if not controllers:
+        raise OptionError("controllers is empty; expected a mapping of names to controllers")
     linear = {name: _linear(controller) for name, controller in controllers.items()}
     if span is None:
         span = _span(plant, linear)

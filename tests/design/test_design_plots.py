@@ -95,3 +95,8 @@ def test_the_loop_is_drawn_with_its_actuator_limits_and_noise(valve):
     marked = [line.get_ydata()[0] for line in limited.axes[1, 0].lines[1:]]
     assert {-2, 2.1} <= set(marked)
     plt.close("all")
+
+
+def test_a_plot_of_loops_needs_a_controller(valve):
+    with pytest.raises(cr.errors.OptionError, match="controllers is empty"):
+        cr.plots.closed_loop_plot(valve(37), {})

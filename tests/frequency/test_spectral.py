@@ -127,6 +127,13 @@ def test_whole_periods_have_no_leakage():
     assert_allclose(frf.coherence, 1, atol=1e-12)
 
 
+@pytest.mark.parametrize("period", [250, 450, 499, 501, 750])
+def test_a_period_that_is_not_that_of_the_input_is_refused(period):
+    record, _ = multisine_record(periods=12)
+    with pytest.raises(cr.errors.DataError, match=f"does not repeat after {period} samples"):
+        cr.spectral_frf(record, period=period)
+
+
 def test_deviation_of_periodic_estimates_is_that_of_their_scatter():
     errors, stated, inside = [], [], []
     for seed in range(40):
