@@ -12,6 +12,17 @@ import pytest
 
 mpl.use("Agg")
 
+collect_ignore = ["tests/oracles"]  # they hold no tests, and may need packages that are not there
+
+NEEDED = {"ctrl_realize.interactive.widget.app": "anywidget"}
+"""Optional packages of examples."""
+
+
+@pytest.fixture(autouse=True)
+def _optional_package_of_an_example(request):
+    if request.node.name in NEEDED:
+        pytest.importorskip(NEEDED[request.node.name])
+
 
 @pytest.fixture(autouse=True)
 def _no_figure_left_open():

@@ -4,9 +4,10 @@ import ast
 import re
 from pathlib import Path
 
+import ctrl_realize
 from ctrl_realize.numerics.rules import Rule
 
-PACKAGE = Path(__file__).parents[1] / "ctrl_realize"
+PACKAGE = Path(ctrl_realize.__file__).parent
 NUMERICS = [
     "engine", "families", "output_error", "joint", "signals", "validation", "hankel",
     "internal_delays",

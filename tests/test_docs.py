@@ -16,6 +16,7 @@ from ctrl_realize.cli import main
 from tests.sources import parsed
 
 ROOT = Path(__file__).resolve().parents[1]
+PACKAGE = Path(cr.__file__).parent
 DOCS = ROOT / "docs"
 PAGES = sorted(
     path for path in DOCS.rglob("*.md") if not {"_build", "generated", "extra"} & set(path.parts)
@@ -70,6 +71,8 @@ def test_links_inside_the_project_lead_somewhere(page: Path, reference):
         if "generated/notebooks/" in target:
             path = str(ROOT / "notebooks" / target.split("generated/notebooks/")[1])
         found = (page.parent / path).resolve()
+        if found.is_relative_to(ROOT / PACKAGE.name):  # a wheel is installed elsewhere
+            found = PACKAGE / found.relative_to(ROOT / PACKAGE.name)
         endings = ("", ".md", ".ipynb")
         assert any(found.with_name(found.name + ending).exists() for ending in endings), target
 
@@ -90,7 +93,7 @@ def test_names_of_stored_numbers_stand_outside_of_code_where_they_are_filled_in(
 def test_files_that_the_architecture_names_exist():
     named = re.findall(r"`(ctrl_realize/[\w/]+\.py)`", (DOCS / "architecture.md").read_text())
     assert len(named) >= 10
-    assert [path for path in named if not (ROOT / path).exists()] == []
+    assert [path for path in named if not (PACKAGE.parent / path).exists()] == []
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda path: str(path.relative_to(DOCS)))
