@@ -101,8 +101,11 @@ def test_tune_tells_the_numbers_of_the_same_calls_in_python(tmp_path, capsys):
     margin = f"{pid.check.margins.gain_margin:.2g} times as large"
     assert margin in said
     assert files_in(tmp_path) == {"heater.csv"}
-    assert main(["tune", *words, "--closed-loop-time", "1", "--rule", "amigo"]) == 2
-    assert "--closed-loop-time is an argument of simc" in capsys.readouterr().err
+    # what no model can change is told before one is identified, or a record is read
+    (empty := tmp_path / "empty.csv").touch()
+    for wrong in (["--closed-loop-time", "1"], ["--max-sensitivity", "1.6"]):
+        assert main(["tune", str(empty), *wrong, "--rule", "amigo"]) == 2
+        assert f"{wrong[0]} is an argument of" in capsys.readouterr().err
 
 
 def test_tune_tells_the_same_numbers_for_a_saved_model(tmp_path, capsys):

@@ -6,11 +6,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from .._checks import one_of
 from ..delayed import DelayedStateSpace
 from ..design import pid
 from ..design.tuning.entered import Scaling
-from ..design.tuning.pid import KINDS, RULES
+from ..design.tuning.pid import TuningOptions
 from ..report.controller import unsafe_if
 from .inputs import python_keywords
 from .terminal import complain, say
@@ -31,8 +30,7 @@ class Tuning:
         """Check names and ranges before a model is identified."""
         ranges = {name: self.entered.get(name) for name in ("measured_range", "output_range")}
         Scaling(**ranges).of(self.entered.get("form", "ideal"))
-        one_of(self.tuned.get("rule", RULES[0]), "rule", RULES)
-        one_of(self.tuned.get("kind", KINDS[0]), "kind", KINDS)
+        TuningOptions(**self.asked)
 
     @property
     def asked(self) -> dict[str, Any]:

@@ -56,7 +56,7 @@ def rule_options(settings: Mapping[str, Any], system: DelayedStateSpace) -> JSON
     if rule == "optimal":
         options["max_sensitivity"] = float(f"{_MS[0] + speed * (_MS[1] - _MS[0]):.3g}")
     elif rule in SPEEDS and speed != _MIDDLE:
-        model = tuned(system, rule, kind, TuningOptions())[0].model
+        model = tuned(system, TuningOptions(rule, kind))[0].model
         usual = SPEEDS[rule] * max(model.dead_time if model else 0.0, float(system.dt))
         options["closed_loop_time"] = float(f"{usual * _RATIO ** (1 - speed / _MIDDLE):.3g}")
     return options
@@ -72,8 +72,7 @@ def tuned_loop(
             warnings.simplefilter("always", CtrlRealizeWarning)
             controller = pid(system, **options)
     else:
-        rule, kind = options.pop("rule"), options.pop("kind")
-        controller, _ = tuned(system, rule, kind, TuningOptions(**options))
+        controller, _ = tuned(system, TuningOptions(**options))
     said = tuple(str(one.message) for one in told)
     found = (margins(one, controller) for one in (_plants(system) if checked else [system]))
     sizes = np.array([one.ms if one.stable else np.inf for one in found])

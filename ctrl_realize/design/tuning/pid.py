@@ -161,13 +161,13 @@ def pid(
     given = locals()
     options = TuningOptions(**{one.name: given[one.name] for one in fields(TuningOptions)})
     if options.closed_loop_time == "robust":
-        options = _robust(system, rule, kind, options)
-    made, plant = tuned(system, rule, kind, options)
+        options = _robust(system, options)
+    made, plant = tuned(system, options)
     check = loop_check(plant, made)
     if not check.stable or check.flags:
         with warnings.catch_warnings():  # what the record leaves open has been said
             warnings.simplefilter("ignore")
-            advice = _one_that_works(system, rule, kind, options)
+            advice = _one_that_works(system, options)
         refuse_unstable(check, f"the {kind} controller of rule={rule!r}", advice)
         warn_of(check, advice)
     return made.checked(check)
@@ -175,8 +175,10 @@ def pid(
 
 @dataclass(frozen=True)
 class TuningOptions:
-    """Arguments of `pid` beside system, rule and kind."""
+    """Arguments of `pid` beside the system, which are checked without one."""
 
+    rule: str = "simc"
+    kind: str = "PI"
     closed_loop_time: float | Literal["robust"] | None = None
     max_sensitivity: float | None = None
     derivative_filter: float = 10.0
@@ -185,66 +187,69 @@ class TuningOptions:
     dt: float | None = None
     name: str | None = None
 
+    def __post_init__(self) -> None:
+        """Check every argument that does not depend on the plant."""
+        rule, kind = one_of(self.rule, "rule", RULES), one_of(self.kind, "kind", KINDS)
+        one_of(self.reduction, "reduction", REDUCTIONS)
+        one_of(self.method, "method", DISCRETIZATIONS)
+        known = kinds_of(rule)
+        if kind not in known:
+            raise OptionError(f"rule={rule!r} has no {kind}; available: {', '.join(known)}")
+        within(self.derivative_filter, "derivative_filter", "td / tf", 1, 100)
+        if self.closed_loop_time is not None:
+            if rule not in ADJUSTED:
+                raise OptionError(
+                    f"closed_loop_time= is an argument of simc, lambda and imc, not of {rule!r}"
+                )
+            if self.closed_loop_time != "robust":
+                positive(self.closed_loop_time, "closed_loop_time", "time in s")
+        if self.max_sensitivity is not None:
+            if rule != "optimal":
+                raise OptionError(f"max_sensitivity= is an argument of 'optimal', not of {rule!r}")
+            within(self.max_sensitivity, "max_sensitivity", "Ms", 1.01, 10)
+
 
 def tuned(
-    system: Any, rule: str, kind: str, options: TuningOptions, plants: Any = None
+    system: Any, options: TuningOptions, plants: Any = None
 ) -> tuple[PIDController, DelayedStateSpace | DelaySystem]:
     """Tune by a rule without checking the loop; return the controller and its plant.
 
     The plant is in the time base of the controller; `plants` are those of `reference_plant`.
     """
-    rule = one_of(rule, "rule", RULES)
-    kind = one_of(kind, "kind", KINDS)
-    method = one_of(options.method, "method", DISCRETIZATIONS)
-    known = kinds_of(rule)
-    if kind not in known:
-        raise OptionError(f"rule={rule!r} has no {kind}; available: {', '.join(known)}")
-    ratio = within(options.derivative_filter, "derivative_filter", "td / tf", 1, 100)
-    target = None
-    if options.closed_loop_time is not None:
-        if rule not in ADJUSTED:
-            raise OptionError(
-                f"closed_loop_time= is an argument of simc, lambda and imc, not of {rule!r}"
-            )
-        target = positive(options.closed_loop_time, "closed_loop_time", "time in s")
-    if options.max_sensitivity is not None and rule != "optimal":
-        raise OptionError(f"max_sensitivity= is an argument of 'optimal', not of {rule!r}")
-    given = _USUAL_MS if options.max_sensitivity is None else options.max_sensitivity
-    limit = within(given, "max_sensitivity", "Ms", 1.01, 10)
+    if isinstance(options.closed_loop_time, str):
+        return tuned(system, _robust(system, options), plants)
+    rule, kind, ratio = options.rule, options.kind, options.derivative_filter
     plant, exact, step = plants or reference_plant(system, options.dt)
     model: ProcessModel | None = None
     if rule in MODEL_RULES:
         model = reduced(system, plant, rule, kind, options.reduction, step)
-        kp, ti, td = MODEL_RULES[rule][0](model, kind, target)
+        kp, ti, td = MODEL_RULES[rule][0](model, kind, options.closed_loop_time)
     elif rule == "optimal":
-        total = total_time(system, plant)
+        limit = _USUAL_MS if options.max_sensitivity is None else options.max_sensitivity
         kp, ti, td = optimal(
-            plant, total, kind, max_sensitivity=limit, filter_ratio=ratio, method=method,
-            direct=0.0 if step else turned_feedthrough(exact),
+            plant, total_time(system, plant), kind, max_sensitivity=limit, filter_ratio=ratio,
+            method=options.method, direct=0.0 if step else turned_feedthrough(exact),
         )  # fmt: skip
     else:
         kp, ti, td = from_ultimate(rule, kind, *critical_point(exact))
     units = gain_and_time_units(plant)
     made = PIDController(
-        kp, ti, td, td / ratio, dt=step, method=method, rule=rule, model=model,
+        kp, ti, td, td / ratio, dt=step, method=options.method, rule=rule, model=model,
         name=options.name, gain_unit=units[0], time_unit=units[1],
     )  # fmt: skip
     return made, exact
 
 
-def _robust(system: Any, rule: str, kind: str, options: TuningOptions) -> TuningOptions:
+def _robust(system: Any, options: TuningOptions) -> TuningOptions:
     """Options with the shortest closed-loop time that is robust."""
-    made, _ = tuned(system, rule, kind, replace(options, closed_loop_time=None))
-    if made.model is None or rule not in ADJUSTED:
-        raise OptionError(
-            f"closed_loop_time='robust' with rule={rule!r}; expected one of {', '.join(ADJUSTED)}"
-        )
-    shortest = made.model.dead_time or 0.1 * made.model.lag
+    model = tuned(system, replace(options, closed_loop_time=None))[0].model
+    assert model is not None
+    shortest = model.dead_time or 0.1 * model.lag
     tried = []
     for share in LONGER:
         time = None if share == 1 else float(f"{share * shortest:.3g}")  # as it is suggested
         changed = replace(options, closed_loop_time=time)
-        made, plant = tuned(system, rule, kind, changed)
+        made, plant = tuned(system, changed)
         check = loop_check(plant, made)
         if not check.flags:
             return changed
@@ -253,30 +258,30 @@ def _robust(system: Any, rule: str, kind: str, options: TuningOptions) -> Tuning
     return min(tried, key=lambda one: one[0])[1]
 
 
-def _one_that_works(system: Any, rule: str, kind: str, options: TuningOptions) -> str:
+def _one_that_works(system: Any, options: TuningOptions) -> str:
     """Suggest a call whose loop is robust, on the model and over its intervals."""
     usual = replace(options, closed_loop_time=None, max_sensitivity=None)
     tries = [
-        (name, form, replace(usual, reduction=reduction))
-        for form in dict.fromkeys((kind, "PI"))
-        for name in dict.fromkeys((rule, *SAFE))
+        replace(usual, rule=rule, kind=kind, reduction=reduction)
+        for kind in dict.fromkeys((options.kind, "PI"))
+        for rule in dict.fromkeys((options.rule, *SAFE))
         for reduction in REDUCTIONS
-        if name in MODEL_RULES
+        if rule in MODEL_RULES and kind in kinds_of(rule)
     ]
-    tries.append(("optimal", "PI", usual))
+    tries.append(replace(usual, rule="optimal", kind="PI"))
     best: tuple[float, str] = (np.inf, "")
-    for name, form, changed in [*tries, *_slower(system, usual)]:
-        if form not in kinds_of(name) or (name, form, changed) == (rule, kind, options):
+    for changed in [*tries, *_slower(system, usual)]:
+        if changed == options:
             continue
         try:
-            made, plant = tuned(system, name, form, changed)
+            made, plant = tuned(system, changed)
         except ValueError:
             continue
         check = loop_check(plant, made)
         if not check.stable or check.margins.ms > MOST_SENSITIVE:
             continue
         worst = check.margins.ms if check.worst is None else check.worst.ms
-        call = f"{_call(name, form, changed)}: Ms {check.margins.ms:.3g}"
+        call = f"{_call(changed)}: Ms {check.margins.ms:.3g}"
         if not check.flags:
             if check.worst is None:
                 return f"Try {call}"
@@ -290,17 +295,17 @@ def _one_that_works(system: Any, rule: str, kind: str, options: TuningOptions) -
     return "No other rule does better; see design.compare_pid, or use design.lqg"
 
 
-def _slower(system: Any, options: TuningOptions) -> list[tuple[str, str, TuningOptions]]:
+def _slower(system: Any, options: TuningOptions) -> list[TuningOptions]:
     """A closed-loop time of simc that is robust, or comes closest to it."""
     try:
-        return [("simc", "PI", _robust(system, "simc", "PI", options))]
+        return [_robust(system, replace(options, rule="simc", kind="PI"))]
     except ValueError:
         return []
 
 
-def _call(rule: str, kind: str, options: TuningOptions) -> str:
+def _call(options: TuningOptions) -> str:
     """What to type for a rule, without the defaults."""
-    usual = TuningOptions()
+    usual, rule, kind = TuningOptions(), options.rule, options.kind
     words: dict[str, Any] = {"closed_loop_time": options.closed_loop_time, "dt": options.dt}
     if rule in MODEL_RULES:
         words["reduction"] = options.reduction

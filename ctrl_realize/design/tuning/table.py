@@ -198,8 +198,7 @@ def compare_pid(
     """
     tried = [one_of(rule, "rule", RULES) for rule in rules or RULES]
     kinds = [one_of(kind, "kind", KINDS) for kind in kinds]
-    settings = TuningOptions(**options)
-    plants = reference_plant(system, settings.dt)  # what no rule can tune is refused at once
+    plants = reference_plant(system, options.get("dt"))  # what no rule can tune is refused at once
     made: list[tuple[PIDController, Performance]] = []
     refused: list[tuple[str, str, str]] = []
     for rule in tried:
@@ -207,7 +206,7 @@ def compare_pid(
             if kind not in kinds_of(rule):
                 continue
             try:
-                controller, exact = tuned(system, rule, kind, settings, plants)
+                controller, exact = tuned(system, TuningOptions(rule, kind, **options), plants)
             except ValueError as error:
                 # A rule that does not apply to this plant becomes a row of the result.
                 refused.append((rule, kind, str(error)))
