@@ -26,6 +26,7 @@ from ..numerics.output_error.any_input.data import MOST_SAMPLES
 from ..numerics.rules import Rule
 from ..numerics.signals.noise import correlation_time
 from ..numerics.signals.noise_model import coloured_criterion
+from ..numerics.validation.innovations import RARE, misfit_chance
 from .long_records import lively_parts
 from .output_error.checks import Shown, against_one_model, nonlinear_flags
 from .output_error.loop_flags import answers_the_output, in_automatic
@@ -69,11 +70,15 @@ def with_modes_judged(
         related = [bool(check.flags) for check in checks]
     except UnsuitableSystemError:  # an unstable model is not simulated
         related, follows, left = [True] * len(records), [True] * len(records), None
-    if not any(related) or not Rule.MODES.on:
+    if not Rule.MODES.on:
         return system
     why = "nothing else could be fitted"
     outlying = fit.repeatability is not None and fit.repeatability.outlying
-    if asked:
+    if not any(related):
+        stepped = bool(np.isfinite(fit.onset))
+        follows = [not (asked or stepped) and _follows(check) for check in checks]
+        why = f"{interval_in_time(*fit.interval)} is not an interval of 95 %"
+    elif asked:
         why = (
             "identify without order and structures, or fit_state_space, also tries "
             "state-space models"
@@ -114,6 +119,11 @@ def _checks(system: DelayedStateSpace, records: Sequence[Record]) -> list[Residu
         analyse_residuals(system, record, lags=min(late + LAGS, record.n_samples // 3))
         for record in records
     ]
+
+
+def _follows(check: ResidualAnalysis) -> bool:
+    """Whether the input explains the residual from further back than its correlation tells."""
+    return misfit_chance(np.ravel(check.residual), np.ravel(check.record.input)) < RARE
 
 
 def _residuals(checks: Sequence[ResidualAnalysis]) -> Residuals:

@@ -60,6 +60,39 @@ def test_held_samples_and_coloured_residuals_widen_the_interval_to_the_truth():
     assert low <= case.dead_time
 
 
+def test_samples_on_lines_between_the_samples_of_an_output_are_left_out():
+    # with them the dead time of 10.3 samples was 0 to 7.4
+    t = np.arange(260.0)
+    noise = 0.01 * np.random.default_rng(0).standard_normal(260)
+    y = -2 * np.clip(-np.expm1(-(t - 73.3) / 20), 0, None) + noise
+    fit = cr.identify(cr.Record(t, np.where(t < 63, 0.0, 1.0), np.interp(t, t[::7], y[::7]))).fit
+    (flag,) = (one for one in fit.flags if one.code == "repeats_left_out")
+    assert "interpolated between samples 7 apart" in str(flag)
+    assert fit.interval[0] <= 10.3 <= fit.interval[1]
+
+
+def test_an_integrator_that_is_driven_by_steps_is_not_taken_for_interpolated():
+    u = np.repeat(np.random.default_rng(1).choice([-1.0, 1.0], 60), 5)
+    y = np.append(np.zeros(5), 0.1 * np.cumsum(u)[:-5])  # straight between moves of the input
+    fit = cr.identify(cr.Record(np.arange(300.0), u, y)).fit
+    assert "repeats_left_out" not in codes(fit)
+
+
+def test_a_recycle_behind_other_inputs_is_seen_in_the_residual():
+    # y = (u exp(-6 s) + 0.45 exp(-33 s) y / (1 + 4 s)) / (1 + 11 s): 5.4 to 5.95 s was called good
+    level, inside, output = 0.0, 0.0, np.zeros(700)
+    u = np.repeat(np.random.default_rng(1).uniform(-1, 1, 20), 35)
+    a, b = np.exp(-1 / 11), np.exp(-1 / 4)
+    for k in range(1, 700):
+        inside = b * inside + (1 - b) * (output[k - 33] if k >= 33 else 0.0)
+        level = a * level + (1 - a) * ((u[k - 6] if k >= 6 else 0.0) + 0.45 * inside)
+        output[k] = level
+    noise = 0.005 * np.ptp(output) * np.random.default_rng(2).standard_normal(700)
+    fit = cr.identify(cr.Record(np.arange(700.0), u, output + noise)).fit
+    assert "input_in_residual" in codes(fit)
+    assert fit.verdicts[0].level == "with care"
+
+
 @pytest.mark.parametrize("driven_by", ["step", "binary"])
 def test_samples_that_repeat_an_output_between_its_updates_are_left_out(driven_by):
     # with them the dead time of 12 samples was 18.8 (15.4 to 21.0), with a load that was none, and

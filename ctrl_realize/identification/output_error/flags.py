@@ -293,11 +293,16 @@ def _before_the_step(data: StepData, fit: OutputErrorEstimate) -> Iterator[Flag]
 def _record_flags(data: StepData, fit: OutputErrorEstimate, start: float) -> Iterator[Flag]:
     """List the flags of the record: what disturbed it."""
     if fit.load is not None:
-        yield flagged(
-            "load_disturbance.early" if fit.load.early else "load_disturbance",
-            size=fit.load.size,
-            when=in_time(start + fit.load.time, 4),
-        )
+        size, when = fit.load.size, in_time(start + fit.load.time, 4)
+        if fit.load.own_gain and fit.static is not None:
+            gain = fit.static.gain + fit.load.own_gain
+            yield flagged("load_disturbance.own", size=size, when=when, gain=gain)
+        else:
+            yield flagged(
+                "load_disturbance.early" if fit.load.early else "load_disturbance",
+                size=size,
+                when=when,
+            )
     if data.edge < 8:
         yield flagged("no_rest", samples=data.edge, share=_percent(data.sigma, data))
     if data.drift and not data.relaxing:

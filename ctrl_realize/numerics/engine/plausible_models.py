@@ -69,11 +69,14 @@ class PlausibleDraw:
         Of the structures that are not ruled out, on any scale.
     best : callable
         The fit of each: best(structure) -> Candidate.
+    other : WindowFit, optional
+        Another fit that is as likely, of whose best half of the models are drawn.
     """
 
     fits: WindowFit
     evidence: Mapping[Structure, float]
     best: Callable[[Structure], Candidate]
+    other: WindowFit | None = None
 
     def __getstate__(self) -> dict[str, tuple[PlausibleModel, ...]]:
         """What is stored or sent: the models, which are far smaller than the fits."""
@@ -83,11 +86,14 @@ class PlausibleDraw:
     def models(self) -> tuple[PlausibleModel, ...]:
         """`COUNT` equally likely models; the same for the same data."""
         rng = np.random.default_rng(COUNT)
+        others = 0 if self.other is None else COUNT // 2
         weights = np.array(list(self.evidence.values()))
-        ends = np.round(np.cumsum(weights / weights.sum()) * COUNT - 1e-9)
+        ends = np.round(np.cumsum(weights / weights.sum()) * (COUNT - others) - 1e-9)
         counts = np.diff(ends, prepend=0.0)  # of each, within one of its share
         models: list[PlausibleModel] = []
         with one_blas_thread():
+            if self.other is not None:
+                models += _about(self.other, self.other.best, others, rng)
             for structure, count in zip(self.evidence, counts, strict=True):
                 if count:
                     models += _about(self.fits, self.best(structure), int(count), rng)

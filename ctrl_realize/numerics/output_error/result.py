@@ -329,6 +329,8 @@ class OutputErrorEstimate:
         own = averaged_ends(
             [(one.gain, np.hypot(one.gain_std, self.rounding), weight) for one, weight in every]
         )
+        late = 0.0 if self.load is None else self.load.own_gain
+        own = own[0] + min(late, 0.0), own[1] + max(late, 0.0)
         if self.beyond is None:
             return own
         low, high = (-np.inf, np.inf) if self._rises_on else self.beyond.gain_ends

@@ -73,6 +73,7 @@ from ..families.equal_lags import LagChain
 from ..families.flow import DispersedFlow
 from ..rules import Rule
 from ..signals.edges import difference_noise, level_error
+from ..signals.load_step import LoadStep
 from ..signals.noise import rounding_of_level
 from ..signals.noise_model import continues
 from .before_the_step import fitted_from_rest
@@ -132,8 +133,12 @@ def fit_step_record(
     free = cache(partial(fit, data, data.output.size, ALL_STRUCTURES))
     loaded = None if data.load is not None else load_of(data, fits, fit, free, _is_noise)
     if loaded is not None and not loaded[0].early:
-        data, found = fit_step_record(given.with_load(*loaded), requested)
-        return data, replace(found, load=loaded[0])
+        load, part = loaded
+        load = replace(load, own_gain=_own_gain(data, load))
+        data, found = fit_step_record(given.with_load(load, part), requested)
+        if load.own_gain and found.drawn is not None:
+            found = replace(found, drawn=replace(found.drawn, other=fits))
+        return data, replace(found, load=load)
     if structures is None and requested.fastest is None:
         found = _free_choice(data, fits, fit, requested.whiten)
     else:
@@ -146,6 +151,17 @@ def fit_step_record(
         level *= np.sqrt(2) / float(np.ptp(data.input))
         found = replace(found, rounding=float(np.hypot(found.rounding, level)))
     return data, found if loaded is None else replace(found, load=loaded[0])
+
+
+def _own_gain(data: StepData, load: LoadStep) -> float:
+    """What a load adds to the gain if it is a late part of the response to the step before it."""
+    times = data.dt * np.array([index for index, _ in data.edges])
+    own = int(np.flatnonzero(times <= load.time)[-1])
+    late = np.delete(times, own) + load.time - times[own]  # it would follow the others as well
+    if np.any(late + load.lag <= data.clock[-1]):
+        return 0.0
+    index, samples = data.edges[own]
+    return load.size / float(data.input[index + samples] - data.input[index - 1])
 
 
 def _input_error(data: StepData) -> float:

@@ -20,6 +20,8 @@ class LoadStep:
     The response to a unit step is the sum of ``residues / poles (exp(poles s) - 1)``, s the time
     since the step over `lag`; times in s. `size` is what the load adds to the last output. `early`:
     it cannot be told from the response to the input, mostly since it comes so soon after a step.
+    `own_gain` is what it adds to the gain if it is no load but a late part of the response to a
+    step, of a second path or a recycle; 0 where it would follow another step as well.
     """
 
     time: float
@@ -28,6 +30,7 @@ class LoadStep:
     residues: ComplexArray = field(default_factory=lambda: np.ones(1, dtype=np.complex128))
     size: float = 0.0
     early: bool = False
+    own_gain: float = 0.0
 
     def columns(self, clock: FloatArray) -> FloatArray:
         """Response to a unit step (N, 3), and its changes for a later step and a longer lag."""

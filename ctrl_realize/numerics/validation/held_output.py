@@ -1,4 +1,4 @@
-"""Outputs that are constant while the plant moves: held between samples, or stuck.
+"""Outputs that are constant while the plant moves: held or interpolated between samples, or stuck.
 
 Our own rule: noise of one quantisation step [1]_ rarely repeats a value, a held output does so most
 of the time.
@@ -54,11 +54,12 @@ def held_share(output: FloatArray, fitted: FloatArray) -> float:
 
 
 def updates(output: FloatArray, inputs: FloatArray) -> BoolArray:
-    """Samples (N,) at which a held output is updated; all of them if it is not held.
+    """Samples (N,) at which a held or interpolated output is updated; all of them if it is neither.
 
     Changes of an output (N,), NaN where it is missing, that is updated every few samples have
     distances with a common divisor, or about equal ones; one that is stored when it has changed
-    enough has no small changes. Of these the first and last sample count as updates. Where an
+    enough has no small changes. Of these the first and last sample count as updates. One that is
+    interpolated has its bends at such distances, and more of them than its inputs move. Where an
     output is a monotonic function of one of the inputs (M, N) some samples before, its changes are
     the input's.
     """
@@ -68,10 +69,14 @@ def updates(output: FloatArray, inputs: FloatArray) -> BoolArray:
     # Steps of one size are those of a converter, which an even ramp passes at equal distances.
     if at.size < _FEWEST or np.ptp(sizes) <= rounding or _static(output, inputs, at, rounding):
         return ~new
-    period = int(np.gcd.reduce(np.diff(at)))
-    if period > 1 and at.size >= _FEWEST_UPDATES:
-        new[at[0] % period :: period] = True
-        return new
+    bends = 1 + np.flatnonzero(np.abs(np.diff(output, 2)) > 2 * rounding)
+    if bends.size <= 2 * np.count_nonzero(np.diff(inputs).any(axis=0)):
+        bends = at  # those of an integrator
+    for some in (at, bends):
+        period = int(np.gcd.reduce(np.diff(some)))
+        if period > 1 and some.size >= _FEWEST_UPDATES:
+            new[some[0] % period :: period] = True
+            return new
     new[at], new[0], new[-1] = True, True, True
     # Values at an end of the range are those of a limit, and before the first change it is at rest.
     inside = (output > np.nanmin(output)) & (output < np.nanmax(output))

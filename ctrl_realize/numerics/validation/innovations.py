@@ -26,11 +26,13 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
+from scipy.signal import lfilter
 from scipy.special import fdtrc
 
 from ..arrays import FloatArray, IntArray, unit_columns
 from ..constants import LEAST_FREEDOM, SMALLEST
 from ..rules import Rule
+from ..signals.correlation import autoregression
 from ..signals.noise import mad_sigma, quantisation_step
 
 RARE = 1e-4
@@ -70,6 +72,10 @@ _SINGLE = 0.9
 """Part of the moves of such an input that are a single step; those of a set point are more."""
 _PIECES = 6
 """Means of the past input whose products are asked about."""
+_PARTS, _REACH = 20, 4
+"""Means of the past input that may explain a residual, over so many parts of a quarter of a record.
+Of 27 simulated records of plants with a second path or a recycle, of which 16 miss the dead time,
+11 were below 1e-4; of 86 of other plants, in white and slow noise, none was below 0.02."""
 _WILD = 3.0
 """Standard deviations at which innovations are cut: set-points move an input more than noise."""
 _SPARSE = 0.05
@@ -262,6 +268,27 @@ def nonlinear_chance(output: FloatArray, drive: FloatArray, past: int) -> tuple[
         return 1.0, 0.0
     first = 2 + _PIECES
     return _chance(left[:, first:], left[:, 0], left[:, 2:first], rank)
+
+
+def misfit_chance(residual: FloatArray, drive: FloatArray) -> float:
+    """P-value of the dependence of the residual of a model on the past input.
+
+    Means of the input over parts of a quarter of the record, made white with the residual: further
+    back than a test of single lags reaches (Ljung, System Identification, 2nd ed., section 16.6).
+
+    Parameters
+    ----------
+    residual, drive : ndarray, shape (N,)
+    """
+    count = residual.size
+    width = max(count // _REACH // _PARTS, 1)
+    sums = np.append(np.zeros(width * _PARTS + 1), np.cumsum(drive - drive[0]))
+    ends = [sums[width * i :][:count] for i in range(_PARTS, -1, -1)]
+    parts = [late - early for late, early in pairwise(ends)]
+    both = np.stack([residual, np.ones(count), np.arange(count) / count, *parts], axis=1)
+    filter_ = np.append(1.0, -autoregression(residual, OWN_PAST))
+    white = np.asarray(lfilter(filter_, [1.0], both, axis=0)[filter_.size :])
+    return _chance(white[:, 3:], white[:, 0], white[:, 1:3], 0)[0]
 
 
 def _past(output: FloatArray, drive: FloatArray, past: int, ahead: int) -> _Past | None:

@@ -54,6 +54,34 @@ def test_a_late_load_is_told_and_taken_out_of_the_gain(size, lags):
     assert fit.interval[0] <= DEAD_TIME <= fit.interval[1]
 
 
+def test_a_late_part_of_the_response_to_one_step_may_be_the_plant_s_own():
+    # half of the gain comes by a second path, which is 6 lags longer
+    paths = [np.where(TIME - late < STEP, 0.0, 1.0) for late in (DEAD_TIME, DEAD_TIME + 420)]
+    noise = 0.05 * np.random.default_rng(3).standard_normal(SAMPLES)
+    output = 60 + 3 * GAIN * lagged(sum(paths), *LAGS) + noise
+    fit = cr.identify(cr.Record(TIME, np.where(TIME < STEP, 40.0, 46.0), output)).fit
+    _, gain, tuning = fit.verdicts
+    assert gain.level == "no"
+    assert tuning.level != "good"
+    low, high = fit.gain_interval
+    assert low <= GAIN / 2 <= GAIN <= high
+    (flag,) = told(fit)
+    assert "one step cannot tell" in str(flag)
+
+
+def test_a_load_that_does_not_follow_another_step_is_no_part_of_the_plant():
+    steps = np.where(TIME < STEP, 0.0, 1.0) - np.where(STEP + 500 > TIME, 0.0, 2.0)
+    delayed = np.interp(TIME - DEAD_TIME, TIME, steps)
+    load = 0.4 * lagged(np.where(STEP + 350 > TIME, 0.0, 1.0), *LAGS)
+    noise = 0.05 * np.random.default_rng(4).standard_normal(SAMPLES)
+    output = 6 * GAIN * (lagged(delayed, *LAGS) + load) + noise
+    fit = cr.identify(cr.Record(TIME, 40 + 6 * steps, output)).fit
+    (flag,) = told(fit)
+    assert "cut the record" in str(flag)
+    low, high = fit.gain_interval
+    assert low <= GAIN <= high < 1.05 * GAIN
+
+
 def test_a_step_of_a_coarse_converter_is_no_load():
     # 1.8 degC, rounded to 0.1: a load of 0.088 took the gain away
     fit = cr.fit_output_error(cr.bench.heater().step_record(2, rng=3)).fit
@@ -115,7 +143,7 @@ def test_the_flag_names_the_time_on_the_clock_of_the_record():
     fit = cr.identify(later, structures="P2D").fit
     (flag,) = told(fit)
     assert abs(fit.estimate.load.time - 600.0) < 0.02 * TIME[-1]
-    assert f"cut the record before {1000 + fit.estimate.load.time:.4g} s" in str(flag)
+    assert f"from {1000 + fit.estimate.load.time:.4g} s on" in str(flag)
 
 
 def test_columns_of_a_load_are_the_derivatives_of_its_response():

@@ -118,7 +118,7 @@ def _codes(record: Record, signal: FloatArray, limit: float) -> tuple[IntArray, 
 
 
 def at_updates(record: Record) -> tuple[Record, tuple[Flag, ...]]:
-    """Leave out samples that repeat an output between two of its updates, and tell it."""
+    """Leave out samples between two updates of an output, and tell it."""
     output = np.ravel(record.output)
     new = updates(output, np.atleast_2d(record.input))
     if not np.any(record.seen & ~new) or not Rule.REPEATS.on:
@@ -128,7 +128,12 @@ def at_updates(record: Record) -> tuple[Record, tuple[Flag, ...]]:
     if count < FEWEST_SAMPLES:
         return record, (flagged("held_output.few", count=count, hold=longest),)
     if np.ptp(apart) == 0:
-        flag = flagged("repeats_left_out", period=int(apart[0]), time=longest)
+        lines = np.nanmedian(np.abs(np.diff(output))) > 0  # most samples differ from the last
+        flag = flagged(
+            "repeats_left_out.lines" if lines else "repeats_left_out",
+            period=int(apart[0]),
+            time=longest,
+        )
     else:
         band = np.nanmin(np.abs(np.diff(output[new]))[:-1])
         flag = flagged("repeats_left_out.seldom", count=count, band=band, hold=longest)
