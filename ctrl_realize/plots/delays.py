@@ -27,10 +27,7 @@ def estimate_of(system: DelayedStateSpace) -> float:
 def interval_of(system: DelayedStateSpace) -> tuple[float, float] | None:
     """Return the interval of a model's dead time in s; None if its fit has none."""
     interval = None if system.fit is None else system.fit.dead_time_interval
-    if interval is None:
-        return None
-    low, high = interval
-    return (low, high) if np.isfinite(low) and np.isfinite(high) else None
+    return interval if interval is not None and np.isfinite(interval).all() else None
 
 
 def mark_dead_time(axes: Axes, system: DelayedStateSpace, factor: float) -> None:

@@ -40,13 +40,8 @@ class Curve:
     response: ComplexArray
     phase_deg: FloatArray
     coherence: FloatArray | None
+    good: BoolArray
     measured: bool
-
-    @property
-    def good(self) -> BoolArray:
-        """Coherent points; all of them if none is, or if the coherence is not known."""
-        good = _coherent(self.coherence)
-        return np.ones(self.frequency_hz.size, dtype=np.bool_) if good is None else good
 
 
 def curves_of(
@@ -68,10 +63,10 @@ def curves_of(
     ]
     delay = dead_time if dead_time is not None else delays[0] if delays else 0.0
     curves = [_curve(item, grid, delay) for item in items]
-    nameless = [curve for curve in curves if re.fullmatch(r"sys\[\d+\]", curve.label)]
-    if len(nameless) == 1:  # python-control's default name
-        place = curves.index(nameless[0])
-        curves[place] = replace(nameless[0], label="model")
+    # python-control's default names
+    nameless = [k for k, one in enumerate(curves) if re.fullmatch(r"sys\[\d+\]", one.label)]
+    if len(nameless) == 1:
+        curves[nameless[0]] = replace(curves[nameless[0]], label="model")
     return _aligned(curves)
 
 
@@ -97,30 +92,28 @@ def _curve(item: Any, grid: FloatArray, delay: float) -> Curve:
     else:
         step = float(item.dt) if item.isdtime(strict=True) else 0.0
         frequency = grid if step == 0 else grid[grid <= 0.5 / step]
-        response = np.asarray(item(_points(frequency, step))).reshape(-1)
+        s = 2j * np.pi * frequency
+        response = np.ravel(item(np.exp(s * step) if step else s))
         coherence = None
-    phase = np.degrees(_phase(response, 2 * np.pi * frequency, delay, _coherent(coherence)))
+    good = _coherent(coherence, frequency.size)
+    phase = np.degrees(_phase(response, 2 * np.pi * frequency, delay, good))
     # A fitted curve is a model, even if only its response is known.
     measured = isinstance(item, ct.FrequencyResponseData) and not item.name.startswith(FITTED)
-    return Curve(item.name or "measured", frequency, response, phase, coherence, measured)
+    return Curve(item.name or "measured", frequency, response, phase, coherence, good, measured)
 
 
-def _coherent(coherence: FloatArray | None) -> BoolArray | None:
-    """Mark coherent points; None if all are to be taken, because none is, or it is not known."""
-    if coherence is None:
-        return None
-    good = coherence >= TRUSTED_COHERENCE
-    return good if good.any() else None
+def _coherent(coherence: FloatArray | None, size: int) -> BoolArray:
+    """Mark coherent points; all of them if none is, or if the coherence is not known."""
+    good = np.zeros(size, dtype=np.bool_) if coherence is None else coherence >= TRUSTED_COHERENCE
+    return good if good.any() else ~good
 
 
-def _phase(
-    response: ComplexArray, omega: FloatArray, delay: float, good: BoolArray | None
-) -> FloatArray:
+def _phase(response: ComplexArray, omega: FloatArray, delay: float, good: BoolArray) -> FloatArray:
     """Unwrap the phase of coherent points; others get the turn that is nearest to these.
 
     Noise has no phase that could be unwrapped, and must not turn that of points beyond it.
     """
-    if good is None or good.all():
+    if good.all():
         return unwrap_with_dead_time(omega, response, delay)
     known = unwrap_with_dead_time(omega[good], response[good], delay)
     near = np.interp(omega, omega[good], known + omega[good] * delay) - omega * delay
@@ -135,8 +128,7 @@ def trusted_band(items: Sequence[Any]) -> tuple[float, float] | None:
     for item in items:
         if isinstance(item, ct.FrequencyResponseData):
             points = measured_points(item)
-            good = _coherent(points.coherence)
-            if good is not None and not good.all():
+            if not _coherent(points.coherence, points.frequency_hz.size).all():
                 try:
                     trusted, _ = trusted_points(points, TRUSTED_COHERENCE, None)
                 except DataError:  # single points only
@@ -144,11 +136,6 @@ def trusted_band(items: Sequence[Any]) -> tuple[float, float] | None:
                 inside = points.frequency_hz[trusted]
                 return float(inside[0]), float(inside[-1])
     return None
-
-
-def _points(frequency_hz: FloatArray, step: float) -> ComplexArray:
-    s = 2j * np.pi * frequency_hz
-    return np.asarray(np.exp(s * step) if step else s, dtype=np.complex128)
 
 
 def _aligned(curves: list[Curve]) -> list[Curve]:

@@ -6,10 +6,8 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import control as ct
-import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.figure import FigureBase
 
 from .._checks import check_type, positive
 from .._wording import in_time
@@ -66,8 +64,10 @@ def margins_plot(
     frequency = omega / HERTZ
     gain = decibel(np.abs(values))
     phase = np.degrees(np.unwrap(np.angle(values)))
-    with style.context():
-        gain_ax, phase_ax, nyquist = _three(ax)
+    verdict = "stable" if result.stable else "UNSTABLE"
+    with style.canvas(
+        ax, 3, mosaic="AC;BC", size=(9.6, 5.4), title=title, default_title=f"Closed loop {verdict}"
+    ) as (gain_ax, phase_ax, nyquist):
         drawn = [gain_ax.semilogx(frequency, gain, color=style.MODEL)]
         drawn.append(phase_ax.semilogx(frequency, phase, color=style.MODEL))
         gain_ax.axhline(0, color=style.INPUT, linewidth=1)
@@ -82,8 +82,6 @@ def margins_plot(
         gain_ax.set_ylim(bottom=max(LOWEST_GAIN, float(gain.min())))
         shown = phase[omega <= high]
         phase_ax.set_ylim(float(shown.min()) - 20, float(shown.max()) + 20)
-        verdict = "stable" if result.stable else "UNSTABLE"
-        style.put_title(gain_ax, ax, title, f"Closed loop {verdict}")
         return style.finished(
             [gain_ax, phase_ax, nyquist], drawn, columns=3, legends=(0, 1, 2), loc="lower left"
         )
@@ -99,15 +97,6 @@ def _shown_band(result: Margins) -> tuple[float, float]:
     ends = ends[np.isfinite(ends) & (ends > 0)]
     top = 4 * float(ends.max()) if ends.size else float(omega[-1])
     return max(float(omega[0]), top / 1e4), min(top, float(omega[-1]))
-
-
-def _three(ax: style.AxesLike) -> list[Axes]:
-    """Arrange gain above phase, with the Nyquist curve beside them; given axes are kept."""
-    if ax is not None and not isinstance(ax, FigureBase):
-        return style.axes_for(ax, 3)
-    figure = plt.figure(figsize=(9.6, 5.4), layout="constrained") if ax is None else ax
-    grid = figure.add_gridspec(2, 2)
-    return [figure.add_subplot(place) for place in (grid[0, 0], grid[1, 0], grid[:, 1])]
 
 
 def _mark_gain_margin(axes: Any, result: Margins) -> None:
@@ -251,23 +240,16 @@ def _draw_others(
     steps: tuple[float, float],
 ) -> None:
     """Draw the band of the responses of stable loops, and the others as lines within its scale."""
-    stable = [margins(one, controller).stable for one in plants]
-    inside = [
-        _linear_signals(one, controller, time.size, steps)
-        for one, good in zip(plants, stable, strict=True)
-        if good
-    ]
-    for one, good in zip(plants, stable, strict=True):
-        if not good:
-            for where, signal in zip(
-                axes, _simulated(one, controller, time.size, steps, {}), strict=True
-            ):
-                looks: dict[str, Any] = {"color": style.TRUTH, "lw": 0.8, "scaley": not inside}
-                where.plot(time, signal, **looks)
+    stable = [one for one in plants if margins(one, controller).stable]
+    inside = [_linear_signals(one, controller, time.size, steps) for one in stable]
+    for one in plants:
+        if one not in stable:
+            signals = _simulated(one, controller, time.size, steps, {})
+            for where, signal in zip(axes, signals, strict=True):
+                where.plot(time, signal, color=style.TRUTH, lw=0.8, scaley=not inside)
     if inside:
-        for where, signals in zip(axes, zip(*inside, strict=True), strict=True):
-            low, high = np.min(signals, axis=0), np.max(signals, axis=0)
-            looks = {"color": style.BAND, "alpha": 0.35, "lw": 0}
+        looks: dict[str, Any] = {"color": style.BAND, "alpha": 0.35, "lw": 0}
+        for where, low, high in zip(axes, np.min(inside, 0), np.max(inside, 0), strict=True):
             where.fill_between(time, low, high, label="models that fit as well", **looks)
 
 

@@ -85,6 +85,7 @@ def axes_for(
     heights: Sequence[float] | None = None,
     columns: int = 1,
     sharex: bool = True,
+    mosaic: str | None = None,
 ) -> list[Axes]:
     """Return the axes to draw in: the given ones, or new ones.
 
@@ -100,6 +101,8 @@ def axes_for(
         Relative heights of the rows.
     sharex : bool, default True
         Whether the rows share their x axis.
+    mosaic : str, optional
+        Another arrangement of the axes A, B, ..., as in matplotlib.
 
     Raises
     ------
@@ -109,6 +112,8 @@ def axes_for(
     needed = rows * columns
     if ax is None or isinstance(ax, FigureBase):
         figure = plt.figure(figsize=size, layout="constrained") if ax is None else ax
+        if mosaic is not None:
+            return [one for _, one in sorted(figure.subplot_mosaic(mosaic).items())]
         shared: Any = "col" if sharex else False
         return list(
             figure.subplots(rows, columns, squeeze=False, sharex=shared, height_ratios=heights).flat
@@ -120,13 +125,6 @@ def axes_for(
             "Figure, or None)"
         )
     return given
-
-
-def put_title(axes: Axes, ax: AxesLike, title: str | None, default: str) -> None:
-    """Set the title of a new figure; one made by the caller is not changed."""
-    text = default if title is None else title
-    if text and ax is None:
-        axes.set_title(plain(text), loc="left")
 
 
 @contextmanager
@@ -147,7 +145,9 @@ def canvas(
     with context():
         axes = axes_for(ax, rows, **layout)
         yield axes
-        put_title(axes[0], ax, title, default_title)
+        text = default_title if title is None else title
+        if text and ax is None:
+            axes[0].set_title(plain(text), loc="left")
 
 
 def finished(

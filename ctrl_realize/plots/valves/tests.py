@@ -124,13 +124,10 @@ def _draw_signature(axes: Axes, report: ValveReport, looks: dict[str, Any]) -> l
     lines: list[Line2D] = []
     curve = report.curve
     for way, (colour, marker, line) in _WAYS.items():
-        values = None if curve is None else getattr(curve, way)
-        if curve is None or values is None or not np.isfinite(values).any():
-            continue
-        own = {"color": colour, "linestyle": line, "marker": marker, "markersize": 3.5,
-               "linewidth": 1.2, "label": way, **looks}  # fmt: skip
-        if np.isfinite(values).sum() > 1:
-            lines += axes.plot(curve.command, values - curve.command, **own)
+        if curve is not None and np.isfinite(getattr(curve, way)).sum() > 1:
+            own = {"color": colour, "linestyle": line, "marker": marker, "markersize": 3.5,
+                   "linewidth": 1.2, "label": way, **looks}  # fmt: skip
+            lines += axes.plot(curve.command, getattr(curve, way) - curve.command, **own)
     if not lines:
         style.no_curve(axes, "needs a slow ramp, or several levels in one record")
     axes.set(xlabel="command [% of span]", ylabel="position - command [%]")
