@@ -116,8 +116,8 @@ def figures(system: DelayedStateSpace, frf: Any) -> list[JSON]:
     if (models := fit.plausible_models) is not None:
         sketches.append(sketch("plausible", plots.plausible_plot, models, size=(6.2, 6.4)))
     sketches += frf_sketches([system], frf)
-    pages = [one.on_page() for one in sketches]
-    return [vars(one) | {"svg": str(one.svg)} for one in pages]
+    shown = ("key", "title", "caption", "svg")
+    return [{name: str(getattr(one, name)) for name in shown} for one in sketches]
 
 
 def plan_view(plan: ExperimentPlan, system: DelayedStateSpace) -> JSON:

@@ -302,7 +302,7 @@ def write_report(
         subtitle=subtitle,
         verdict=verdict,
         version=version_of("ctrl-realize"),
-        figures=[sketch.on_page() for sketch in sketches],
+        figures=sketches,
         tables=[*tables, *below],
         calls=calls,
         simulated=simulated,

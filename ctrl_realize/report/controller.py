@@ -12,6 +12,7 @@ from ..data.shown_units import in_shown_units
 from ..delayed import DelayedStateSpace
 from ..design.tuning.controller import PIDController
 from ..design.tuning.forms import PIDForm
+from ..plots.delays import estimate_of
 from .page import Column, Controller, Row, Table
 from .sketches import Sketch, sketch
 from .verdict import Level
@@ -45,23 +46,20 @@ def _unsafe_if(system: DelayedStateSpace, pid: PIDController) -> Iterator[str]:
     check = pid.check
     if check is None:
         return
-    found, fit = check.margins, system.fit
+    found = check.margins
     if np.isfinite(found.gain_margin):
         word = "as large" if found.gain_margin > 1 else "what it is"
         yield (
             f"the gain of the plant, or of the controller, is {found.gain_margin:.2g} times {word}"
         )
-    wait = float(system.dead_time)
-    if fit is not None and fit.dead_time is not None:
-        wait = float(fit.dead_time)
     if np.isfinite(found.delay_margin):
         others = "longer dead time, a filter"
         if system.dt:
             with times_in("s"):  # as cycle times are set
                 others += f", a slower cycle than {in_time(float(system.dt), 4)}"
         yield (
-            f"{in_time(found.delay_margin)} of delay come in addition to the {in_time(wait)} of "
-            f"the model: a {others}"
+            f"{in_time(found.delay_margin)} of delay come in addition to the "
+            f"{in_time(estimate_of(system))} of the model: a {others}"
         )
     unstable = sum(not np.isfinite(corner.ms) for corner in check.corners)
     if unstable:
@@ -105,7 +103,7 @@ def controller_of(
         entered=entered,
         facts=told,
         unsafe=unsafe_if(system, pid),
-        figure=loop_sketch(system, pid).on_page(),
+        figure=loop_sketch(system, pid),
     )
 
 

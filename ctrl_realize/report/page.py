@@ -17,6 +17,7 @@ from markupsafe import Markup
 
 from .._facts import facts
 from ..io.atomic import write_text
+from .sketches import Sketch
 from .verdict import Level, Verdict
 
 # control characters, and those that change the direction of writing, may occur in file names
@@ -27,16 +28,6 @@ _TABLES = facts("report/tables.toml")
 
 
 @dataclass(frozen=True)
-class PageFigure:
-    """A figure with its texts; `svg` is generated and not escaped."""
-
-    key: str
-    title: str
-    caption: str
-    svg: Markup
-
-
-@dataclass(frozen=True)
 class Column:
     """Column heading.
 
@@ -44,7 +35,7 @@ class Column:
     ----------
     name : str
         With its unit.
-    kind : {"text", "name", "number", "mono"}
+    kind : {"text", "label", "name", "number", "mono"}
         Format of the cells: numbers right-aligned, ``"mono"`` in a fixed-width font.
 
     Examples
@@ -89,9 +80,7 @@ class Table:
         Heading above the table.
     rows : tuple of Row
     columns : tuple of Column
-        Headings; empty for a table without.
-    kinds : tuple of str
-        Kinds of the columns of a table without headings, as in `Column`.
+        Without names if the table has no headings.
     note : str
         A sentence below.
     folded : bool
@@ -103,21 +92,15 @@ class Table:
     >>> columns = (Column("record", "name"), Column("delay [samples]", "number"))
     >>> rows = (Row(("valve_1", "37.1"), "best"), Row(("valve_2", "38.0")))
     >>> table = Table("Delays", rows, columns, note="two of forty")
-    >>> table.kind_of(1), len(table.rows)
+    >>> table.columns[1].kind, len(table.rows)
     ('number', 2)
     """
 
     title: str
     rows: tuple[Row, ...]
-    columns: tuple[Column, ...] = ()
-    kinds: tuple[str, ...] = ()
+    columns: tuple[Column, ...]
     note: str = ""
     folded: bool = False
-
-    def kind_of(self, position: int) -> str:
-        """Return the kind of the column at `position`."""
-        kinds = tuple(column.kind for column in self.columns) or self.kinds
-        return kinds[position] if position < len(kinds) else "text"
 
 
 @dataclass(frozen=True)
@@ -130,7 +113,7 @@ class Controller:
     entered: Table
     facts: tuple[tuple[str, str], ...]
     unsafe: tuple[str, ...]
-    figure: PageFigure
+    figure: Sketch
 
 
 @dataclass(frozen=True)
@@ -144,8 +127,7 @@ class Page:
         Verdict at the top, from `verdict_of`.
     version : str
         Version of the package, for the footer.
-    figures : sequence of PageFigure
-        From `Sketch.on_page`.
+    figures : sequence of Sketch
     tables : sequence of Table
     calls : sequence of (name, text)
         Commands that reproduce the result.
@@ -175,7 +157,7 @@ class Page:
     subtitle: str
     verdict: Verdict
     version: str
-    figures: Sequence[PageFigure] = ()
+    figures: Sequence[Sketch] = ()
     tables: Sequence[Table] = ()
     calls: Sequence[tuple[str, str]] = field(default=())
     simulated: bool = False
@@ -208,8 +190,8 @@ def pairs(
     >>> [row.cells for row in table.rows]
     [('shaker', '4.2 kg'), ('room', '21 °C')]
     """
-    kinds = ("label", "mono" if mono else "text")
-    return Table(title, tuple(Row(tuple(row)) for row in rows), kinds=kinds, folded=folded)
+    columns = Column("", "label"), Column("", "mono" if mono else "text")
+    return Table(title, tuple(Row(tuple(row)) for row in rows), columns, folded=folded)
 
 
 def headed(key: str, rows: Iterable[Row], **words: Any) -> Table:

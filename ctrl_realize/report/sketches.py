@@ -30,7 +30,6 @@ from ..identification.step.steps import unit_step
 from ..io.atomic import replaced_when_complete
 from ..plots.fits import MOST_BESIDE, each_record_rows, evidence_height
 from ..results import ModelFit
-from .page import PageFigure
 from .svg import inline_svg, laid_out, missing_glyphs_allowed
 
 MOST_DRAWN = 60
@@ -74,11 +73,11 @@ class Sketch:
         """The figure, drawn once."""
         return laid_out(self.draw, self.size)
 
-    def on_page(self) -> PageFigure:
-        """Convert it for a page."""
-        key = self.key.replace("_", "-")
-        svg = inline_svg(self.figure, key, f"{self.title}. {self.caption}")
-        return PageFigure(key, self.title, self.caption, Markup(svg))
+    @property
+    def svg(self) -> Markup:
+        """The figure for a page, which does not escape it."""
+        described = f"{self.title}. {self.caption}"
+        return Markup(inline_svg(self.figure, self.key.replace("_", "-"), described))
 
     def save(self, path: str | os.PathLike[str], *, dpi: float = 150) -> None:
         """Save it to a file, atomically; the extension determines the format."""
