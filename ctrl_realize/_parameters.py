@@ -20,22 +20,14 @@ SECONDS: dict[str, float] = {"ms": 1e-3, "s": 1.0, "min": 60.0, "h": 3600.0, "da
 """Seconds in a unit of time of results."""
 
 _LABELS = {
-    "gain": "gain",
-    "dead_time": "dead time",
-    "lag": "lag",
     "pair_time": "time constant of the pair",
     "pair_damping": "damping of the pair",
-    "lead": "lead",
     "zero_time": "time constant of the zeros",
     "zero_damping": "damping of the zeros",
-    "slew_rate": "slew rate",
-    "slew_rate_opening": "slew rate opening",
-    "slew_rate_closing": "slew rate closing",
-    "dead_band": "dead band",
     "travel_low": "lower end of travel",
     "travel_high": "upper end of travel",
-    "flow_at": "flow at",
 }
+"""Beginnings of names that are not the words of the label."""
 
 _LETTERS = {"dead": "L", "lag": "T", "pair_time": "Tw", "lead": "Tz", "zero_time": "Tz"}
 """Beginning of a time's name -> its letter beside a transfer function, as in MATLAB's process
@@ -98,13 +90,11 @@ class Parameter:
     @property
     def label(self) -> str:
         """Name in words."""
-        base, _, number = self.name.rpartition("_")
-        if base == "flow_at":
-            return f"{_LABELS[base]} {number}"
-        if base in _LABELS and number.isdigit():
-            alone = number == "1" and not base.startswith("l")  # one pair, but several lags
-            return _LABELS[base] + ("" if alone else f" {number}")
-        return _LABELS.get(self.name, self.name)
+        name = self.name
+        for begin, words in _LABELS.items():
+            if name.startswith(begin):  # one pair, but several lags
+                name = words + name.removeprefix(begin).removesuffix("_1")
+        return name.replace("_", " ")
 
     def in_time_unit(self, unit: str) -> Parameter:
         """Convert from seconds to ``"ms"``, ``"s"``, ``"min"``, ``"h"`` or ``"day"``."""
@@ -227,13 +217,11 @@ def formula(parameters: Sequence[Parameter], integrators: int = 0, time_unit: st
     if dead_time is not None and dead_time.value > 0:
         head.append(f"e^(-{_short(dead_time)} s)")
     above = _factors(values, "lead", "zero")
-    below = ["s" if integrators == 1 else f"s^{integrators}"] * (integrators > 0)
-    below += _factors(values, "lag", "pair")
+    power = "" if not integrators else "s" if integrators == 1 else f"s^{integrators}"
+    lags = _factors(values, "lag", "pair")
     text = " ".join([*head, *above])
-    if below:
-        joined = "".join(below[1:] if below[0].startswith("s") else below)
-        joined = f"{below[0]} {joined}".strip() if below[0].startswith("s") else joined
-        text += f" / {joined}" if len(below) == 1 else f" / ({joined})"
+    if below := f"{power} {''.join(lags)}".strip():
+        text += f" / ({below})" if len(lags) + bool(power) > 1 else f" / {below}"
     if not known:
         text += f", gain K not determined: {number}{said}"
     if time_unit != "s":

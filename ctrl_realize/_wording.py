@@ -214,11 +214,9 @@ def numbers_alike(values: Iterable[float], low: float, high: float) -> list[str]
     several = [float(value) for value in values]
     largest, width = max(abs(low), abs(high)), high - low
     if largest == 0 or not 1e-3 < largest < 1e6:
-        digits = (
-            6
-            if width <= 0 or largest == 0
-            else int(np.clip(2 + np.floor(np.log10(largest)) - np.floor(np.log10(width)), 3, 6))
-        )
+        digits = 6
+        if width > 0 and largest > 0:
+            digits = int(np.clip(2 + np.floor(np.log10(largest)) - np.floor(np.log10(width)), 3, 6))
         return [f"{value:.{digits}g}" for value in several]
     least = (4 if width <= 0 else 3) - 1 - int(np.floor(np.log10(largest)))
     # a width of 0.9999..., computed from 1, counts as 1
