@@ -16,6 +16,7 @@ from .imperfections import band_limited_noise, converted, drive_spikes
 STROKE_MM = 2.0
 AD_RANGE_V = 10.0
 VOLT_PER_MA = 0.25
+MM_PER_MA = STROKE_MM / (paper.SETUP.current_range[1] - paper.SETUP.current_range[0])
 
 
 def held_input(values: ArrayLike, name: str, limits: tuple[float, float], unit: str) -> FloatArray:

@@ -9,8 +9,10 @@ from typing import Literal
 import numpy as np
 from scipy.interpolate import CubicSpline
 
+from .. import paper
 from ..actuators import Actuator, Series
 from ..numerics.arrays import FloatArray
+from .instruments import MM_PER_MA, STROKE_MM
 from .linear import Core, response_to_held_input, response_to_started_sine
 
 _OVERSAMPLING = 8
@@ -27,13 +29,8 @@ class Motion:
     ----------
     whole, before, after : (A, B, C, D)
         From current to shown displacement, to the stem, and from the stem on.
-    gain : float
-        Static gain in mm per mA.
-    closed : float
-        Displacement at the lower end of the stroke, mm above that at zero current.
-    stroke : float
-        In mm; the unit of the actuator is a percent of it.
     actuator : tuple of Actuator
+        Its unit is a percent of the stroke.
     place : {"stem", "input"}
         Where it acts.
     """
@@ -41,9 +38,6 @@ class Motion:
     whole: Core
     before: Core
     after: Core
-    gain: float
-    closed: float
-    stroke: float
     actuator: tuple[Actuator, ...]
     place: Literal["stem", "input"]
 
@@ -52,7 +46,7 @@ class Motion:
         if not self.actuator:
             return response_to_held_input(self.whole, current, dt, dead_time)
         if self.place == "input":
-            acting = self._through(self.gain * current, dt) / self.gain
+            acting = self._through(MM_PER_MA * current, dt) / MM_PER_MA
             return response_to_held_input(self.whole, acting, dt, dead_time)
         fine = dt / _OVERSAMPLING
         often = np.repeat(current, _OVERSAMPLING)
@@ -73,12 +67,12 @@ class Motion:
                 amplitude * response_to_started_sine(self.whole, omega, time, dead_time)
                 for dead_time in dead_times
             ]
-        middle = self.gain * mean
+        middle = MM_PER_MA * mean
         fine = float(time[1]) / _SINE_OVERSAMPLING
         often = fine * np.arange(time.size * _SINE_OVERSAMPLING, dtype=np.float64)
         if self.place == "input":
-            sine = middle + self.gain * amplitude * np.sin(omega * often)
-            shown = _passed(self.whole, self._through(sine, fine) / self.gain, fine)
+            sine = middle + MM_PER_MA * amplitude * np.sin(omega * often)
+            shown = _passed(self.whole, self._through(sine, fine) / MM_PER_MA, fine)
         else:
             stem = amplitude * response_to_started_sine(self.before, omega, often, 0.0)
             shown = _passed(self.after, self._through(middle + stem, fine), fine)
@@ -88,9 +82,9 @@ class Motion:
 
     def _through(self, stem: FloatArray, dt: float) -> FloatArray:
         """Pass a displacement through the actuator."""
-        percent = self.stroke / 100
-        moved = Series(self.actuator).simulate((stem - self.closed) / percent, dt)
-        return self.closed + percent * moved
+        closed, percent = MM_PER_MA * paper.SETUP.current_range[0], STROKE_MM / 100
+        moved = Series(self.actuator).simulate((stem - closed) / percent, dt)
+        return closed + percent * moved
 
 
 def _passed(core: Core, signal: FloatArray, dt: float) -> FloatArray:

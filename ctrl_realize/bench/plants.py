@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from .._checks import not_negative, positive, real
@@ -204,21 +202,12 @@ def flow_loop(
     return _plant("flow loop", **locals())
 
 
-@dataclass(frozen=True)
-class _Kind:
-    """What is measured, the steady state before a record, and the step from it."""
-
-    labels: tuple[str, str]
-    units: tuple[str, str]
-    steady_state: tuple[float, float]
-    amplitude: float
-
-
 _KINDS = {
-    "heater": _Kind(("power", "temperature"), ("%", "degC"), (20.0, 40.0), 30.0),
-    "tank": _Kind(("valve", "level"), ("%", "%"), (50.0, 30.0), 10.0),
-    "flow loop": _Kind(("valve", "flow"), ("%", "m3/h"), (40.0, 48.0), 10.0),
+    "heater": (("power", "temperature"), ("%", "degC"), (20.0, 40.0), 30.0),
+    "tank": (("valve", "level"), ("%", "%"), (50.0, 30.0), 10.0),
+    "flow loop": (("valve", "flow"), ("%", "m3/h"), (40.0, 48.0), 10.0),
 }
+"""Input and output, their units, the steady state before a record, and the step from it."""
 
 
 def _plant(
@@ -248,10 +237,11 @@ def _plant(
         positive(sizes[key], key, "time in s")
     if resolution is not None:
         positive(resolution, "resolution", "step in units of the output, or None")
-    kind, numbers = _KINDS[name], {key: float(value) for key, value in sizes.items()}
+    labels, units, steady_state, amplitude = _KINDS[name]
+    numbers = {key: float(value) for key, value in sizes.items()}
     dead_time = numbers.pop("dead_time")
     return Plant(
-        truth=PlantTruth(chain(parts, gain), dead_time, numbers["dt"], kind.units, name),
-        labels=kind.labels, steady_state=kind.steady_state, amplitude=kind.amplitude,
+        truth=PlantTruth(chain(parts, gain), dead_time, numbers["dt"], units, name),
+        labels=labels, steady_state=steady_state, amplitude=amplitude,
         input_range=(0.0, 100.0), resolution=resolution, drawn_noise=None, **numbers,
     )  # fmt: skip

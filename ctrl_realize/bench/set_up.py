@@ -10,7 +10,7 @@ from .._checks import integer, not_negative, one_of, positive, real
 from ..actuators import Actuator, Backlash
 from ..actuators.base import actuators_of
 from .control_valve import Valve
-from .instruments import STROKE_MM
+from .instruments import MM_PER_MA
 from .linear import butterworth, chain, lag, second_order_lag
 from .motion import Motion
 from .truth import ValveTruth
@@ -124,20 +124,16 @@ def valve(
     after = [] if lvdt_hz is None else [lag(lvdt_hz)]
     if given["anti_aliasing"] == "analog":
         after += butterworth(4, 1 / (2.56 * dt))
-    gain = STROKE_MM / (paper.SETUP.current_range[1] - paper.SETUP.current_range[0])
     # An ideal sensor still needs a state; this one is faster than anything that is sampled.
     sensed = after or [lag(1e3 / dt)]
-    whole_chain = chain(before + after, gain)
+    whole = chain(before + after, MM_PER_MA)
     of_motion = ("dead_time", "lag_hz", "actuator_hz", "damping", "lvdt_hz")
     return Valve(
-        truth=ValveTruth(matrices=whole_chain, dead_time=float(dead_time), dt=float(dt)),
+        truth=ValveTruth(matrices=whole, dead_time=float(dead_time), dt=float(dt)),
         _motion=Motion(
-            whole=whole_chain,
-            before=chain(before, gain),
+            whole=whole,
+            before=chain(before, MM_PER_MA),
             after=chain(sensed),
-            gain=gain,
-            closed=gain * paper.SETUP.current_range[0],
-            stroke=STROKE_MM,
             actuator=parts,
             place=given["actuator_at"],
         ),
