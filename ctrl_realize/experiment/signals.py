@@ -83,21 +83,15 @@ def _peak_one(spectrum: ComplexArray, count: int) -> FloatArray:
     return np.asarray(wave / np.abs(wave).max())
 
 
-KINDS: dict[str, tuple[Callable[[int, int], FloatArray], str]] = {
-    "steps": (steps, "held"),
-    "3-2-1-1": (three_two_one_one, "unit"),
-    "random binary": (random_binary, "clock period"),
-    "multisine": (multisine, "shortest period"),
-    "chirp": (chirp, "shortest period"),
+KINDS: dict[str, tuple[Callable[[int, int], FloatArray], str, float, int]] = {
+    "steps": (steps, "held", 1, 1),
+    "3-2-1-1": (three_two_one_one, "unit", 1 / 7, 1),
+    "random binary": (random_binary, "clock period", 1 / 6, 1),
+    "multisine": (multisine, "shortest period", 1 / 3, 4),
+    "chirp": (chirp, "shortest period", 1 / 3, 4),
 }
-"""Function of the samples of the test and of the number that is chosen, and its name."""
-
-
-LEAST = {
-    "steps": (1, 1), "3-2-1-1": (1 / 7, 1), "random binary": (1 / 6, 1),
-    "multisine": (1 / 3, 4), "chirp": (1 / 3, 4),
-}  # fmt: skip
-"""Smallest choice, in dead time and lags together, and in samples.
+"""Function of the samples of the test and of the number that is chosen, its name, and the smallest
+choice, in dead time and lags together, and in samples.
 
 Steps and 3-2-1-1 repeat after 2 and 14 units, and not within twice that time: a response that is
 late by a period would be the same but for its beginning. Others change no faster than a sixth: what
@@ -112,8 +106,7 @@ def shapes(count: int, slowest: float, *, returns: bool) -> Iterator[Shape]:
     the first with the other sign (inverse-repeat [1]_).
     """
     length, once = (count // 2, "up and down") if returns else (count, "one step")
-    for kind, (make, _) in KINDS.items():
-        part, samples = LEAST[kind]
+    for kind, (make, _, part, samples) in KINDS.items():
         least = max(part * slowest, samples)
         longest = length // (7 if kind == "3-2-1-1" else 1)
         wanted = {round(longest / _DOUBLED**i) for i in range(_MOST)}

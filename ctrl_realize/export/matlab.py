@@ -80,11 +80,10 @@ def to_matlab(
     elif isinstance(system, ProcessModel):
         text = _process(system, identifier(name or "plant", "plant", CALLED))
     elif isinstance(system, ContinuousModel | DelayedStateSpace):
-        core, named, dt = (
-            (system.core, system.core, "0")
-            if isinstance(system, ContinuousModel)
-            else (system.delay_free, system, _number(float(system.dt)))
-        )
+        if isinstance(system, ContinuousModel):
+            core, named, dt = system.core, system.core, "0"
+        else:
+            core, named, dt = system.delay_free, system, _number(float(system.dt))
         variable = identifier(name or str(named.name), "plant", CALLED)
         delays = list(system.input_delays), list(system.output_delays)
         text = _state_space(core, str(named.name), variable, dt, *delays)

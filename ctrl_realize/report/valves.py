@@ -101,15 +101,12 @@ def _verdict(result: ValveReport) -> Verdict:
 
 
 def _sketches(result: ValveReport) -> list[Sketch]:
-    panels: dict[str, dict[str, Any]] = {
-        "steps": {"panel": "steps"},
-        "t86": {"panel": "sizes"},
-        "dead_time": {"panel": "sizes", "metric": "dead_time"},
-        "gain": {"panel": "sizes", "metric": "gain"},
-        "loop": {"panel": "loop"},
-        "signature": {"panel": "signature"},
-    }
-    return [sketch(key, plots.valve_plot, result, **shown) for key, shown in panels.items()]
+    sketches = [sketch("steps", plots.valve_plot, result, panel="steps")]
+    for key in ("t86", "dead_time", "gain"):
+        sketches.append(sketch(key, plots.valve_plot, result, panel="sizes", metric=key))
+    for key in ("loop", "signature"):
+        sketches.append(sketch(key, plots.valve_plot, result, panel=key))
+    return sketches
 
 
 def _metric_table(result: ValveReport) -> Table:
