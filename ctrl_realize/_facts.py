@@ -9,6 +9,7 @@ from importlib import metadata
 from typing import Any
 
 
+@cache
 def facts(file: str) -> dict[str, Any]:
     """Read a table in a file of the package; lists become tuples.
 

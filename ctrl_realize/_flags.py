@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cache
-from typing import Any
 
 from ._facts import facts
 
@@ -37,11 +36,6 @@ class Flag:
         return self.message
 
 
-@cache
-def _table() -> dict[str, dict[str, Any]]:
-    return facts("flags.toml")
-
-
 def flagged(key: str, /, **values: object) -> Flag:
     """Make a flag from the words of the table, with `values` in them.
 
@@ -59,7 +53,7 @@ def flagged(key: str, /, **values: object) -> Flag:
     Flag(code='few_cycles', message='5.0 cycles of the oscillation; record at least 8')
     """
     code, _, case = key.partition(".")
-    return Flag(code, _table()[code][case or "words"].format(**values))
+    return Flag(code, facts("flags.toml")[code][case or "words"].format(**values))
 
 
 @cache
@@ -72,7 +66,8 @@ def marked(mark: str) -> frozenset[str]:
     >>> sorted(marked("wrong_dead_time"))
     ['delay_at_bound', 'no_delay_resolved', 'order_in_noise']
     """
-    return frozenset(code for code, row in _table().items() if mark in row.get("marks", ()))
+    table = facts("flags.toml")
+    return frozenset(code for code, row in table.items() if mark in row.get("marks", ()))
 
 
 def in_doubt(flag: Flag) -> bool:

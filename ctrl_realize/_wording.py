@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
-from functools import cache
 
 import numpy as np
 
@@ -291,11 +290,6 @@ def named(kind: str, name: str) -> str:
     return f"{kind} {name!r}" if name else f"the {kind}"
 
 
-@cache
-def _reasons() -> dict[str, dict[str, str]]:
-    return facts("choices.toml")
-
-
 def chosen(key: str, /, **values: object) -> str:
     """Say what was chosen automatically, and why, in the words of the table.
 
@@ -313,4 +307,4 @@ def chosen(key: str, /, **values: object) -> str:
     'order 1, relative degree 1: the only structure that was tried'
     """
     topic, _, choice = key.partition(".")
-    return _reasons()[topic][choice].format(**values)
+    return str(facts("choices.toml")[topic][choice]).format(**values)

@@ -8,15 +8,9 @@ from .._facts import facts
 from .info import DataFile, DatasetInfo
 
 
-def _file(reading: dict[str, Any] | None = None, **row: Any) -> DataFile:
-    # columns are lists, as for a reader
-    lists = {k: list(v) if isinstance(v, tuple) else v for k, v in (reading or {}).items()}
-    return DataFile(**row, reading=lists)
-
-
 def _info(name: str, row: dict[str, Any]) -> DatasetInfo:
-    files = tuple(_file(**file) for file in row.pop("files"))
-    return DatasetInfo(name=name, files=files, **{"dead_time_band": None, **row})
+    files = tuple(DataFile(**file) for file in row["files"])
+    return DatasetInfo(name=name, **{"dead_time_band": None, **row, "files": files})
 
 
 DATASETS = tuple(_info(name, row) for name, row in facts("datasets/catalogue.toml").items())

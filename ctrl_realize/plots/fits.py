@@ -226,15 +226,15 @@ def several_inputs_plot(
     with style.canvas(ax, 2, title=title, default_title=record.name) as (upper, lower):
         factor, unit = axis_time_unit(float(np.abs(record.time[[0, -1]]).max()), lower)
         time, looks = factor * record.time, {**style.model_looks(), "label": "model", **kwargs}
-        lines = [list(upper.plot(time, measured, color=style.MEASURED, lw=1.5, label="measured"))]
-        lines[0] += upper.plot(time, total + np.nanmean(measured - total), **looks)
-        lines.append([])
+        above = list(upper.plot(time, measured, color=style.MEASURED, lw=1.5, label="measured"))
+        above += upper.plot(time, total + np.nanmean(measured - total), **looks)
+        below: list[Line2D] = []
         for i, (name, response) in enumerate(zip(result.inputs, result.responses, strict=True)):
             own: dict[str, Any] = {"color": style.model_colour(i + 1), "label": plain(name, 30)}
-            lines[1] += lower.plot(time, response, **own)
+            below += lower.plot(time, response, **own)
         upper.set_ylabel(with_unit(record.output_labels[0], record.output_units[0]))
         lower.set(xlabel=f"time [{unit}]", ylabel="response to")
-        return style.finished([upper, lower], lines, legends=(0, 1), loc="above")
+        return style.finished([upper, lower], [above, below], legends=(0, 1), loc="above")
 
 
 def each_record_rows(count: int) -> int:

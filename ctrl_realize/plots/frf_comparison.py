@@ -182,18 +182,15 @@ def comparison_plot(
     ['gain error [dB]', 'phase error [deg]']
     """
     errors = (comparison.gain_error_db, comparison.phase_error_deg)
-    spread: tuple[FloatArray | None, FloatArray | None] = (None, None)
-    if comparison.std is not None:
-        relative = comparison.std / np.abs(comparison.measured)
-        # Of a complex error, half the power is in the gain and half in the phase.
-        half = relative / np.sqrt(2)
-        spread = (20 / np.log(10) * half, np.degrees(half))
+    units = 20 / np.log(10), 180 / np.pi  # dB and degrees of a small relative error
     looks = {"color": style.MODEL, "linewidth": 1.5, "label": "model - measured", **kwargs}
     with style.canvas(ax, 2, title=title, default_title=comparison.name, size=(8.0, 5.2)) as axes:
         lines = []
-        for one, error, std in zip(axes, errors, spread, strict=True):
+        for one, error, unit in zip(axes, errors, units, strict=True):
             mark_band(one, comparison.band_hz)
-            if std is not None:
+            if comparison.std is not None:
+                # Of a complex error, half the power is in the gain and half in the phase.
+                std = unit * comparison.std / np.abs(comparison.measured) / np.sqrt(2)
                 one.fill_between(
                     comparison.frequency_hz, -2 * std, 2 * std, color=style.NOISE, alpha=0.35,
                     linewidth=0, label="noise of the FRF (2 std)",

@@ -66,7 +66,7 @@ def margins_plot(
     phase = np.degrees(np.unwrap(np.angle(values)))
     verdict = "stable" if result.stable else "UNSTABLE"
     with style.canvas(
-        ax, 3, mosaic="AC;BC", size=(9.6, 5.4), title=title, default_title=f"Closed loop {verdict}"
+        ax, 3, beside=True, size=(9.6, 5.4), title=title, default_title=f"Closed loop {verdict}"
     ) as (gain_ax, phase_ax, nyquist):
         drawn = [gain_ax.semilogx(frequency, gain, color=style.MODEL)]
         drawn.append(phase_ax.semilogx(frequency, phase, color=style.MODEL))

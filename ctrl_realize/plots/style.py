@@ -85,7 +85,7 @@ def axes_for(
     heights: Sequence[float] | None = None,
     columns: int = 1,
     sharex: bool = True,
-    mosaic: str | None = None,
+    beside: bool = False,
 ) -> list[Axes]:
     """Return the axes to draw in: the given ones, or new ones.
 
@@ -101,8 +101,8 @@ def axes_for(
         Relative heights of the rows.
     sharex : bool, default True
         Whether the rows share their x axis.
-    mosaic : str, optional
-        Another arrangement of the axes A, B, ..., as in matplotlib.
+    beside : bool, default False
+        Whether the last one stands beside the others.
 
     Raises
     ------
@@ -112,8 +112,10 @@ def axes_for(
     needed = rows * columns
     if ax is None or isinstance(ax, FigureBase):
         figure = plt.figure(figsize=size, layout="constrained") if ax is None else ax
-        if mosaic is not None:
-            return [one for _, one in sorted(figure.subplot_mosaic(mosaic).items())]
+        if beside:
+            grid = figure.add_gridspec(rows - 1, 2)
+            places = [*(grid[row, 0] for row in range(rows - 1)), grid[:, 1]]
+            return [figure.add_subplot(place) for place in places]
         shared: Any = "col" if sharex else False
         return list(
             figure.subplots(rows, columns, squeeze=False, sharex=shared, height_ratios=heights).flat

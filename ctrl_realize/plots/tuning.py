@@ -6,7 +6,7 @@ import control as ct
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
-from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
+from matplotlib.ticker import LogLocator, MaxNLocator
 
 from ..design.models.balanced import BalancedReduction
 from ..design.models.process_model import ProcessModel
@@ -62,9 +62,8 @@ def pid_comparison_plot(
         axes.set_yscale("log")
         low, high = axes.get_ylim()
         few = high < 5 * low  # too few round numbers for a logarithmic axis
+        style.plain_logarithms(axes.yaxis)
         axes.yaxis.set_major_locator(MaxNLocator(5) if few else LogLocator(subs=(1.0, 2.0, 5.0)))
-        axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-        axes.yaxis.set_minor_formatter(NullFormatter())
         low, high = axes.get_xlim()
         # Room for the names, which stand to the right of their points.
         axes.set_xlim(low, high + 0.35 * (high - low))
