@@ -88,37 +88,34 @@ def valve_loop(
     0.667, 2.00 s
     """
     kind = one_of(process, "process", tuple(_TYPICAL))
-    typical = _TYPICAL[kind]
-    chosen = typical[0] if gain is None else real(gain, "gain", "gain of the process")
-    if chosen == 0:
+    typical_gain, lag, typical_wait = _TYPICAL[kind]
+    gain = real(typical_gain if gain is None else gain, "gain", "gain of the process")
+    if gain == 0:
         raise OptionError("gain=0; expected a process that responds to its valve")
     if kind == "integrating" and time_constant is not None:
         raise OptionError("an integrating process has no time_constant; expected None")
-    lag = typical[1]
     if time_constant is not None:
         lag = positive(time_constant, "time_constant", "time in s")
-    if dead_time is None:
-        dead_time = typical[2]
-    not_negative(dead_time, "dead_time", "dead time in s")
+    wait = typical_wait if dead_time is None else dead_time
+    wait = not_negative(wait, "dead_time", "dead time in s")
     positive(dt, "dt", "sample time in s")
     positive(tightness, "tightness", "factor")
     not_negative(noise, "noise", "standard deviation in %")
     if oscillation is not None:
-        amplitude, period = band(oscillation, "oscillation", "amplitude in %, period in s")
-        positive(amplitude, "oscillation", "amplitude in %")
-        positive(period, "oscillation", "period in s")
-        oscillation = (amplitude, period)
+        oscillation = band(oscillation, "oscillation", "amplitude in %, period in s")
+        positive(oscillation[0], "oscillation", "amplitude in %")
+        positive(oscillation[1], "oscillation", "period in s")
     if controller is None:
-        proportional, integral_time = _simc(chosen, lag, dead_time + dt / 2)
+        proportional, integral_time = _simc(gain, lag, wait + dt / 2)
     else:
         proportional, integral_time = band(controller, "controller", "gain, integral time in s")
         positive(integral_time, "controller", "integral time in s")
     return ValveLoop(
         actuator=actuators_of(actuator),
         process=kind,
-        gain=chosen,
+        gain=gain,
         time_constant=lag,
-        dead_time=float(dead_time),
+        dead_time=wait,
         controller=(tightness * proportional, integral_time),
         oscillation=oscillation,
         noise=float(noise),
