@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-
 import numpy as np
 
 from .. import plots
@@ -39,17 +37,14 @@ def unsafe_if(system: DelayedStateSpace, pid: PIDController) -> tuple[str, ...]:
     63.2 ms of delay come in addition to the 29 ms of the model: a longer dead time, a filter, a
     slower cycle than 1 ms
     """
-    return tuple(_unsafe_if(system, pid))
-
-
-def _unsafe_if(system: DelayedStateSpace, pid: PIDController) -> Iterator[str]:
     check = pid.check
     if check is None:
-        return
+        return ()
+    told = []
     found = check.margins
     if np.isfinite(found.gain_margin):
         word = "as large" if found.gain_margin > 1 else "what it is"
-        yield (
+        told.append(
             f"the gain of the plant, or of the controller, is {found.gain_margin:.2g} times {word}"
         )
     if np.isfinite(found.delay_margin):
@@ -57,16 +52,17 @@ def _unsafe_if(system: DelayedStateSpace, pid: PIDController) -> Iterator[str]:
         if system.dt:
             with times_in("s"):  # as cycle times are set
                 others += f", a slower cycle than {in_time(float(system.dt), 4)}"
-        yield (
+        told.append(
             f"{in_time(found.delay_margin)} of delay come in addition to the "
             f"{in_time(estimate_of(system))} of the model: a {others}"
         )
     unstable = sum(not np.isfinite(corner.ms) for corner in check.corners)
     if unstable:
-        yield (
+        told.append(
             f"the plant is one of {unstable} of {len(check.corners)} models that fit the record "
             "as well: their loops are unstable"
         )
+    return tuple(told)
 
 
 def controller_of(

@@ -99,11 +99,5 @@ def formula_of(system: DelayedStateSpace) -> str:
     found = process_parameters(poles, numerator, wait, _EVER)
     unit = "s" if system.fit is None else system.fit.time_unit
     integrators = int(np.sum(np.abs(poles) * _EVER < INTEGRATOR))
-    shown = [Parameter(one.name, one.value, times=_power(one.name, integrators)) for one in found]
+    shown = [Parameter(one.name, one.value, times=1) for one in found]  # times are told by name
     return formula(shown, integrators, unit)
-
-
-def _power(name: str, integrators: int) -> int:
-    if name == "gain":
-        return -1 if integrators else 0
-    return 0 if "damping" in name else 1

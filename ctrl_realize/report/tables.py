@@ -12,7 +12,6 @@ import numpy as np
 from .._parameters import Parameter
 from .._wording import (
     in_digits,
-    in_time,
     interval_in_time,
     number_within,
     numbers_alike,
@@ -65,7 +64,7 @@ def _parameter_row(one: Parameter, where: str = "") -> Row:
         ends = one.low, one.high
         factor, name = time_unit(max(map(abs, ends)) if known else abs(one.value))
         error = f"{factor * one.std:.2g} {name}" if np.isfinite(one.std) else ""
-        value = time_within(one.value, *ends) if known else in_time(one.value, 4)
+        value = time_within(one.value, *ends)
         interval = interval_in_time(*ends) if known else ""
     else:
         unit = one.unit and f" {one.unit}"
