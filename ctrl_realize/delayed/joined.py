@@ -12,6 +12,7 @@ from ..errors import UnsuitableSystemError
 from ..numerics.internal_delays import form as forms
 from .inside.system import DelaySystem
 from .operands import common_dt, core_states, form_of
+from .operators import solvable
 from .parts import stand_in
 
 
@@ -59,13 +60,8 @@ def interconnect(systems: Sequence[Any], *args: Any, **settings: Any) -> Any:
     # selection of the outputs, and the inputs u = gain y + into r
     seen = np.asarray(wired.output_map)
     of_outputs, of_inputs = seen[:, : all_.outputs], seen[:, all_.outputs :]
-    try:
+    with solvable("the direct terms of the systems"):
         loop = forms.closed(all_, gain)
-    except np.linalg.LinAlgError:
-        raise UnsuitableSystemError(
-            "the direct terms of the systems close an algebraic loop that has no solution, or "
-            "many: put a delay or a lag into it"
-        ) from None
     loop = forms.through(loop, of_outputs + of_inputs @ gain, into)
     total = forms.parallel(loop, forms.static(of_inputs @ into))
     labels = wired.input_labels, wired.output_labels

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from typing import Any, ClassVar
 
 import control as ct
@@ -61,10 +62,8 @@ class DelayOperators(DeferredMatrices):
 
         `states` are names for those of the core.
         """
-        try:
+        with solvable("its delays of 0 s"):
             form = merged(form)
-        except np.linalg.LinAlgError:
-            raise algebraic("its delays of 0 s") from None
         labels: dict[str, Any] = dict(names)
         if inputs is not None and len(inputs) == form.inputs == len(set(inputs)):
             labels["inputs"] = list(inputs)
@@ -176,10 +175,8 @@ class DelayOperators(DeferredMatrices):
                 f"feedback around {forward.outputs} outputs and {forward.inputs} inputs by a "
                 f"system of {back.outputs} outputs and {back.inputs} inputs"
             )
-        try:
+        with solvable("the direct terms of both"):
             form = forms.feedback(forward, back, float(sign))
-        except np.linalg.LinAlgError:
-            raise algebraic("the direct terms of both") from None
         return self._joined(form, common_dt(self, other), self.input_labels, self.output_labels)
 
     def append(self, other: Any) -> Any:
@@ -202,12 +199,9 @@ class DelayOperators(DeferredMatrices):
         gain[m + np.arange(ny), np.arange(p - ny, p)] = 1.0
         rows = [*range(p - ny), *range(p + nu, both.outputs)]
         columns = [*range(m - nu), *range(m + ny, both.inputs)]
-        try:
-            form = forms.closed(both, gain)
-        except np.linalg.LinAlgError:
-            raise algebraic("the direct terms of both") from None
-        chosen = forms.through(form, np.eye(both.outputs)[rows], np.eye(both.inputs)[:, columns])
-        return self._joined(chosen, common_dt(self, other))
+        with solvable("the direct terms of both"):
+            form = forms.wired(both, gain, rows, columns)
+        return self._joined(form, common_dt(self, other))
 
 
 class BesideDelays(ct.StateSpace):  # type: ignore[misc]  # control is untyped
@@ -231,9 +225,13 @@ class BesideDelays(ct.StateSpace):  # type: ignore[misc]  # control is untyped
         return own.feedback(other, sign)
 
 
-def algebraic(what: str) -> UnsuitableSystemError:
-    """Make the error for a loop without delay that has no solution, or many."""
-    return UnsuitableSystemError(
-        f"{what} close an algebraic loop that has no solution, or many (I - D2 D1 is singular): "
-        "the loop answers itself without any delay. Put a delay or a lag into it"
-    )
+@contextmanager
+def solvable(what: str) -> Iterator[None]:
+    """Say what closes a loop without delay that has no solution, or many."""
+    try:
+        yield
+    except np.linalg.LinAlgError:
+        raise UnsuitableSystemError(
+            f"{what} close an algebraic loop that has no solution, or many (I - D2 D1 is "
+            "singular): the loop answers itself without any delay. Put a delay or a lag into it"
+        ) from None

@@ -6,7 +6,6 @@ import sys
 from typing import Any
 
 import control as ct
-import numpy as np
 
 from ..._checks import check_type
 from ..._facts import facts
@@ -14,7 +13,7 @@ from ...errors import DelayRangeError, UnsuitableSystemError
 from ...numerics.internal_delays.form import DelayForm, without_zero_delays
 from ..deferred import DeferredMatrices
 from ..operands import plain, whole_samples
-from ..operators import algebraic
+from ..operators import solvable
 from ..parts import MAX_DELAY, check_entries
 
 _INSTEAD = facts("delayed/advice.toml")["instead"]
@@ -95,8 +94,6 @@ def without_zeros(
     UnsuitableSystemError
         They close an algebraic loop.
     """
-    try:
+    with solvable("its delays of 0 s"):
         form = without_zero_delays(DelayForm(core.A, core.B, core.C, core.D, delays))
-    except np.linalg.LinAlgError:
-        raise algebraic("its delays of 0 s") from None
     return plain(form, dt, core.state_labels), form.delays

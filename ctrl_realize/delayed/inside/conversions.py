@@ -62,9 +62,7 @@ class InsideConversions(DelayOperators):
             # z_i goes into the approximant, whose output is w_i
             gain = np.zeros((opened.inputs, opened.outputs))
             gain[-1, p + i] = gain[m + i, -1] = 1.0
-            opened = forms.closed(opened, gain)
-            keep_in, keep_out = np.eye(m + q, opened.inputs), np.eye(p + q, opened.outputs)
-            opened = forms.through(opened, keep_out, keep_in.T)
+            opened = forms.wired(opened, gain, slice(p + q), slice(m + q))
         ends = forms.through(opened, np.eye(p, p + q), np.eye(m, m + q).T)
         made = plain(ends, 0)
         made.update_names(inputs=self.input_labels, outputs=self.output_labels)

@@ -14,7 +14,7 @@ import control as ct
 import numpy as np
 
 from ..._checks import real, system_name
-from ...numerics.internal_delays.form import DelayForm
+from ...numerics.internal_delays.form import DelayForm, through
 from ...numerics.internal_delays.merging import ends_apart
 from ...numerics.internal_delays.response import Response
 from ..chains import Matrices
@@ -174,16 +174,9 @@ class DelaySystem(InsideResponses, InsideConversions, InsideCards, DelayOperator
     def __getitem__(self, key: Any) -> Self:
         """Select channels, by number or name."""
         chosen = stand_in(self)[key]
-        rows = [self.output_index[name] for name in chosen.output_labels]
-        columns = [self.input_index[name] for name in chosen.input_labels]
-        q = len(self.internal_delays)
-        rows += range(self.noutputs, self.noutputs + q)
-        columns += range(self.ninputs, self.ninputs + q)
-        core = self._core
-        form = DelayForm(
-            core.A, core.B[:, columns], core.C[rows], core.D[np.ix_(rows, columns)],
-            self.internal_delays,
-        )  # fmt: skip
+        left = np.eye(self.noutputs)[[self.output_index[name] for name in chosen.output_labels]]
+        right = np.eye(self.ninputs)[:, [self.input_index[name] for name in chosen.input_labels]]
+        form = through(self._form(), left, right)
         made: Self = self._joined(
             form, self.dt, chosen.input_labels, chosen.output_labels, name=f"{self.name}$indexed"
         )

@@ -21,6 +21,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -65,6 +66,11 @@ class DelayForm:
         rows = [*range(self.outputs), *(self.outputs + i for i in keep)]
         D, delays = self.D[np.ix_(rows, columns)], tuple(self.delays[i] for i in keep)
         return DelayForm(self.A, self.B[:, columns], self.C[rows], D, delays)
+
+    def dual(self) -> DelayForm:
+        """Transpose the system: what was read is driven, and inputs and outputs change places."""
+        A, C, B, D = (np.ascontiguousarray(M.T) for M in (self.A, self.B, self.C, self.D))
+        return DelayForm(A, B, C, D, self.delays)
 
 
 def static(D: FloatArray) -> DelayForm:
@@ -146,14 +152,18 @@ def closed(form: DelayForm, gain: FloatArray) -> DelayForm:
     return DelayForm(form.A + into @ back[:, :n], B, C, D, form.delays)
 
 
+def wired(form: DelayForm, gain: FloatArray, outputs: Any, inputs: Any) -> DelayForm:
+    """Close a static gain around a system, and keep some outputs and inputs; see `closed`."""
+    left, right = np.eye(form.outputs)[outputs], np.eye(form.inputs)[:, inputs]
+    return through(closed(form, gain), left, right)
+
+
 def series(second: DelayForm, first: DelayForm) -> DelayForm:
     """Make the product second * first: `first` acts first."""
     both = append(first, second)
     gain = np.zeros((both.inputs, both.outputs))
     gain[first.inputs :, : first.outputs] = np.eye(second.inputs)
-    left = np.hstack([np.zeros((second.outputs, first.outputs)), np.eye(second.outputs)])
-    right = np.vstack([np.eye(first.inputs), np.zeros((second.inputs, first.inputs))])
-    return through(closed(both, gain), left, right)
+    return wired(both, gain, slice(first.outputs, None), slice(first.inputs))
 
 
 def parallel(first: DelayForm, second: DelayForm) -> DelayForm:
@@ -175,9 +185,7 @@ def feedback(forward: DelayForm, back: DelayForm, sign: float) -> DelayForm:
     gain = np.zeros((both.inputs, both.outputs))
     gain[: forward.inputs, forward.outputs :] = sign * np.eye(forward.inputs)
     gain[forward.inputs :, : forward.outputs] = np.eye(forward.outputs)
-    left = np.hstack([np.eye(forward.outputs), np.zeros((forward.outputs, back.outputs))])
-    right = np.vstack([np.eye(forward.inputs), np.zeros((back.inputs, forward.inputs))])
-    return through(closed(both, gain), left, right)
+    return wired(both, gain, slice(forward.outputs), slice(forward.inputs))
 
 
 def inverse(form: DelayForm) -> DelayForm:
@@ -221,8 +229,7 @@ def without_zero_delays(form: DelayForm) -> DelayForm:
     m, p = form.inputs, form.outputs
     gain = np.zeros((opened.inputs, opened.outputs))
     gain[m:, p:] = np.eye(len(at))
-    left, right = np.eye(p, opened.outputs), np.eye(opened.inputs, m)
-    return through(closed(opened, gain), left, right)
+    return wired(opened, gain, slice(p), slice(m))
 
 
 def with_states(

@@ -50,28 +50,30 @@ def _without_dead(form: DelayForm) -> DelayForm | None:
 
 def _without_twins(form: DelayForm) -> DelayForm | None:
     """Merge two channels of one delay that read, or drive, the same up to a factor."""
-    reads, drives = _out_of(form), _into(form).T
-    p, m = form.outputs, form.inputs
+    dual = form.dual()
     for i, delay in enumerate(form.delays):
         for j in range(i):
             if form.delays[j] != delay:
                 continue
-            rest = [k for k in range(len(form.delays)) if k != i]
-            factor = _factor(reads[j], reads[i])
-            if factor is not None:
-                # w_i = factor w_j
-                B, D = form.B.copy(), form.D.copy()
-                B[:, m + j] += factor * B[:, m + i]
-                D[:, m + j] += factor * D[:, m + i]
-                return DelayForm(form.A, B, form.C, D, form.delays).channels(rest)
-            factor = _factor(drives[j], drives[i])
-            if factor is not None:
-                # what w_i drives is driven by factor w_j too
-                C, D = form.C.copy(), form.D.copy()
-                C[p + j] += factor * C[p + i]
-                D[p + j] += factor * D[p + i]
-                return DelayForm(form.A, form.B, C, D, form.delays).channels(rest)
+            if (merged_form := _with_twin(form, i, j)) is not None:
+                return merged_form
+            if (merged_form := _with_twin(dual, i, j)) is not None:
+                return merged_form.dual()
     return None
+
+
+def _with_twin(form: DelayForm, i: int, j: int) -> DelayForm | None:
+    """Drop channel i if it reads what channel j reads, up to a factor."""
+    reads, m = _out_of(form), form.inputs
+    factor = _factor(reads[j], reads[i])
+    if factor is None:
+        return None
+    # w_i = factor w_j
+    B, D = form.B.copy(), form.D.copy()
+    B[:, m + j] += factor * B[:, m + i]
+    D[:, m + j] += factor * D[:, m + i]
+    rest = [k for k in range(len(form.delays)) if k != i]
+    return DelayForm(form.A, B, form.C, D, form.delays).channels(rest)
 
 
 def _factor(one: FloatArray, other: FloatArray) -> float | None:
@@ -116,42 +118,34 @@ def ends_apart(form: DelayForm) -> tuple[tuple[float, ...], tuple[float, ...], D
     rest : DelayForm
         What is left; without channels if all delays stood at the ends.
     """
-    before, behind = [0.0] * form.inputs, [0.0] * form.outputs
-    keep = list(range(len(form.delays)))
-    B, C, D = form.B.copy(), form.C.copy(), form.D.copy()
-    n, m, p = form.states, form.inputs, form.outputs
-    reads, drives = _out_of(form), _into(form)
-    for i, delay in enumerate(form.delays):
-        (at,) = np.nonzero(reads[i])
-        if at.size == 1 and n <= at[0] < n + m:
-            j = int(at[0]) - n
-            # nothing but this channel may read the input, and not its own output either
-            others = np.count_nonzero(B[:, j]) + np.count_nonzero(D[:, j])
-            if others == 1:
-                before[j] += delay
-                factor = D[p + i, j]
-                D[p + i, j] = 0.0
-                B[:, j], D[:, j] = factor * B[:, m + i], factor * D[:, m + i]
-                B[:, m + i], D[:, m + i] = 0.0, 0.0
-                keep.remove(i)
-                continue
-        (driven,) = np.nonzero(drives[:, i])
-        if driven.size == 1 and n <= driven[0] < n + p:
-            k = int(driven[0]) - n
-            if np.count_nonzero(C[k]) + np.count_nonzero(D[k]) == 1:
-                behind[k] += delay
-                factor = D[k, m + i]
-                D[k, m + i] = 0.0
-                C[k], D[k] = factor * C[p + i], factor * D[p + i]
-                C[p + i], D[p + i] = 0.0, 0.0
-                keep.remove(i)
-    rest = DelayForm(form.A, B, C, D, form.delays).channels(keep)
+    before, rest = _inputs_apart(form)
+    behind, dual = _inputs_apart(rest.dual())
+    rest = dual.dual()
     one = len(rest.delays) == rest.inputs == rest.outputs == 1
     # All of a single input goes through the single delay, and never twice.
     if one and not _reaches(rest, 0, 0) and not _reaches(rest, 1, 1):
         before[0] += rest.delays[0]
         rest = without_zero_delays(DelayForm(rest.A, rest.B, rest.C, rest.D, (0.0,)))
     return tuple(before), tuple(behind), rest
+
+
+def _inputs_apart(form: DelayForm) -> tuple[list[float], DelayForm]:
+    """Take delays at the inputs out of a form."""
+    before, keep = [0.0] * form.inputs, []
+    B, D = form.B.copy(), form.D.copy()
+    n, m, p = form.states, form.inputs, form.outputs
+    for i, (delay, reads) in enumerate(zip(form.delays, _out_of(form), strict=True)):
+        (at,) = np.nonzero(reads)
+        j = int(at[0]) - n if at.size == 1 else m
+        # nothing but this channel may read the input, and not its own output either
+        if 0 <= j < m and np.count_nonzero(B[:, j]) + np.count_nonzero(D[:, j]) == 1:
+            before[j] += delay
+            factor = D[p + i, j]
+            D[p + i, j] = 0.0
+            B[:, j], D[:, j] = factor * B[:, m + i], factor * D[:, m + i]
+        else:
+            keep.append(i)
+    return before, DelayForm(form.A, B, form.C, D, form.delays).channels(keep)
 
 
 def paths_apart(
