@@ -72,8 +72,7 @@ DEFECTS = (
        "iae += np.concatenate([[0.0], np.cumsum(np.abs(markov))])[delays]", "iae += 0.0",
        "kung scan", KERNELS),
     _d("iae end of the window", "one sample beyond the window counts for every delay",
-       "beyond = np.arange(end, count) >= (window - 1 - delays)",
-       "beyond = np.arange(end, count) > (window - 1 - delays)", "kung scan", KERNELS),
+       "row[window - 1 - delay :] = 0.0", "row[window - delay :] = 0.0", "kung scan", KERNELS),
     # --- the separable fit
     _d("slope of the static part", "the derivative of the level with a pole has the wrong sign",
        "level = ((-1.0 / self._free)[:, None] @ self.dfree)[:, 0].real",

@@ -160,23 +160,15 @@ def _single_channel(
 ) -> DelayModels:
     size = hankel_size(samples, padded=padded)
     windows = np.lib.stride_tricks.sliding_window_view(markov, samples)
-    A = np.empty((delays.size, order, order))
-    B = np.empty((delays.size, order, 1))
-    C = np.empty((delays.size, 1, order))
-    singular_values = np.empty((delays.size, order))
-    following = np.empty(delays.size)
+    found = []
     group = max(1, int(GROUP_BYTES // (8 * size * order)))
     for start in range(0, delays.size, group):
-        rows = slice(start, start + group)
-        first, final = int(delays[rows][0]), int(delays[rows][-1])
-        in_a_row = np.array_equal(delays[rows], np.arange(first, final + 1))
-        h = windows[first + 1 : final + 2] if in_a_row else windows[delays[rows] + 1]
+        h = windows[delays[start : start + group] + 1]
         pairs = leading_eigenpairs(h if padded else h[:, : 2 * size - 1], size, order, tol=tol)
         last = None if padded else h[:, size : 2 * size]
-        A[rows], B[rows, :, 0], C[rows, 0] = realize_symmetric(pairs.values, pairs.vectors, last)
-        singular_values[rows] = np.abs(pairs.values)
-        following[rows] = pairs.following
-    return DelayModels(A, B, C, singular_values, following)
+        A, B, C = realize_symmetric(pairs.values, pairs.vectors, last)
+        found.append((A, B[:, :, None], C[:, None], np.abs(pairs.values), pairs.following))
+    return DelayModels(*(np.concatenate(parts) for parts in zip(*found, strict=True)))
 
 
 def iae_of_models(

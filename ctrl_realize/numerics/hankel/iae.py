@@ -67,21 +67,12 @@ def integrated_absolute_error(
     """
     A, B, C, D = models
     window = markov.size
-    first, last = int(delays.min()), int(delays.max())
-    count = window - 1 - first
-    padded = np.zeros(window + last)
-    padded[:window] = markov
-    shifted = np.lib.stride_tricks.sliding_window_view(padded, count)
-    in_a_row = np.array_equal(delays, np.arange(first, last + 1))
-    data = shifted[first + 1 : last + 2] if in_a_row else shifted[delays + 1]
     with np.errstate(over="ignore", invalid="ignore"):
-        difference = markov_stack(A, B, C, count)
-        np.subtract(difference, data, out=difference)
+        difference = markov_stack(A, B, C, window - 1 - int(delays.min()))
+        for row, delay in zip(difference, delays.tolist(), strict=True):
+            row[: window - 1 - delay] -= markov[delay + 1 :]
+            row[window - 1 - delay :] = 0.0  # a model with a long delay extends beyond the window
         np.abs(difference, out=difference)
-        # a model with a long delay extends beyond the window
-        end = window - 1 - last
-        beyond = np.arange(end, count) >= (window - 1 - delays)[:, np.newaxis]
-        difference[:, end:][beyond] = 0.0
         iae: FloatArray = difference.sum(axis=1)
     iae += np.concatenate([[0.0], np.cumsum(np.abs(markov))])[delays]
     iae += np.abs(markov[delays] - D)
