@@ -12,8 +12,8 @@ from scipy.optimize import brentq
 from .._checks import real
 from ..numerics.arrays import ComplexArray, FloatArray
 from ..numerics.internal_delays.form import DelayForm
-from ..numerics.internal_delays.stability import grid
-from ..numerics.loops.crossings import follow, frequency_grid
+from ..numerics.internal_delays.stability import grid, grid_about
+from ..numerics.loops.crossings import follow
 from .deferred import DeferredMatrices
 from .parts import check_single
 
@@ -54,13 +54,8 @@ class HostMargins(DeferredMatrices):
 
     def _followed(self) -> tuple[FloatArray, ComplexArray]:
         """Frequencies so close that the response between them can be interpolated."""
-        features, dead_time = self.features()
-        sizes = np.abs(features)
-        sizes = sizes[sizes > 0]
-        fastest = float(sizes.max(initial=1 / dead_time if dead_time else 1.0))
-        top = np.pi / self.dt if self.dt else self._gain_is_gone(fastest)
-        low = 1e-3 * min(float(sizes.min(initial=top)), 1 / dead_time if dead_time else top)
-        omega, values = follow(self._at, frequency_grid(low, top, features, dead_time))
+        every = grid_about(*self.features(), float(self.dt or 0), self._gain_is_gone)
+        omega, values = follow(self._at, every)
         omega, values = follow(self._at, omega[: _last(values)], FINE)
         known = np.isfinite(values)
         return omega[known], values[known]

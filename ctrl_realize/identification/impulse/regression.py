@@ -156,7 +156,7 @@ def through_arx(group: tuple[Record, ...], count: int, start: str) -> PulseRegre
                 "the output moves too little compared with its level; subtract the level, or "
                 "record more digits"
             ) from None
-        prediction_error = equations.rows * np.linalg.slogdet(fit.noise)[1]
+        prediction_error = equations.rows * np.linalg.slogdet(fit.solution.noise)[1]
         fits[prediction_error + p * len(columns) * np.log(equations.rows)] = (order, fit)
     order, fit = fits[min(fits)]
     growth = count * np.log10(np.abs(np.linalg.eigvals(arx_state_space(fit)[0])).max() + 1e-9)
@@ -175,7 +175,7 @@ def through_arx(group: tuple[Record, ...], count: int, start: str) -> PulseRegre
     return PulseRegression(
         markov=markov,
         std=std,
-        noise_std=np.sqrt(np.diag(fit.noise)),
+        noise_std=np.sqrt(np.diag(fit.solution.noise)),
         rows=equations.rows,
         method=f"OKID, ARX order {order}",
         flags=_silence(silent),

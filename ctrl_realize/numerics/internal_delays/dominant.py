@@ -111,17 +111,14 @@ def _complete(part: DelayForm, roots: ComplexArray, count: int) -> bool:
 
 def count_outside(part: DelayForm, radius: float) -> int:
     """Count the poles of a discrete system outside a circle by the argument principle."""
-    form = schur_form(part.A)
     d = np.array(part.delays)
-    outside = int(np.sum(np.abs(np.diag(form[0])) > radius))
+    outside = int(np.sum(np.abs(np.linalg.eigvals(part.A)) > radius))
 
     def curve(angle: FloatArray) -> ComplexArray:
-        z = radius * np.exp(1j * angle)
-        core = frequency_response(form, part.B, part.C, part.D, z)
+        M = between_delays(part, radius * np.exp(1j * angle))
         # I - z^-d M, for a radius below 1 times its power d: positive, so it turns alike
         late = np.exp(-1j * np.outer(angle, d)) * min(1.0, 1 / radius) ** d
         held = min(1.0, radius) ** d
-        M = np.moveaxis(core, -1, 0)
         loop = np.eye(d.size) * held - late[:, :, None] * M
         return np.asarray(loop[:, 0, 0] if d.size == 1 else np.linalg.det(loop))
 

@@ -15,6 +15,9 @@ References
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
+
 import numpy as np
 
 from ..arrays import ComplexArray, FloatArray
@@ -103,13 +106,18 @@ def features(form: DelayForm, dt: float, *, few: bool = True) -> tuple[ComplexAr
 
 def grid(form: DelayForm, dt: float, *, few: bool = True) -> FloatArray:
     """Frequencies in rad/s at which no turn of the response is missed."""
-    places, dead_time = features(form, dt, few=few)
+    return grid_about(*features(form, dt, few=few), dt, partial(settled_frequency, form))
+
+
+def grid_about(
+    places: ComplexArray, dead_time: float, dt: float, settled: Callable[[float], float]
+) -> FloatArray:
+    """Frequencies in rad/s from far below all `places` up to Nyquist's.
+
+    In continuous time the last one is what `settled` makes of the fastest place.
+    """
     sizes = np.abs(places)
-    if dt:
-        top = np.pi / dt
-    else:
-        top = float(sizes.max(initial=1 / dead_time if dead_time else 1.0))
-        top = settled_frequency(form, top)
+    top = np.pi / dt if dt else settled(sizes.max(initial=1 / dead_time if dead_time else 1.0))
     low = 1e-3 * min(float(sizes[sizes > 0].min(initial=top)), 1 / dead_time if dead_time else top)
     return frequency_grid(low, top, places, dead_time)
 

@@ -83,8 +83,6 @@ class ArxFit:
 
     a: FloatArray
     b: FloatArray
-    noise: FloatArray
-    rows: int
     solution: LeastSquares
 
 
@@ -120,8 +118,6 @@ def solve_arx(equations: NormalEquations, na: int, nb: int) -> ArxFit:
     return ArxFit(
         a=-theta[:cut].reshape(na, p, p).transpose(0, 2, 1),
         b=theta[cut:].reshape(nb, m, p).transpose(0, 2, 1),
-        noise=solution.noise,
-        rows=equations.rows,
         solution=solution,
     )
 
@@ -159,7 +155,7 @@ def arx_markov_std(fit: ArxFit, count: int) -> FloatArray:
     H = arx_markov(fit, count).transpose(2, 0, 1)
     inverse = _divide(fit.a, np.concatenate([np.eye(p)[None], np.zeros((count - 1, p, p))]))
     # Targets are correlated through their noise: L combines the rows of A and B.
-    L = _root(fit.noise)
+    L = _root(fit.solution.noise)
     mixed = inverse @ L
     variance = np.zeros((p, m, count))
     W = fit.solution.inverse_root

@@ -86,7 +86,7 @@ class BankSolution:
     ``theta`` (D, q) minimizes ``misfit`` (D,) = weighted squares of the residual plus those of
     the distance to the prior; `offset` (D,) is the constant of y; ``inverse`` (D, q, q) the
     inverse of the normal matrix, so that the covariance is noise variance times it; `power` is
-    the weighted sum of squares of y about its mean, `weight` the sum of the weights.
+    the weighted sum of squares of y about its mean.
     """
 
     theta: FloatArray
@@ -94,7 +94,6 @@ class BankSolution:
     offset: FloatArray
     inverse: FloatArray
     power: float
-    weight: float
 
 
 class DelayBank:
@@ -154,9 +153,8 @@ class DelayBank:
         The present R_0 is stored: ``R_d[k]`` is then ``R_0[k-d]`` minus its decayed value at the
         restart.
         """
-        slot = (self._slot - 1) % self._depth
-        self._old_gram = self._past(self._gram, slot).copy()
-        self._old_sums = self._past(self._sums, slot).copy()
+        self._old_gram = self._past(self._gram).copy()
+        self._old_sums = self._past(self._sums).copy()
         self._old_weight = 1.0
         self._cross[:] = 0.0
         self.weight = self.weight_squared = self._total = self._power = 0.0
@@ -170,40 +168,37 @@ class DelayBank:
         phi = out[self._n :]
         self._last_gram = keep * self._last_gram + phi[:, None] * phi
         self._last_sums = keep * self._last_sums + phi
-        slot = self._slot
+        slot = self._slot = (self._slot + 1) % depth
         for ring, value in (
             (self._phi, phi),
             (self._gram, self._last_gram),
             (self._sums, self._last_sums),
         ):
             ring[slot] = ring[slot + depth] = value
-        self._slot = (slot + 1) % depth
         self._cross *= keep
-        self._cross += y * self._past(self._phi, slot)
+        self._cross += y * self._past(self._phi)
         self._old_weight *= keep
         self.weight = keep * self.weight + 1.0
         self.weight_squared = keep**2 * self.weight_squared + 1.0
         self._total = keep * self._total + y
         self._power = keep * self._power + y * y
 
-    def _past(self, ring: FloatArray, slot: int) -> FloatArray:
+    def _past(self, ring: FloatArray) -> FloatArray:
         """Rows of low...high samples ago, in this order."""
-        newest = slot + self._depth
+        newest = self._slot + self._depth
         # Rows newest-high ... newest-low, turned around.
         return ring[newest - self.high : newest - self.low + 1][::-1]
 
     def predict(self, delay: int, theta: FloatArray) -> float:
         """Return the response of one candidate to the input so far, without the offset."""
-        slot = (self._slot - 1) % self._depth
-        return float(self._phi[slot + self._depth - delay] @ theta)
+        return float(self._phi[self._slot + self._depth - delay] @ theta)
 
     def solve(self, prior: FloatArray, precision: FloatArray) -> BankSolution:
         """Solve for every candidate, with ``(theta - prior)^T diag(precision) (theta - prior)``
         added to the weighted squares.
         """
-        slot = (self._slot - 1) % self._depth
-        sums = self._past(self._sums, slot) - self._old_weight * self._old_sums
-        gram = self._past(self._gram, slot) - self._old_weight * self._old_gram
+        sums = self._past(self._sums) - self._old_weight * self._old_sums
+        gram = self._past(self._gram) - self._old_weight * self._old_gram
         gram -= sums[:, :, None] * sums[:, None, :] / self.weight
         cross = self._cross - sums * (self._total / self.weight)
         power = max(self._power - self._total**2 / self.weight, 0.0)
@@ -220,6 +215,4 @@ class DelayBank:
         misfit = power + prior @ (precision * prior) - np.einsum("di,di->d", theta, right)
         offset = (self._total - np.einsum("di,di->d", sums, theta)) / self.weight
         least: FloatArray = np.maximum(misfit, 0.0)
-        return BankSolution(
-            theta, least, offset, np.asarray(inverse, np.float64), power, self.weight
-        )
+        return BankSolution(theta, least, offset, np.asarray(inverse, np.float64), power)

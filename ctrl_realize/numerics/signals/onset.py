@@ -226,9 +226,7 @@ def _extrapolate(rise: FloatArray, crossing: int, threshold: float) -> float:
     higher = np.flatnonzero(rise[crossing:] > 3 * threshold)
     if not higher.size:
         return float(crossing)
-    second = crossing + max(int(higher[0]), 1)
-    if second >= rise.size:
-        return float(crossing)
+    second = min(crossing + max(int(higher[0]), 1), rise.size - 1)
     low, high = float(rise[crossing]), float(rise[second])
     if high <= low:
         return float(crossing)

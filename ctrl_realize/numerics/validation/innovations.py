@@ -22,7 +22,6 @@ References
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
@@ -86,18 +85,6 @@ _TURNS, _FLOOR = 12, 0.1  # of weights; smallest residual in one, of the median
 _RANK = 1e-10  # of the largest singular value: rounding
 
 
-@dataclass(frozen=True, eq=False)
-class _Past:
-    """Regressors (rows, q): the past before each of the samples `here`."""
-
-    here: IntArray
-    columns: FloatArray
-
-    def left(self, targets: FloatArray) -> tuple[FloatArray, int]:
-        """Residual of targets (rows, k) after regression on the past, and its rank."""
-        return _left(self.columns, targets, _RANK)
-
-
 def past_inputs(size: int, delay: float) -> int:
     """Number of past inputs: more than a dead time, even if its estimate is wrong."""
     return int(min(max(size // 12, _LEAST_PAST, 1.5 * delay + 10), _MOST_PAST, size // 6))
@@ -130,8 +117,9 @@ def feedback_chance(output: FloatArray, drive: FloatArray, past: int) -> float:
     known = _past(output, drive, past, _AHEAD)
     if known is None:
         return 1.0
-    ahead = [drive[known.here + i] for i in range(_AHEAD + 1)]
-    new, rank = known.left(np.stack([output[known.here], *ahead], axis=1))
+    here, before = known
+    ahead = [drive[here + i] for i in range(_AHEAD + 1)]
+    new, rank = _left(before, np.stack([output[here], *ahead], axis=1))
     if np.any(new.std(axis=0)[:2] <= _PREDICTED * np.array([output.std(), drive.std()])):
         return 1.0
     cut = np.stack([_tamed(column) for column in new.T], axis=1)
@@ -196,7 +184,7 @@ def _answer_chance(output: FloatArray, drive: FloatArray, past: int, first: int 
     here = np.arange(past, output.size)
     own = np.stack([np.ones(here.size), *(drive[here - i] for i in range(1, past + 1))], axis=1)
     outputs = np.stack([output[here - i] for i in range(first, _OUTPUTS)], axis=1)
-    left, rank = _Past(here, own).left(np.column_stack([drive[here], outputs]))
+    left, rank = _left(own, np.column_stack([drive[here], outputs]))
     if left[:, 0].std() <= _PREDICTED * drive.std():
         return 1.0
     return _chance(left[:, 1:], left[:, 0], np.zeros((here.size, 0)), rank)[0]
@@ -224,9 +212,9 @@ def late_samples(output: FloatArray, drive: FloatArray, past: int) -> tuple[int,
     if here.size < LEAST_FREEDOM + 2 * past:
         return 0, 0.0
     earlier = [drive[here - i] for i in range(1, past + 1)]
-    known = _Past(here, np.stack([np.ones(here.size), here / here.size, *earlier], axis=1))
+    before = np.stack([np.ones(here.size), here / here.size, *earlier], axis=1)
     ahead = [drive[here + i] for i in range(_LATE)]
-    left, _ = known.left(np.stack([output[here], *ahead], axis=1))
+    left, _ = _left(before, np.stack([output[here], *ahead], axis=1))
     squares = [_squares(left[:, 1 : count + 1], left[:, 0])[0] for count in range(_LATE + 1)]
     parts = 1 - np.array(squares) / max(squares[0], SMALLEST)
     samples = int(np.argmax(parts >= _NEARLY * parts[-1]))
@@ -256,14 +244,15 @@ def nonlinear_chance(output: FloatArray, drive: FloatArray, past: int) -> tuple[
     known = _past(output, drive, past, 0)
     if known is None:
         return 1.0, 0.0
+    here, before = known
     width = max(past // _PIECES, 1)
     sums = np.concatenate([np.zeros(1), np.cumsum(drive - np.mean(drive))])
-    ends = [sums[np.maximum(known.here + 1 - i * width, 0)] for i in range(_PIECES + 1)]
+    ends = [sums[np.maximum(here + 1 - i * width, 0)] for i in range(_PIECES + 1)]
     pieces = [(late - early) / width for late, early in pairwise(ends)]
     products = [a * b for i, a in enumerate(pieces) for b in pieces[i:]]
     products += [a**3 for a in pieces]
-    both = [output[known.here], drive[known.here]]
-    left, rank = known.left(np.column_stack([*both, *pieces, *products]))
+    both = [output[here], drive[here]]
+    left, rank = _left(before, np.column_stack([*both, *pieces, *products]))
     if np.any(left.std(axis=0)[:2] <= _PREDICTED * np.array([output.std(), drive.std()])):
         return 1.0, 0.0
     first = 2 + _PIECES
@@ -291,7 +280,10 @@ def misfit_chance(residual: FloatArray, drive: FloatArray) -> float:
     return _chance(white[:, 3:], white[:, 0], white[:, 1:3], 0)[0]
 
 
-def _past(output: FloatArray, drive: FloatArray, past: int, ahead: int) -> _Past | None:
+def _past(
+    output: FloatArray, drive: FloatArray, past: int, ahead: int
+) -> tuple[IntArray, FloatArray] | None:
+    """Samples whose past and future are known, and the past as regressors (rows, q)."""
     before = max(OWN_PAST, past)
     rows = output.size - before - ahead
     if rows < LEAST_FREEDOM + 2 * (OWN_PAST + past):
@@ -300,7 +292,7 @@ def _past(output: FloatArray, drive: FloatArray, past: int, ahead: int) -> _Past
     own = [output[here - i] for i in range(1, OWN_PAST + 1)]
     earlier = [drive[here - i] for i in range(1, past + 1)]
     level = [np.ones(rows), here / rows]
-    return _Past(here, np.stack([*level, *own, *earlier], axis=1))
+    return here, np.stack([*level, *own, *earlier], axis=1)
 
 
 def _tamed(values: FloatArray) -> FloatArray:
@@ -347,7 +339,7 @@ def _least_absolute(
     return left, found
 
 
-def _left(columns: FloatArray, targets: FloatArray, least: float) -> tuple[FloatArray, int]:
+def _left(columns: FloatArray, targets: FloatArray, least: float = _RANK) -> tuple[FloatArray, int]:
     """What least squares leave of targets, and the rank of the columns, scaled to one size."""
     scaled, _ = unit_columns(columns)
     solution, _, rank, _ = np.linalg.lstsq(scaled, targets, rcond=least)

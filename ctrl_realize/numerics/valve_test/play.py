@@ -78,20 +78,17 @@ def fit_play(levels: FloatArray, outputs: FloatArray, error: float) -> PlayFit |
     freedom = levels.size - _FREE
     variance = max(float(sums[best]) / freedom, error**2)
     limit = float(sums[best]) + float(fdtri(1, freedom, 0.95)) * variance
-    bounds = []
-    for direction in (-1, 1):
-        bounds.append(_bound(levels, outputs, start, float(widths[best]), direction, widest, limit))
+    width = float(widths[best])
+    low, high = (_bound(levels, outputs, start, width, end, limit) for end in (0.0, widest))
     excess = float(sums[best]) / freedom / error**2 if error > 0 else float("inf")
-    return PlayFit(float(widths[best]), bounds[0], bounds[1], float(gains[best]), excess)
+    return PlayFit(width, low, high, float(gains[best]), excess)
 
 
 def _bound(
     levels: FloatArray, outputs: FloatArray, start: FloatArray,
-    best: float, direction: int, widest: float, limit: float,
+    inside: float, end: float, limit: float,
 ) -> float:  # fmt: skip
-    """Where the sum of squares exceeds the limit, below or above the best width."""
-    end = 0.0 if direction < 0 else widest
-    inside = best
+    """Where the sum of squares exceeds the limit, between a width that does not and an end."""
     for _ in range(3):
         widths = np.linspace(inside, end, 60)
         over = np.flatnonzero(_misfits(levels, outputs, widths, start)[0] > limit)
