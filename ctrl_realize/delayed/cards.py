@@ -26,9 +26,6 @@ class DelayedCards(ShownSystem, CoreAndDelays):
             return f"{in_time(float(self.dead_time), 5)} = {self.delay} samples, as z^-{self.delay}"
         return f"{self._shift()} samples"
 
-    def _fit_line(self) -> str:
-        return "" if self.fit is None else f"{self.fit!r}"
-
     def _repr_eval_(self) -> str:
         core = as_code(self.delay_free)
         delays = [f"delay={self.input_delays!r}"]
@@ -39,7 +36,7 @@ class DelayedCards(ShownSystem, CoreAndDelays):
     def _line(self) -> str:
         name = "" if self._generic_name_check() else f" {self.name!r}"
         signals = f"{', '.join(self.input_labels)} -> {', '.join(self.output_labels)}"
-        fit = f", fit: {self._fit_line()}" if self.fit is not None else ""
+        fit = f", fit: {self.fit!r}" if self.fit is not None else ""
         return (
             f"<DelayedStateSpace{name}: {signals}, order {self._core.nstates}, {self._shift()}, "
             f"dt = {self.dt:.6g} s{fit}>"
@@ -65,7 +62,7 @@ class DelayedCards(ShownSystem, CoreAndDelays):
                 ("DC gain", f"{gain:.6g}" if np.isfinite(gain) else "none: the model integrates")
             )
         if self.fit is not None:
-            rows.append(("fit", self._fit_line().strip("<>")))
+            rows.append(("fit", repr(self.fit).strip("<>")))
         return Card(f"DelayedStateSpace{name}", rows)
 
 

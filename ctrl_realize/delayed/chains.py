@@ -8,14 +8,12 @@ import numpy as np
 
 from .._checks import integer
 from ..errors import DelayRangeError, OptionError
-from ..numerics.arrays import ComplexArray, FloatArray, whole_power
+from ..numerics.arrays import ComplexArray, Matrices, whole_power
 from ..numerics.internal_delays.form import DelayForm, delayed_ends
 from ..numerics.internal_delays.recurrence import absorbed
 
 ON_CIRCLE = 1 - 1e-12
 """Magnitude from which on a point counts as one on the unit circle."""
-
-Matrices = tuple[FloatArray, FloatArray, FloatArray, FloatArray]
 
 
 def parse_delays(given: int | Sequence[int], count: int, name: str, side: str) -> tuple[int, ...]:

@@ -9,9 +9,9 @@ import control as ct
 import numpy as np
 
 from ..errors import DelayRangeError
-from ..numerics.arrays import FloatArray
+from ..numerics.arrays import FloatArray, Matrices
 from ..numerics.internal_delays.form import DelayForm
-from .chains import Matrices, with_chains
+from .chains import with_chains
 from .readers import warn_of_an_interconnection, warn_of_the_reader
 
 MAX_STATES = 20_000

@@ -11,8 +11,8 @@ import numpy as np
 
 from .._checks import check_type, system_names
 from ..errors import OptionError, UnsuitableSystemError
-from ..numerics.arrays import ComplexArray, IntArray, read_only
-from .chains import Matrices, chain_labels
+from ..numerics.arrays import ComplexArray, IntArray, Matrices, read_only
+from .chains import chain_labels
 from .deferred import DeferredMatrices
 
 MAX_DELAY = 10_000_000

@@ -11,6 +11,8 @@ FloatArray: TypeAlias = NDArray[np.float64]
 ComplexArray: TypeAlias = NDArray[np.complex128]
 IntArray: TypeAlias = NDArray[np.int64]
 BoolArray: TypeAlias = NDArray[np.bool_]
+Matrices: TypeAlias = tuple[FloatArray, FloatArray, FloatArray, FloatArray]
+"""A, B, C and D of a state-space model."""
 
 Entry = TypeVar("Entry", bound=np.generic)
 

@@ -37,12 +37,9 @@ class InsideCards(ShownSystem, DeferredMatrices):
 
     def _repr_eval_(self) -> str:
         core = as_code(self._core)
-        count = len(self.internal_delays)
-        labels = self.input_labels, self.output_labels
-        assert len(self._core.input_labels) == len(labels[0]) + count
         return (
             f"{type(self).__name__}(\n{core},\n{self.internal_delays!r}, name={self.name!r}, "
-            f"inputs={labels[0]!r}, outputs={labels[1]!r})"
+            f"inputs={self.input_labels!r}, outputs={self.output_labels!r})"
         )
 
     def __str__(self) -> str:

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from ..._checks import finite, positive
 from ...errors import DataError, ModelWarning, UnsuitableSystemError, warn_caller
 from ...numerics.arrays import FloatArray
-from ...numerics.internal_delays.equation import Solution, TooManyStepsError, solve
+from ...numerics.internal_delays.equation import TooManyStepsError, solve
 from ..host_responses import spread
 from .poles import InsidePoles
 
@@ -54,11 +54,11 @@ class Motion(InsidePoles):
 
             kinks = np.abs(np.diff(rows, 2)) > 1e-12 * np.abs(rows).max(initial=0.0)
             breaks = times[1:-1][kinks.any(axis=0)]
-        found = self._solved(
+        outputs = self._solved(
             signal, times, breaks, tolerance, initial_state=initial_state, history=history
         )
         options = {"squeeze": squeeze, "transpose": transpose, "plot_inputs": True}
-        return self._data(times, found.outputs, signal(times), **options)
+        return self._data(times, outputs, signal(times), **options)
 
     def _unit_motion(
         self,
@@ -76,8 +76,8 @@ class Motion(InsidePoles):
         drive = np.zeros((m, m, times.size))
         pulse = kind == "impulse"
         for j in range(m):
-            found = self._solved(_unit_signal(m, j), times, np.zeros(0), tolerance, slope=pulse)
-            outputs[:, j] = found.outputs
+            unit = _unit_signal(m, j)
+            outputs[:, j] = self._solved(unit, times, np.zeros(0), tolerance, slope=pulse)
             drive[j, j] = 1.0
         return self._unit_responses(
             times, outputs, drive, kind, squeeze=squeeze, transpose=transpose
@@ -93,13 +93,13 @@ class Motion(InsidePoles):
         initial_state: ArrayLike = 0.0,
         history: ArrayLike = 0.0,
         slope: bool = False,
-    ) -> Solution:
+    ) -> FloatArray:
         form = self._form()
         wanted = positive(tolerance, "tolerance", "largest error, relative to the largest output")
         state = spread(initial_state, form.states, "initial_state")
         before = spread(history, len(form.delays), "history")
         try:
-            found = solve(
+            outputs, error = solve(
                 form,
                 signal,
                 times,
@@ -109,21 +109,21 @@ class Motion(InsidePoles):
                 tolerance=wanted,
                 slope=slope,
             )
-        except TooManyStepsError as error:
+        except TooManyStepsError as needed:
             raise UnsuitableSystemError(
-                f"{times[-1]:g} s need {error} steps, each no longer than the shortest delay "
+                f"{times[-1]:g} s need {needed} steps, each no longer than the shortest delay "
                 f"({min(form.delays, default=0.0):g} s): give shorter timepts, omit the shortest "
                 "delay, or use a rational approximation (sys.pade)"
             ) from None
-        size = float(np.abs(found.outputs).max(initial=0.0))
-        if not found.error <= wanted * max(size, 1e-300) and size > 0:
+        size = float(np.abs(outputs).max(initial=0.0))
+        if not error <= wanted * max(size, 1e-300) and size > 0:
             warn_caller(
                 f"when all steps were halved for the last time, the response changed by "
-                f"{found.error:.2g} of at most {size:.3g}; the relative tolerance is {wanted:g}. "
+                f"{error:.2g} of at most {size:.3g}; the relative tolerance is {wanted:g}. "
                 "Give closer timepts",
                 ModelWarning,
             )
-        return found
+        return outputs
 
     def _motion_times(self, timepts: ArrayLike | float | None) -> FloatArray:
         """Check the given times, or make those up to an end or until the response has settled."""

@@ -14,10 +14,10 @@ import control as ct
 import numpy as np
 
 from ..._checks import real, system_name
+from ...numerics.arrays import Matrices
 from ...numerics.internal_delays.form import DelayForm, through
 from ...numerics.internal_delays.merging import ends_apart
 from ...numerics.internal_delays.response import Response
-from ..chains import Matrices
 from ..operands import plain
 from ..operators import INSIDE, DelayOperators
 from ..parts import named, parts_of, signal_names, signals_of, stand_in, with_core

@@ -105,7 +105,7 @@ def estimate_delay(
 
 def best_of(surface: Surface, order: int) -> DelayedStateSpace:
     """Realize the model of one order at its best delay."""
-    iae, rounding = surface.row(order), surface.rounding
+    iae, rounding = surface.iae[surface.orders.index(order)], surface.rounding
     delay = best_delay(iae, rounding)
     system = realize(
         surface.impulse,
@@ -126,6 +126,7 @@ def best_of(surface: Surface, order: int) -> DelayedStateSpace:
         feedthrough=surface.feedthrough is not False,
         singular_values=read_only(surface.singular_values[:, :order]),
         noise_floor=surface.noise_floor,
+        impulse=realization.impulse,
         realization=realization,
         flags=(
             *curve_flags(iae, delay, rounding),

@@ -7,14 +7,14 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ..._wording import in_time
-from ...data import ImpulseResponse, Record
+from ...data import ImpulseResponse
 from ...numerics.arrays import FloatArray
-from ...results import Flag, IntervalKind, ModelFit
-from .result import Realization
+from ...results import Flag, IntervalKind
+from .result import ImpulseFit, Realization
 
 
 @dataclass(frozen=True, eq=False)
-class DelayScan(ModelFit):
+class DelayScan(ImpulseFit):
     """IAE of the best model for every candidate delay.
 
     ``iae[d]`` is the sum of ``|impulse.markov[k] - model.markov(n)[k]|`` over the fixed window
@@ -40,6 +40,8 @@ class DelayScan(ModelFit):
     noise_floor : float or None
         Largest singular value of a Hankel matrix of the noise before the step; None if that noise
         is not known.
+    impulse : ImpulseResponse
+        The impulse response.
     realization : Realization
         Realization of the returned model after `delay`.
     flags : tuple of Flag
@@ -67,24 +69,10 @@ class DelayScan(ModelFit):
     feedthrough: bool
     singular_values: FloatArray
     noise_floor: float | None
+    impulse: ImpulseResponse = field(repr=False)
     realization: Realization = field(repr=False)
     flags: tuple[Flag, ...] = ()
     choices: tuple[str, ...] = ()
-
-    @property
-    def impulse(self) -> ImpulseResponse:
-        """The impulse response."""
-        return self.realization.impulse
-
-    @property
-    def dt(self) -> float:
-        """Sample time in s."""
-        return self.impulse.dt
-
-    @property
-    def dead_time(self) -> float:
-        """Best delay in s."""
-        return self.delay * self.dt
 
     @property
     def interval(self) -> tuple[float, float]:
@@ -95,16 +83,6 @@ class DelayScan(ModelFit):
     def interval_kind(self) -> IntervalKind:
         """``"flatness"``: it shows how flat the curve is."""
         return "flatness"
-
-    @property
-    def sampling(self) -> str:
-        """How the impulse response was sampled."""
-        return self.impulse.sampling
-
-    @property
-    def records(self) -> tuple[Record, ...]:
-        """The record behind the impulse response, if it is known."""
-        return self.realization.records
 
     @property
     def least_iae(self) -> float:

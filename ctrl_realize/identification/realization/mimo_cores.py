@@ -11,9 +11,9 @@ import numpy as np
 from ...data import ImpulseResponse
 from ...delayed import DelayedStateSpace, fit_of
 from ...errors import OrderError
-from ...numerics.arrays import FloatArray, IntArray
+from ...numerics.arrays import FloatArray, IntArray, Matrices
 from ...numerics.hankel.delay_models import realize_at
-from ...numerics.state_space.delay_split import Matrices, joined_columns, joined_rows
+from ...numerics.state_space.delay_split import joined_columns, joined_rows, least_known
 from ...results import Flag
 from ..realization.result import Realization
 from .impulses import channels, check_samples
@@ -96,7 +96,9 @@ def cores_one_by_one(
 ) -> Assembly:
     """Realize every output (`axis` 0) or input (1) separately, with tapped delay lines."""
     markov = channels(data)
-    first, full = _first_taps(found, axis)
+    first = least_known(found, found >= 0, axis)
+    # a channel without response uses its delay line unchanged, and adds no tap
+    full = np.where(found >= 0, found, np.expand_dims(first, axis))
     count = full.shape[axis]
     aligned = [_aligned(markov.take([k], axis), full.take([k], axis)) for k in range(count)]
     realized = [_realized(data, part, order, samples) for part in aligned]
@@ -108,14 +110,3 @@ def cores_one_by_one(
     inputs, outputs = (none, taps) if axis else (taps, none)
     orders = tuple(part[0].shape[0] for part in parts)
     return Assembly(core, inputs, outputs, orders, tuple(flags.values()))
-
-
-def _first_taps(found: IntArray, axis: int) -> tuple[IntArray, IntArray]:
-    """Return the first tap of each delay line, and the delay of every channel.
-
-    A channel without response uses its delay line unchanged, and adds no tap.
-    """
-    known = found >= 0
-    first = np.where(known, found, found.max() + 1).min(axis=axis)
-    first = np.where(known.any(axis=axis), first, 0)
-    return first, np.where(known, found, np.expand_dims(first, axis))

@@ -13,8 +13,36 @@ from ...results import Flag, ModelFit
 from .impulses import channels
 
 
+class ImpulseFit(ModelFit):
+    """What a model of an impulse response, with its `delay` in samples, says of it."""
+
+    impulse: ImpulseResponse
+    delay: int
+
+    @property
+    def dt(self) -> float:
+        """Sample time in s."""
+        return self.impulse.dt
+
+    @property
+    def dead_time(self) -> float:
+        """`delay` in s."""
+        return self.delay * self.dt
+
+    @property
+    def sampling(self) -> str:
+        """How the impulse response was sampled."""
+        return self.impulse.sampling
+
+    @property
+    def records(self) -> tuple[Record, ...]:
+        """The record behind the impulse response, if it is known."""
+        step = self.impulse.step
+        return () if step is None or step.record is None else (step.record,)
+
+
 @dataclass(frozen=True, eq=False)
-class Realization(ModelFit):
+class Realization(ImpulseFit):
     """Result of the realization of an impulse response.
 
     ``iae`` is the sum of ``|impulse.markov[k] - sys.markov(n)[k]|`` over the ``n = delay + samples
@@ -77,27 +105,6 @@ class Realization(ModelFit):
     flags: tuple[Flag, ...] = ()
     choices: tuple[str, ...] = ()
     interval = delay_interval = None
-
-    @property
-    def dt(self) -> float:
-        """Sample time in s."""
-        return self.impulse.dt
-
-    @property
-    def dead_time(self) -> float:
-        """`delay` in s."""
-        return self.delay * self.dt
-
-    @property
-    def sampling(self) -> str:
-        """How the impulse response was sampled."""
-        return self.impulse.sampling
-
-    @property
-    def records(self) -> tuple[Record, ...]:
-        """The record behind the impulse response, if it is known."""
-        step = self.impulse.step
-        return () if step is None or step.record is None else (step.record,)
 
     def leading_singular_values(self, count: int = 30) -> FloatArray:
         """Compute the first singular values of the Hankel matrix, as in the paper's Fig. 5.

@@ -21,7 +21,6 @@ References
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 from scipy.special import roots_jacobi
@@ -48,14 +47,6 @@ Signal = Callable[[FloatArray], FloatArray]
 """Inputs (m, K) at K times; right-continuous."""
 
 
-@dataclass(frozen=True)
-class Solution:
-    """Outputs (p, K), and their largest change when all steps were halved for the last time."""
-
-    outputs: FloatArray
-    error: float
-
-
 class TooManyStepsError(ArithmeticError):
     """The shortest delay, or the tolerance, asks for more steps than are made."""
 
@@ -70,7 +61,7 @@ def solve(
     history: FloatArray,
     tolerance: float,
     slope: bool = False,
-) -> Solution:
+) -> tuple[FloatArray, float]:
     """Solve a continuous system closed through delays.
 
     Parameters
@@ -92,7 +83,9 @@ def solve(
 
     Returns
     -------
-    Solution
+    outputs : ndarray, shape (p, K)
+    error : float
+        Their largest change when all steps were halved for the last time.
 
     Raises
     ------
@@ -115,7 +108,7 @@ def solve(
                 break
         before = outputs
         longest /= 2
-    return Solution(outputs, error)
+    return outputs, error
 
 
 def breaking_points(form: DelayForm, breaks: FloatArray, end: float) -> FloatArray:

@@ -14,9 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import linprog
 
-from ..arrays import FloatArray, IntArray
-
-Matrices = tuple[FloatArray, FloatArray, FloatArray, FloatArray]
+from ..arrays import IntArray, Matrices
 
 
 def split_delays(delays: IntArray, known: NDArray[np.bool_]) -> list[tuple[IntArray, IntArray]]:
@@ -52,17 +50,17 @@ def split_delays(delays: IntArray, known: NDArray[np.bool_]) -> list[tuple[IntAr
     shares = np.rint(np.asarray(found.x)).astype(np.int64)
     ways = [_balanced(shares[:p], shares[p:])]
     if np.any(known & (delays != np.add.outer(*ways[0]))):
-        first = _least(delays, known)
-        ways.append(_balanced(_least((delays - first).T, known.T), first))
-        second = _least(delays.T, known.T)
-        ways.append(_balanced(second, _least(delays - second[:, None], known)))
+        first = least_known(delays, known)
+        ways.append(_balanced(least_known((delays - first).T, known.T), first))
+        second = least_known(delays.T, known.T)
+        ways.append(_balanced(second, least_known(delays - second[:, None], known)))
     return ways
 
 
-def _least(delays: IntArray, known: NDArray[np.bool_]) -> IntArray:
-    """Return the smallest known entry of each column; 0 if there is none."""
-    least = np.where(known, delays, np.iinfo(np.int64).max).min(axis=0)
-    return np.where(known.any(axis=0), least, 0)
+def least_known(delays: IntArray, known: NDArray[np.bool_], axis: int = 0) -> IntArray:
+    """Return the smallest known entries along an axis; 0 where there is none."""
+    least = np.min(delays, axis, where=known, initial=np.iinfo(np.int64).max)
+    return np.where(known.any(axis), least, 0)
 
 
 def _balanced(outputs: IntArray, inputs: IntArray) -> tuple[IntArray, IntArray]:

@@ -17,12 +17,10 @@ from math import factorial
 
 import numpy as np
 
-from ..arrays import FloatArray
-
-Ladder = tuple[FloatArray, FloatArray, FloatArray, FloatArray]
+from ..arrays import Matrices
 
 
-def pade_ladder(dead_time: float, order: int) -> Ladder:
+def pade_ladder(dead_time: float, order: int) -> Matrices:
     r"""Diagonal Pade approximant of exp(-s tau) in Schwarz form.
 
     The approximant is all-pass, Q(-s)/Q(s). The Routh array of Q, exact in integers, gives

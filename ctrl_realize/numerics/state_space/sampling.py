@@ -18,16 +18,15 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from itertools import pairwise
-from typing import Any, TypeAlias
+from typing import Any
 
 import numpy as np
 from scipy.linalg import expm
 from scipy.optimize import brentq, fminbound
 
-from ..arrays import FloatArray
+from ..arrays import FloatArray, Matrices
 from .matrix_logarithm import principal_logarithm
 
-Core: TypeAlias = tuple[FloatArray, FloatArray, FloatArray, FloatArray]
 _EXPLAINED = 1e-9
 """Relative rounding of a feedthrough that a fraction of a sample explains."""
 
@@ -117,8 +116,8 @@ def sample_with_dead_time(
 
 
 def sample_ends(
-    core: Core, dt: float, before: FloatArray, behind: FloatArray
-) -> tuple[Core, tuple[int, ...], tuple[int, ...]]:
+    core: Matrices, dt: float, before: FloatArray, behind: FloatArray
+) -> tuple[Matrices, tuple[int, ...], tuple[int, ...]]:
     """Sample a continuous model with a hold and a delay at every input and output.
 
     A fraction of a sample at an input is as in `sample_with_dead_time`. At an output, what is seen
@@ -160,8 +159,8 @@ def sample_ends(
 
 
 def continuous_ends(
-    core: Core, dt: float, before: Sequence[int], behind: Sequence[int]
-) -> tuple[Core, tuple[float, ...], tuple[float, ...]]:
+    core: Matrices, dt: float, before: Sequence[int], behind: Sequence[int]
+) -> tuple[Matrices, tuple[float, ...], tuple[float, ...]]:
     """Invert `sample_ends`: find the continuous core, and delays in s, of a sampled one.
 
     The principal logarithm is taken: of all models with the same samples, the one whose poles are

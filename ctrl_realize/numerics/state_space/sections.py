@@ -27,9 +27,7 @@ from numpy.typing import NDArray
 from scipy.linalg import block_diag
 from scipy.signal import lfilter
 
-from ..arrays import ComplexArray, FloatArray
-
-Matrices = tuple[FloatArray, FloatArray, FloatArray, FloatArray]
+from ..arrays import ComplexArray, FloatArray, Matrices
 
 _SHAKEN = 1e-8
 """Relative change of A if it has no full set of eigenvectors, or equal poles."""
