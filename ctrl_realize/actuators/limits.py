@@ -11,7 +11,7 @@ import numpy as np
 from .._checks import not_negative, positive, real, within
 from ..errors import OptionError
 from ..numerics.actuators.friction import backlash
-from ..numerics.actuators.limits import resolved, saturated, slew_limited, without_dead_zone
+from ..numerics.actuators.limits import resolved, slew_limited, without_dead_zone
 from ..numerics.arrays import FloatArray
 from .base import Actuator, State
 
@@ -229,7 +229,7 @@ class Saturation(StaticMap):
         return f"travel from {self.low:g} to {self.high:g}"
 
     def _simulated(self, command: FloatArray, dt: float) -> FloatArray:
-        return saturated(command, self.low, self.high)
+        return np.asarray(np.clip(command, self.low, self.high))
 
 
 @dataclass(frozen=True)

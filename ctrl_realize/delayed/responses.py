@@ -29,12 +29,11 @@ class DelayedResponses(HostResponses, CoreAndDelays):
         points = np.atleast_1d(np.asarray(x, dtype=np.complex128))
         if points.ndim > 1:
             raise ValueError("input list must be 1D")
+        core = self._core
         if self._schur is None:
-            self._schur = responses.schur_form(self._core.A)
+            self._schur = responses.schur_form(core.A)
         with np.errstate(divide="ignore", invalid="ignore"):
-            out = responses.frequency_response(
-                self._schur, self._core.B, self._core.C, self._core.D, points
-            )
+            out = responses.frequency_response(self._schur, core.B, core.C, core.D, points)
             if any(self.input_delays):
                 out = out * powers(points, self.input_delays)[None, :, :]
             if any(self.output_delays):

@@ -11,7 +11,7 @@ from scipy.linalg import expm
 
 from ..._checks import integer, positive
 from ...errors import DelayRangeError, ModelWarning, OptionError, UnsuitableSystemError, warn_caller
-from ...numerics.arrays import FloatArray
+from ...numerics.arrays import BoolArray, FloatArray
 from ...numerics.internal_delays import form as forms
 from ...numerics.internal_delays.form import DelayForm
 from ...numerics.internal_delays.merging import ends_apart, paths_apart
@@ -115,15 +115,16 @@ class InsideConversions(DelayOperators):
             return self._joined(_paths_sampled(*paths, step), step, *names)
         before, behind, rest = ends_apart(self._form())
         rest = _held_apart(rest)
-        whole_ones = [_samples(tau, step) for tau in (*before, *behind, *rest.delays)]
-        inputs = rest.inputs
-        entry, exit_ = whole_ones[:inputs], whole_ones[inputs : inputs + rest.outputs]
-        inner = tuple(float(d) for d in whole_ones[inputs + rest.outputs :])
-        held = [not np.any(row) for row in _not_held(rest)]
+        ends = before, behind, rest.delays
+        entry, exit_, inner = ([_samples(tau, step) for tau in end] for end in ends)
+        # not driven by states or by outputs of other delays
+        below = slice(rest.outputs, None)
+        driven = np.hstack([rest.C[below], rest.D[below, rest.inputs :]])
+        held = np.asarray(~driven.any(axis=1))
         core = _held(rest, step, held)
-        form = forms.delayed_ends(replace(core, delays=inner), entry, exit_)
+        form = forms.delayed_ends(replace(core, delays=tuple(map(float, inner))), entry, exit_)
         made = self._joined(form, step, *names)
-        if not all(held):
+        if not held.all():
             self._state_error(made, step)
         return made
 
@@ -273,24 +274,13 @@ def _held_apart(form: DelayForm) -> DelayForm:
     """Split delays driven by inputs: a signal held before a delay is also held after it."""
     m, p, q = form.inputs, form.outputs, len(form.delays)
     split = [i for i in range(q) if np.any(form.D[p + i, :m]) and np.any(form.C[p + i])]
-    C, D = form.C.copy(), form.D.copy()
-    C_more, D_more = np.zeros((len(split), form.states)), D[[p + i for i in split]].copy()
-    D_more[:, m:] = 0.0
-    for i in split:
-        D[p + i, :m] = 0.0
-    columns = [m + i for i in split]
-    C, D = np.vstack([C, C_more]), np.vstack([D, D_more])
-    B, D = np.hstack([form.B, form.B[:, columns]]), np.hstack([D, D[:, columns]])
-    return DelayForm(form.A, B, C, D, (*form.delays, *(form.delays[i] for i in split)))
+    wide = form.channels([*range(q), *split])
+    wide.D[[p + i for i in split], :m] = 0.0
+    wide.C[p + q :], wide.D[p + q :, m:] = 0.0, 0.0
+    return wide
 
 
-def _not_held(form: DelayForm) -> FloatArray:
-    """Inputs of each delay that are not held: states and outputs of other delays."""
-    below = slice(form.outputs, None)
-    return np.hstack([form.C[below], form.D[below, form.inputs :]])
-
-
-def _held(form: DelayForm, step: float, held: list[bool]) -> DelayForm:
+def _held(form: DelayForm, step: float, held: BoolArray) -> DelayForm:
     """Sample a core with inputs held and outputs of delays linear between samples.
 
     With w(t) = w0 + (w1 - w0) t / h the state x - G2 w of the first-order hold moves w1 into C and
@@ -305,7 +295,7 @@ def _held(form: DelayForm, step: float, held: list[bool]) -> DelayForm:
     A, whole_step, ramp = E[:n, :n], E[:n, n : n + width], E[:n, n + width :]
     B = whole_step.copy()
     D = form.D.copy()
-    late = ramp[:, m:] * ~np.array(held, dtype=bool)
+    late = ramp[:, m:] * ~held
     B[:, m:] = whole_step[:, m:] - late + A @ late
     D[:, m:] = D[:, m:] + form.C @ late
     return DelayForm(A, B, form.C, D, form.delays)

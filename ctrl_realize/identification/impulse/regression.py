@@ -193,7 +193,12 @@ def _equations(
     """Sum the equations of all records that are longer than the past that they need."""
     signals = [_signals(record, past, start) for record in group]
     parts = [of_signals(u, y) for u, y in signals if u.shape[1] > past]
-    _check_rows(parts, needed, past + 1)
+    if sum(part.freedom for part in parts) < needed:
+        raise DataError(
+            f"only {sum(part.rows for part in parts)} samples have a complete past of {past + 1} "
+            f"samples, at least {needed + len(parts)} are needed; choose a shorter "
+            "length, use more records, or start='rest' if the plant was at rest before"
+        )
     equations = reduce(add, parts)
     if not np.all(np.diag(equations.power) > 0):
         raise DataError("an output is constant: there is no response to estimate")
@@ -219,16 +224,6 @@ def _signals(record: Record, past: int, start: str) -> tuple[FloatArray, FloatAr
     if start == "rest":
         u, y = (np.concatenate([np.repeat(z[:, :1], past, axis=1), z], axis=1) for z in (u, y))
     return u, y
-
-
-def _check_rows(equations: Sequence[NormalEquations], needed: int, past: int) -> None:
-    freedom = sum(e.freedom for e in equations)
-    if freedom < needed:
-        raise DataError(
-            f"only {sum(e.rows for e in equations)} samples have a complete past of {past} "
-            f"samples, at least {needed + len(equations)} are needed; choose a shorter "
-            "length, use more records, or start='rest' if the plant was at rest before"
-        )
 
 
 def _silence(silent: NDArray[np.bool_]) -> tuple[Flag, ...]:

@@ -62,27 +62,18 @@ def check_samples(
             f"{what}={max_delay} needs more than {max_delay + 1} samples, "
             f"the response has {available}"
         )
-    if samples is None:
-        samples = available - 1 - max_delay
-    else:
-        samples = integer(samples, "samples", 2)
-        if samples + max_delay + 1 > available:
-            raise DelayRangeError(
-                f"samples={samples} and {what}={max_delay} need {samples + max_delay + 1} "
-                f"samples, the response has {available}"
-            )
-    check_order(impulse, order, samples, padded=padded)
-    return int(samples)
-
-
-def check_order(impulse: ImpulseResponse, order: int, samples: int, *, padded: bool) -> None:
-    """Raise an error if the Hankel matrix is too small for the order."""
-    largest = hankel_size(samples, padded=padded) * min(impulse.ninputs, impulse.noutputs)
+    used = available - 1 - max_delay if samples is None else integer(samples, "samples", 2)
+    if used + max_delay + 1 > available:
+        raise DelayRangeError(
+            f"samples={used} and {what}={max_delay} need {used + max_delay + 1} "
+            f"samples, the response has {available}"
+        )
+    largest = hankel_size(used, padded=padded) * min(impulse.ninputs, impulse.noutputs)
     if not 1 <= order <= largest:
         raise OrderError(
-            f"order={order}, but a Hankel matrix of {samples} samples allows "
-            f"1 <= order <= {largest}"
+            f"order={order}, but a Hankel matrix of {used} samples allows 1 <= order <= {largest}"
         )
+    return used
 
 
 def settled_samples(impulse: ImpulseResponse, order: int, max_delay: int) -> int:

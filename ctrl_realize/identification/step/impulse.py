@@ -10,12 +10,7 @@ from ..._checks import check_type, integer, one_of, positive
 from ...data import FilterSpec, ImpulseResponse, StepResponse
 from ...errors import OptionError
 from ...numerics.arrays import FloatArray
-from ...numerics.signals.filters import (
-    backward_difference,
-    central_difference,
-    low_pass,
-    settling_samples,
-)
+from ...numerics.signals.filters import central_difference, low_pass, settling_samples
 from ...numerics.signals.onset import rise_time
 
 BANDWIDTH_TIMES_RISE = 0.35
@@ -139,4 +134,4 @@ def _cutoff(step: StepResponse, cutoff_hz: float | str | None) -> float | None:
 def _differentiate(values: FloatArray, difference: str) -> FloatArray:
     if difference == "central":
         return central_difference(values)
-    return backward_difference(values, before=float(values[0]))
+    return np.diff(values, prepend=values[0])  # G_k = S_k - S_(k-1), exact behind a hold

@@ -34,11 +34,6 @@ def slew_limited(
     return np.array(out)
 
 
-def saturated(position: FloatArray, low: float = -np.inf, high: float = np.inf) -> FloatArray:
-    """Clip to the travel between `low` and `high`."""
-    return np.asarray(np.clip(position, low, high))
-
-
 def without_dead_zone(position: FloatArray, low: float, high: float) -> FloatArray:
     """Return what a dead zone between `low` and `high` lets through: 0 inside, slope 1 outside."""
     return np.asarray(position - np.clip(position, low, high))

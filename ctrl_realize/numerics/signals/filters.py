@@ -21,27 +21,6 @@ from scipy.signal import butter, sosfilt, sosfilt_zi, sosfiltfilt
 from ..arrays import FloatArray
 
 
-def backward_difference(step: FloatArray, before: float = 0.0) -> FloatArray:
-    """Unit-pulse response of the plant with its hold: G_k = S_k - S_(k-1).
-
-    Exactly step-invariant: the sum of the result is the step response, without truncation error.
-
-    Parameters
-    ----------
-    step : ndarray, shape (N,)
-    before : float
-        S_(-1).
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> from ctrl_realize.numerics.signals.filters import backward_difference
-    >>> print(backward_difference(np.array([0.0, 1.0, 1.5])))
-    [0.  1.  0.5]
-    """
-    return np.diff(step, prepend=before)
-
-
 def central_difference(step: FloatArray) -> FloatArray:
     """Five-point derivative, error O(Ts^4), times the sample time.
 

@@ -48,13 +48,12 @@ def coloured_criterion(residuals: Sequence[FloatArray]) -> tuple[float, int]:
     `noise_lags` others of their segment. Means are subtracted.
     """
     most = noise_lags(min(e.size for e in residuals))
-    rows, targets = [], []
+    rows = []
     for e in residuals:
         centred = e - e.mean()
         rows.append(np.stack([centred[most - i : e.size - i] for i in range(most + 1)]))
-        targets.append(rows[-1][0])
     sums = np.sum([lagged @ lagged.T for lagged in rows], axis=0)
-    n = sum(target.size for target in targets)
+    n = sum(lagged.shape[1] for lagged in rows)
     floor = 1e-300
     found = [(n * float(np.log(max(sums[0, 0] / n, floor))), 0)]
     scale = max(float(np.trace(sums)) / (most + 1), floor)
@@ -67,7 +66,6 @@ def coloured_criterion(residuals: Sequence[FloatArray]) -> tuple[float, int]:
 
 _WILD = 4.0  # standard deviations of which one of 16 000 Gaussian samples is beyond: cut
 _NOTHING = 1e-6  # relative size of a response that has decayed
-_SLOWEST = 0.99  # pole of noise: slower noise is a drift over 200 samples
 _JITTER = 1e-9  # of the variance: a covariance of smooth noise is nearly singular
 _TURNS = 100  # of expectation and maximisation at most, and
 _SAME = 1e-4  # difference of coefficients in a turn, at which they end

@@ -76,10 +76,8 @@ class LineSum:
 
 def _low_rank(rows: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Write rows = mix @ few; all rows of a predictor are combinations of one or two taps."""
-    if rows.size == 0:
-        return np.zeros((rows.shape[0], 0)), np.zeros((0, rows.shape[1]))
     U, s, V = np.linalg.svd(rows, full_matrices=False)
-    rank = int(np.sum(s > 1e-15 * s[0])) if s[0] > 0 else 0
+    rank = int(np.sum(s > 1e-15 * s.max(initial=0.0)))
     return U[:, :rank] * s[:rank], V[:rank]
 
 

@@ -61,7 +61,9 @@ class Sections:
         p, q, _ = self.C.shape
         A = block_diag(*[np.array([[0.0, 1.0], [-a2, -a1]]) for a1, a2 in self.a])
         B, C = self.B.reshape(2 * q, -1), self.C.reshape(p, 2 * q)
-        kept = self._states()
+        kept = np.ones(2 * q, dtype=np.bool_)
+        if self.single:
+            kept[-2] = False
         return A[np.ix_(kept, kept)], B[kept], C[:, kept], self.D
 
     def moved(self, step: FloatArray) -> Sections:
@@ -82,12 +84,6 @@ class Sections:
             a[:], C[:] = False, False
         D = np.full(self.D.shape, feedthrough)
         return np.concatenate([x.ravel() for x in (a, B, C, D)])
-
-    def _states(self) -> NDArray[np.bool_]:
-        kept = np.ones(2 * self.a.shape[0], dtype=np.bool_)
-        if self.single:
-            kept[-2] = False
-        return kept
 
 
 def in_sections(A: FloatArray, B: FloatArray, C: FloatArray, D: FloatArray) -> Sections:
@@ -172,7 +168,7 @@ class Motion:
 
 def motion(model: Sections, v: FloatArray) -> Motion:
     """Filter the inputs (m, T) through every section."""
-    T = v.shape[1]
+    T, q = v.shape[1], len(model.a)
     # An initial state is a pulse one sample before the record.
     inputs = np.zeros((v.shape[0] + 1, T + 1))
     inputs[:-1, 1:], inputs[-1, 0] = v, 1.0
@@ -185,12 +181,11 @@ def motion(model: Sections, v: FloatArray) -> Motion:
         states.append(x)
         bent.append(_bent(a1, a2, x))
         free.append(moved[:, :, -1])
-    shape = (0, 2, 2)
     return Motion(
-        np.array(states).reshape(-1, 2, T),
-        np.array(driven).reshape(-1, 2, 2, v.shape[0], T),
-        np.array(bent).reshape(*((-1,) if bent else (0,)), *shape[1:], T),
-        np.array(free).reshape(*((-1,) if free else (0,)), *shape[1:], T),
+        np.reshape(states, (q, 2, T)),
+        np.reshape(driven, (q, 2, 2, v.shape[0], T)),
+        np.reshape(bent, (q, 2, 2, T)),
+        np.reshape(free, (q, 2, 2, T)),
     )
 
 
