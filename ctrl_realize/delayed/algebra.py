@@ -9,7 +9,7 @@ import control as ct
 from ..errors import OptionError
 from ..numerics.internal_delays.form import DelayForm, delayed_ends
 from .operators import DelayOperators
-from .parts import CoreAndDelays, named, signals_of
+from .parts import CoreAndDelays, matrices_of, named, signals_of
 
 _ENDS = ("prefix", "suffix")
 
@@ -18,8 +18,7 @@ class DelayedAlgebra(CoreAndDelays, DelayOperators):
     """Operations on the core, which leave the delays as they are."""
 
     def _form(self) -> DelayForm:
-        core = self._core
-        form = DelayForm(core.A, core.B, core.C, core.D)
+        form = DelayForm(*matrices_of(self._core))
         return delayed_ends(form, self.input_delays, self.output_delays)
 
     def _around(self, core: ct.StateSpace, **changes: Any) -> Self:

@@ -12,7 +12,7 @@ from ..numerics.constants import SMALLEST
 from ..numerics.internal_delays.dominant import largest
 from ..numerics.internal_delays.form import DelayForm
 from ..numerics.state_space.responses import markov
-from .parts import CoreAndDelays, signals_of
+from .parts import CoreAndDelays, matrices_of, signals_of
 
 _MOST_LOST = 1e-3  # of a response, by rounding of coefficients that cancel
 
@@ -52,8 +52,7 @@ class DelayedAnalysis(CoreAndDelays):
         return np.asarray(super().zeros(), dtype=np.complex128)
 
     def _gain_form(self) -> DelayForm:
-        core = self._core
-        return DelayForm(core.A, core.B, core.C, core.D)
+        return DelayForm(*matrices_of(self._core))
 
     def to_tf(self) -> ct.TransferFunction:
         """Transfer function: that of the core, with d further poles at zero.
@@ -69,7 +68,7 @@ class DelayedAnalysis(CoreAndDelays):
         poles = np.linalg.eigvals(core.A)
         den = np.real(np.poly(poles)) if n else np.ones(1)
         _warn_of_cancellation(den, poles)
-        pulses = markov(core.A, core.B, core.C, core.D, n + 1)
+        pulses = markov(*matrices_of(core), n + 1)
         total = np.add.outer(self.output_delays, self.input_delays)
         return ct.TransferFunction(
             [[_numerator(den, channel) for channel in row] for row in pulses],

@@ -14,7 +14,7 @@ from ..errors import DelayRangeError, OptionError, UnsuitableSystemError
 from ..numerics.state_space.sampling import sample_with_dead_time, split_dead_time
 from ..results import ModelFit
 from .operands import check_proper
-from .parts import MAX_DELAY, check_core, signals_of
+from .parts import MAX_DELAY, check_core, matrices_of, signals_of
 from .system import DelayedStateSpace
 
 
@@ -107,9 +107,7 @@ def delayed_ss(
                 f"the dead time is {(dead_time or 0.0) / step:.6g} samples; use a whole number of "
                 "samples"
             )
-        *sampled, samples = sample_with_dead_time(
-            system.A, system.B, system.C, system.D, step, dead_time or 0.0
-        )
+        *sampled, samples = sample_with_dead_time(*matrices_of(system), step, dead_time or 0.0)
         if not all(np.isfinite(M).all() for M in sampled):
             raise UnsuitableSystemError(
                 f"sampled every {step:g} s the core has non-finite entries; its poles reach "

@@ -11,7 +11,7 @@ import numpy as np
 
 from .._checks import check_type, system_names
 from ..errors import OptionError, UnsuitableSystemError
-from ..numerics.arrays import ComplexArray, IntArray, Matrices, read_only
+from ..numerics.arrays import ComplexArray, IntArray, Matrices
 from .chains import chain_labels
 from .deferred import DeferredMatrices
 
@@ -97,7 +97,7 @@ def named(
 ) -> ct.StateSpace:
     """Copy the core, with read-only matrices and these names."""
     made = ct.StateSpace(
-        *(read_only(M) for M in (core.A, core.B, core.C, core.D)),
+        *matrices_of(core),
         core.dt,
         inputs=list(inputs),
         outputs=list(outputs),
@@ -105,14 +105,19 @@ def named(
         name=name,
         remove_useless_states=False,
     )
-    for M in (made.A, made.B, made.C, made.D):
+    for M in matrices_of(made):
         M.flags.writeable = False
     return made
 
 
+def matrices_of(core: Any) -> Matrices:
+    """A, B, C and D of a core."""
+    return core.A, core.B, core.C, core.D
+
+
 def parts_of(core: ct.StateSpace) -> tuple[Matrices, float | None, list[str]]:
     """Return what `with_core` needs of a core: a system of python-control cannot be stored."""
-    return (core.A, core.B, core.C, core.D), core.dt, core.state_labels
+    return matrices_of(core), core.dt, core.state_labels
 
 
 def with_core(
@@ -161,7 +166,7 @@ def check_entries(system: Any) -> None:
     if isinstance(system, DeferredMatrices):
         return
     if isinstance(system, ct.StateSpace):
-        entries = [system.A, system.B, system.C, system.D]
+        entries = [*matrices_of(system)]
     elif isinstance(system, ct.TransferFunction):
         entries = [part for all_ in (system.num, system.den) for row in all_ for part in row]
     elif isinstance(system, ct.FrequencyResponseData):

@@ -13,7 +13,7 @@ from ..numerics.internal_delays.recurrence import recurrence
 from ..numerics.state_space import responses
 from .chains import powers
 from .host_responses import HostResponses
-from .parts import CoreAndDelays, settled_values
+from .parts import CoreAndDelays, matrices_of, settled_values
 
 
 class DelayedResponses(HostResponses, CoreAndDelays):
@@ -64,8 +64,7 @@ class DelayedResponses(HostResponses, CoreAndDelays):
         if state is not None:
             return recurrence(self._form(), inputs, state)
         held = np.stack([later(u, d) for u, d in zip(inputs, self.input_delays, strict=True)])
-        core = self._core
-        out = responses.simulate(core.A, core.B, core.C, core.D, held)
+        out = responses.simulate(*matrices_of(self._core), held)
         return np.stack([later(y, q) for y, q in zip(out, self.output_delays, strict=True)])
 
     def features(self) -> tuple[ComplexArray, float]:
@@ -76,8 +75,7 @@ class DelayedResponses(HostResponses, CoreAndDelays):
         return np.asarray(np.log(poles) / self.dt, dtype=np.complex128), dead_time
 
     def _with_delay(self, response: Any, count: int) -> FloatArray:
-        core = self._core
-        free: FloatArray = response(core.A, core.B, core.C, core.D, count)
+        free: FloatArray = response(*matrices_of(self._core), count)
         out = np.zeros_like(free)
         for i, behind in enumerate(self.output_delays):
             for j, before in enumerate(self.input_delays):

@@ -19,6 +19,7 @@ from ..numerics.state_space.sampling import continuous_ends
 from . import DelayedStateSpace, DelaySystem
 from .inside.conversions import check_logarithm
 from .operands import plain
+from .parts import matrices_of
 
 Start = Literal["estimate", "rest"]
 
@@ -81,7 +82,7 @@ def _unknown_starts(model: DelayedStateSpace, N: int) -> list[FloatArray]:
     free = markov(core.A, np.eye(n), core.C, np.zeros((p, n)), N + 1)[:, :, 1:]
     parts = [_through_outputs(free, model)] if n else []
     if any(model.input_delays):
-        steps = step_response(core.A, core.B, core.C, core.D, N)
+        steps = step_response(*matrices_of(core), N)
         for j in range(m):
             pulses = [
                 later(steps[:, [j]], first) - later(steps[:, [j]], last)
@@ -141,7 +142,7 @@ def _on_axis(model: DelayedStateSpace, step: float) -> DelayedStateSpace:
     core = model.delay_free
     check_logarithm(core.A)
     ends = model.input_delays, model.output_delays
-    matrices, *delays = continuous_ends((core.A, core.B, core.C, core.D), float(core.dt), *ends)
+    matrices, *delays = continuous_ends(matrices_of(core), float(core.dt), *ends)
     form = delayed_ends(DelayForm(*matrices), *delays)
     sampled: Any = DelaySystem(plain(form, 0), form.delays).to_discrete(step)
     return sampled.replace(fit=model.fit)  # type: ignore[no-any-return]

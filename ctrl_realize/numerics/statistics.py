@@ -103,8 +103,7 @@ def trimmed_statistics(values: FloatArray, trim: int, *, ddof: int = 1) -> Trimm
     # Rounding may make the mean of equal values differ from them.
     mean = float(np.clip(kept.mean(), kept[0], kept[-1]))
     winsorized = np.clip(ordered, kept[0], kept[-1])
-    std_error = float("nan")
-    half_width = float("nan")
+    std_error = half_width = float("nan")
     if kept.size > 1:
         std_error = float(winsorized.std(ddof=1) / ((kept.size / n) * np.sqrt(n)))
         half_width = float(special.stdtrit(kept.size - 1, 0.975)) * std_error

@@ -14,7 +14,7 @@ from ...numerics.internal_delays.form import DelayForm, without_zero_delays
 from ..deferred import DeferredMatrices
 from ..operands import plain, whole_samples
 from ..operators import solvable
-from ..parts import MAX_DELAY, check_entries
+from ..parts import MAX_DELAY, check_entries, matrices_of
 
 _INSTEAD = facts("delayed/advice.toml")["instead"]
 """What to call instead, by the function of python-control that was called."""
@@ -95,5 +95,5 @@ def without_zeros(
         They close an algebraic loop.
     """
     with solvable("its delays of 0 s"):
-        form = without_zero_delays(DelayForm(core.A, core.B, core.C, core.D, delays))
+        form = without_zero_delays(DelayForm(*matrices_of(core), delays))
     return plain(form, dt, core.state_labels), form.delays

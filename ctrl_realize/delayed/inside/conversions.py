@@ -19,6 +19,7 @@ from ...numerics.state_space.pade import pade_ladder
 from ...numerics.state_space.sampling import continuous_ends, sample_ends, split_dead_time
 from ..operands import plain
 from ..operators import DelayOperators
+from ..parts import matrices_of
 
 MAX_PADE_ORDER = 20
 
@@ -165,8 +166,7 @@ class InsideConversions(DelayOperators):
         core, before, behind, left, right = paths
         check_logarithm(core.A)
         whole = [[int(tau) for tau in end] for end in (before, behind)]
-        matrices = core.A, core.B, core.C, core.D
-        found, entry, exit_ = continuous_ends(matrices, float(self.dt), *whole)
+        found, entry, exit_ = continuous_ends(matrices_of(core), float(self.dt), *whole)
         made = forms.through(forms.delayed_ends(DelayForm(*found), entry, exit_), left, right)
         return self._joined(made, 0, self.input_labels, self.output_labels)
 
@@ -255,7 +255,7 @@ def _paths_sampled(
             f"{(before[j] + behind[i]) / step:.6g} samples of {step:g} s; choose dt so that it is "
             "a whole number"
         )
-    sampled, *whole = sample_ends((core.A, core.B, core.C, core.D), step, before, behind)
+    sampled, *whole = sample_ends(matrices_of(core), step, before, behind)
     ends = (tuple(map(float, end)) for end in whole)
     return forms.through(forms.delayed_ends(DelayForm(*sampled), *ends), left, right)
 

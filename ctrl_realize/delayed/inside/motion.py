@@ -71,16 +71,14 @@ class Motion(InsidePoles):
     ) -> ct.TimeResponseData:
         """Compute the responses to a unit step, or a unit impulse, on each input."""
         times = self._motion_times(timepts)
-        m = self.ninputs
-        outputs = np.empty((self.noutputs, m, times.size))
-        drive = np.zeros((m, m, times.size))
-        pulse = kind == "impulse"
-        for j in range(m):
-            unit = _unit_signal(m, j)
-            outputs[:, j] = self._solved(unit, times, np.zeros(0), tolerance, slope=pulse)
-            drive[j, j] = 1.0
+        units, pulse = np.eye(self.ninputs)[:, :, None], kind == "impulse"
+        every = [
+            self._solved(_constant(unit), times, np.zeros(0), tolerance, slope=pulse)
+            for unit in units
+        ]
+        drive = units * np.ones(times.size)
         return self._unit_responses(
-            times, outputs, drive, kind, squeeze=squeeze, transpose=transpose
+            times, np.stack(every, axis=1), drive, kind, squeeze=squeeze, transpose=transpose
         )
 
     def _solved(
@@ -141,11 +139,9 @@ class Motion(InsidePoles):
         return min(max(slow + delay, 5 * delay), 100 * delay + slow) or 1.0
 
 
-def _unit_signal(m: int, j: int) -> Callable[[FloatArray], FloatArray]:
-    """Make the signal that is 1 on one of m inputs."""
-    unit = np.zeros((m, 1))
-    unit[j] = 1.0
-    return lambda t: np.repeat(unit, t.size, axis=1)
+def _constant(inputs: FloatArray) -> Callable[[FloatArray], FloatArray]:
+    """Make the signal that is the inputs (m, 1) at all times."""
+    return lambda t: np.repeat(inputs, t.size, axis=1)
 
 
 def _checked_times(timepts: ArrayLike | None, name: str) -> FloatArray:

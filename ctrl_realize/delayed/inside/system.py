@@ -20,7 +20,7 @@ from ...numerics.internal_delays.merging import ends_apart
 from ...numerics.internal_delays.response import Response
 from ..operands import plain
 from ..operators import INSIDE, DelayOperators
-from ..parts import named, parts_of, signal_names, signals_of, stand_in, with_core
+from ..parts import matrices_of, named, parts_of, signal_names, signals_of, stand_in, with_core
 from .cards import InsideCards
 from .checks import check_core, check_delays, not_rational, without_zeros
 from .conversions import InsideConversions
@@ -133,8 +133,7 @@ class DelaySystem(InsideResponses, InsideConversions, InsideCards, DelayOperator
         return self._core
 
     def _form(self) -> DelayForm:
-        core = self._core
-        return DelayForm(core.A, core.B, core.C, core.D, self.internal_delays)
+        return DelayForm(*matrices_of(self._core), self.internal_delays)
 
     def delay_apart(self) -> tuple[DelaySystem, float]:
         """Split a system with one input and one output into its core and the dead time before it.

@@ -157,7 +157,6 @@ def impulse_from_io(
         if flag.code == "partly_excited":
             # one frame more: the limit of BLAS threads around this function
             warnings.warn(flag.message, DataWarning, stacklevel=3)
-    flags = found.flags + tail
     siso = group[0].input.ndim == 1 and group[0].output.ndim == 1
     return ImpulseEstimate(
         found.markov[0, 0] if siso else found.markov,
@@ -167,7 +166,7 @@ def impulse_from_io(
         method=found.method,
         rows=found.rows,
         choices=(chosen.reason,) if chosen is not None and chosen.reason else (),
-        flags=flags,
+        flags=found.flags + tail,
         name=group[0].name,
     )
 

@@ -10,6 +10,7 @@ import numpy as np
 
 from ...data import ImpulseResponse
 from ...delayed import DelayedStateSpace, fit_of
+from ...delayed.parts import matrices_of
 from ...errors import OrderError
 from ...numerics.arrays import FloatArray, IntArray, Matrices
 from ...numerics.hankel.delay_models import realize_at
@@ -77,8 +78,7 @@ def _realized(
             p, m, _ = markov.shape
             return (np.zeros((0, 0)), np.zeros((0, m)), np.zeros((p, 0)), markov[:, :, 0]), ()
         system = realize(moved, rank, samples=samples)
-    core = system.delay_free
-    return (core.A, core.B, core.C, core.D), fit_of(system, Realization).flags
+    return matrices_of(system.delay_free), fit_of(system, Realization).flags
 
 
 def aligned_core(

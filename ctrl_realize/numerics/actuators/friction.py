@@ -48,10 +48,7 @@ def backlash(position: FloatArray, width: float, start: float = 0.0) -> FloatArr
     out = []
     current = float(position[0]) - start * half
     for wanted in position.tolist():
-        if wanted - half > current:
-            current = wanted - half
-        elif wanted + half < current:
-            current = wanted + half
+        current = min(max(current, wanted - half), wanted + half)
         out.append(current)
     return np.array(out)
 

@@ -106,26 +106,23 @@ def realize_at(
     """
     p, m, _ = markov.shape
     size = hankel_size(samples, padded=padded)
-    if p == m == 1 and size > COMPLETE_SIZE:
-        models = realize_at_delays(
-            markov, np.array([delay]), samples, order, padded=padded, tol=tol
-        )
-        leading = models.singular_values[0]
-        h = markov[0, 0, delay + 1 : delay + 1 + (samples if padded else 2 * size - 1)]
-        bound = tail_bound(hankel_norm_squared(h, size, size), leading, size)
-        following = float(models.following[0])
-        return OneModel(models.A[0], models.B[0], models.C[0], leading, following, bound)
     h = markov[:, :, delay + 1 : delay + 1 + samples]
     known = h if padded else h[:, :, : 2 * size - 1]
-    found = leading_triplets(known, size, size, order, tol=tol)
-    last = None if padded else h[:, :, size : 2 * size].transpose(0, 2, 1).reshape(p, -1)
-    A, B, C = realize_block(found.U, found.values, found.V, (p, m), last)
-    following = float(found.others[0]) if found.others.size else 0.0
-    if found.complete:
-        values = np.concatenate([found.values, found.others])
-        return OneModel(A, B, C, values, following, 2.0 * float(found.others.sum()))
-    bound = tail_bound(hankel_norm_squared(known, size, size), found.values, size * min(p, m))
-    return OneModel(A, B, C, found.values, following, bound)
+    if p == m == 1 and size > COMPLETE_SIZE:
+        one = np.array([delay])
+        models = realize_at_delays(markov, one, samples, order, padded=padded, tol=tol)
+        A, B, C, values = models.A[0], models.B[0], models.C[0], models.singular_values[0]
+        following = float(models.following[0])
+    else:
+        found = leading_triplets(known, size, size, order, tol=tol)
+        last = None if padded else h[:, :, size : 2 * size].transpose(0, 2, 1).reshape(p, -1)
+        A, B, C = realize_block(found.U, found.values, found.V, (p, m), last)
+        values, following = found.values, float(found.others[0]) if found.others.size else 0.0
+        if found.complete:
+            values = np.concatenate([values, found.others])
+            return OneModel(A, B, C, values, following, 2.0 * float(found.others.sum()))
+    bound = tail_bound(hankel_norm_squared(known, size, size), values, size * min(p, m))
+    return OneModel(A, B, C, values, following, bound)
 
 
 def realize_at_delays(

@@ -80,11 +80,6 @@ class EigenPairs:
     vectors: FloatArray
     following: FloatArray
 
-    @classmethod
-    def empty(cls, members: int, size: int, count: int) -> EigenPairs:
-        """Return arrays that take pairs as they converge."""
-        return cls(np.zeros((members, count)), np.zeros((members, count, size)), np.zeros(members))
-
     def part(self, members: IntArray) -> EigenPairs:
         """Return the positions of consecutive members."""
         rows = slice(int(members[0]), int(members[-1]) + 1)
@@ -122,7 +117,9 @@ def leading_eigenpairs(h: FloatArray, size: int, count: int, *, tol: float = 1e-
     fixed random vector. (A start in the range of H saves steps; a pure
     eigenvector as a start would miss the others.)
     """
-    result = EigenPairs.empty(h.shape[0], size, count)
+    # arrays that take pairs as they converge
+    values, following = np.zeros((len(h), count)), np.zeros(len(h))
+    result = EigenPairs(values, np.zeros((len(h), count, size)), following)
     small = size <= DENSE_SIZE or 4 * count >= size
     # Several members at a time hide Python's overhead; too many leave the cache.
     chunk = int(np.clip(CHUNK_BYTES // (8 * size * 32), 1, 64))

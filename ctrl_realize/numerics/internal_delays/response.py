@@ -143,10 +143,8 @@ class Response:
             held, late = turns(form.delays, points, discrete=self.discrete)
             out, largest = _closed(core, held, late, p, m)
             doubtful = ~np.isfinite(out).all(axis=(0, 1)) | (largest > CANCELS).any(axis=(0, 1))
-        eigenvalues = np.diag(self.schur[0])
-        if eigenvalues.size:
-            for pole in eigenvalues:
-                doubtful |= np.abs(points - pole) < NEAR_POLE * max(1.0, abs(pole))
+        for pole in np.diag(self.schur[0]):
+            doubtful |= np.abs(points - pole) < NEAR_POLE * max(1.0, abs(pole))
         if doubtful.any():
             out[:, :, doubtful] = solved_response(form, points[doubtful], discrete=self.discrete)
         return out

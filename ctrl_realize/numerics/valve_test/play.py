@@ -116,11 +116,8 @@ def _misfits(
         product, power, out=np.zeros_like(power), where=power > 1e-12 * np.ptp(levels) ** 2
     )
     sums = np.maximum(float(centred @ centred) - gains * product, 0.0)
-    which = np.argmin(sums, axis=1)[:, None]
-    return (
-        np.take_along_axis(sums, which, axis=1)[:, 0],
-        np.take_along_axis(gains, which, axis=1)[:, 0],
-    )
+    which = np.arange(widths.size), np.argmin(sums, axis=1)
+    return sums[which], gains[which]
 
 
 def slope_of(x: FloatArray, y: FloatArray) -> float:
