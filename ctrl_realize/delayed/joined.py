@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import reduce
 from typing import Any
 
 import control as ct
@@ -52,9 +53,7 @@ def interconnect(systems: Sequence[Any], *args: Any, **settings: Any) -> Any:
     <DelaySystem: r -> y, u, order 2, internal delay 30 samples, dt = 0.01 s>
     """
     dt = _time_base(systems)
-    all_ = form_of(systems[0])
-    for system in systems[1:]:
-        all_ = forms.append(all_, form_of(system))
+    all_ = reduce(forms.append, map(form_of, systems))
     wired = ct.interconnect([*map(stand_in, systems)], *args, **settings)
     gain, into = np.asarray(wired.connect_map), np.asarray(wired.input_map)
     # selection of the outputs, and the inputs u = gain y + into r

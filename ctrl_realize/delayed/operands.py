@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import reduce
 from typing import Any
 
 import control as ct
@@ -147,9 +148,9 @@ def everywhere(single: DelayForm, other: DelayForm) -> DelayForm:
 def product(second: DelayForm, first: DelayForm) -> DelayForm:
     """Series; a system of one input and output is applied to each channel, as in python-control."""
     if is_single(second) and first.outputs != 1:
-        second = _repeated(second, first.outputs)
+        second = reduce(forms.append, [second] * first.outputs)
     elif is_single(first) and second.inputs != 1:
-        first = _repeated(first, second.inputs)
+        first = reduce(forms.append, [first] * second.inputs)
     if second.inputs != first.outputs:
         raise OptionError(f"systems {shapes(second, first)} cannot be multiplied")
     (before, behind, core), (entry, exit_, other) = ends_apart(first), ends_apart(second)
@@ -161,13 +162,6 @@ def product(second: DelayForm, first: DelayForm) -> DelayForm:
     if is_single(joined):
         late, exit_ = late + exit_[0], (0.0,)
     return forms.delayed_ends(joined, [delay + late for delay in before], exit_)
-
-
-def _repeated(single: DelayForm, count: int) -> DelayForm:
-    form = single
-    for _ in range(count - 1):
-        form = forms.append(form, single)
-    return form
 
 
 def shapes(left: DelayForm, right: DelayForm) -> str:

@@ -108,14 +108,8 @@ def trimmed_statistics(values: FloatArray, trim: int, *, ddof: int = 1) -> Trimm
         std_error = float(winsorized.std(ddof=1) / ((kept.size / n) * np.sqrt(n)))
         half_width = float(special.stdtrit(kept.size - 1, 0.975)) * std_error
     variance = float(kept.var(ddof=ddof)) if kept.size > ddof else float("nan")
-    return TrimmedStatistics(
-        mean=mean,
-        variance=variance,
-        std_error=std_error,
-        interval=(mean - half_width, mean + half_width),
-        count=int(kept.size),
-        dropped=2 * trim,
-    )
+    interval = mean - half_width, mean + half_width
+    return TrimmedStatistics(mean, variance, std_error, interval, int(kept.size), 2 * trim)
 
 
 def circle_quantile(level: float, repeats: float | None) -> float:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Sequence
 from functools import partial
+from itertools import product
 from typing import Literal
 
 import numpy as np
@@ -176,14 +177,9 @@ def _latest_onset(group: tuple[Record, ...], lags: int) -> int:
     record = max(group, key=lambda one: one.n_samples)
     if record.n_missing:
         return 0
-    u, y = np.atleast_2d(record.input), np.atleast_2d(record.output)
-    moving = [row for row in u if np.ptp(row) > 0]
-    onsets = [
-        correlation_onset(drive, row, lags, SURE).onset
-        for drive in moving
-        for row in y
-        if np.ptp(row) > 0
-    ]
+    signals = np.atleast_2d(record.input), np.atleast_2d(record.output)
+    moving = ([row for row in rows if np.ptp(row) > 0] for rows in signals)
+    onsets = [correlation_onset(u, y, lags, SURE).onset for u, y in product(*moving)]
     return max([0, *onsets])
 
 

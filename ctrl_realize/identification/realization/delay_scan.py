@@ -116,7 +116,7 @@ def best_of(surface: Surface, order: int) -> DelayedStateSpace:
         hankel=surface.hankel,
     )
     realization = fit_of(system, Realization)
-    last = surface.singular_value(order, delay)
+    last = float(surface.singular_values[delay, order - 1])
     fit = DelayScan(
         iae=read_only(iae),
         delay=delay,

@@ -235,8 +235,8 @@ def scan_orders(
     surface = scan_surface(impulse, tried, max_delay, samples, feedthrough, hankel, dt)
     rounding = surface.rounding
     delays = tuple(best_delay(row, rounding) for row in surface.iae)
-    last = [surface.singular_value(k, d) for k, d in zip(surface.orders, delays, strict=True)]
-    chosen = suggest_order(surface, np.array(last))
+    last = surface.singular_values[list(delays), np.array(surface.orders) - 1]
+    chosen = suggest_order(surface, last)
     i = surface.orders.index(chosen)
     return OrderScan(
         orders=surface.orders,
@@ -252,7 +252,7 @@ def scan_orders(
         impulse=surface.impulse,
         flags=(
             *curve_flags(surface.iae[i], delays[i], rounding),
-            *noise_flags(last[i], surface.noise_floor, chosen),
+            *noise_flags(float(last[i]), surface.noise_floor, chosen),
             *filter_flags(surface.impulse),
         ),
         _surface=surface,

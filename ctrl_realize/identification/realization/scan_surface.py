@@ -43,10 +43,6 @@ class Surface:
         """Number of samples of the IAE."""
         return int(self.samples + self.iae.shape[1])
 
-    def singular_value(self, order: int, delay: int) -> float:
-        """Singular value `order` of the Hankel matrix for a delay."""
-        return float(self.singular_values[delay, order - 1])
-
 
 def scan_surface(
     impulse: ImpulseResponse | ArrayLike,

@@ -36,12 +36,10 @@ class Ellipse:
 def fit_ellipse(output: FloatArray, value: FloatArray, period: float) -> Ellipse:
     """Fit the ellipse to each segment of both signals (N,), and return the one of median width."""
     length = min(round(_CYCLES * period), output.size)
-    found = []
-    for start in range(0, output.size - length + 1, max(length, 1)):
-        part = slice(start, start + length)
-        found.append(_fundamentals(output[part], value[part], period))
-    found.sort(key=lambda one: one.width)
-    return found[len(found) // 2]
+    starts = range(0, output.size - length + 1, max(length, 1))
+    parts = [slice(start, start + length) for start in starts]
+    found = [_fundamentals(output[part], value[part], period) for part in parts]
+    return sorted(found, key=lambda one: one.width)[len(found) // 2]
 
 
 def _fundamentals(output: FloatArray, value: FloatArray, period: float) -> Ellipse:

@@ -91,9 +91,8 @@ def normal_equations(
     """
     keep = complete_rows(signals, targets, lags)
     # Means are subtracted first: sums with large offsets would lose digits.
-    z, y = (
-        (_centred(signals), _centred(targets)) if offset else (_zeroed(signals), _zeroed(targets))
-    )
+    filled = _centred if offset else _zeroed
+    z, y = filled(signals), filled(targets)
     gram, sums = _gram(z, lags)
     cross = _correlation(y[:, lags - 1 :], z, lags).reshape(y.shape[0], -1).T
     tail = y[:, lags - 1 :]

@@ -119,14 +119,10 @@ def find_edges(
             edges.append(edge)
             if most is not None and len(edges) > most:
                 break
-    return [
-        replace(
-            e,
-            start=edges[i - 1].index + edges[i - 1].samples - 1 if i else 0,
-            stop=edges[i + 1].index if i + 1 < len(edges) else int(clean.size),
-        )
-        for i, e in enumerate(edges)
-    ]
+    starts = [0, *(edge.index + edge.samples - 1 for edge in edges[:-1])]
+    stops = [*(edge.index for edge in edges[1:]), int(clean.size)]
+    around = zip(edges, starts, stops, strict=False)  # without edges there is nothing between them
+    return [replace(edge, start=start, stop=stop) for edge, start, stop in around]
 
 
 def _significant_range(values: FloatArray, noise: float) -> float:

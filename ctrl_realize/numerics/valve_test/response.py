@@ -218,8 +218,6 @@ def _root(curve: np.polynomial.Polynomial, level: float) -> float:
 def _smoothing(shape: FloatArray, noise: Noise) -> int:
     """Window of the moving mean: 1 % of noise if it stays below a quarter of the rise."""
     wanted = int(np.ceil(noise.correlation * (noise.sigma / 0.01) ** 2))
-    if wanted <= 1:
-        return 1
     for width in (1, 3, 5, 9, 15, 25, 41, 65, 101, 161, 257, 401):
         smooth = _smoothed(shape, width)
         high = int(np.argmax(smooth >= 0.8)) if (smooth >= 0.8).any() else shape.size
