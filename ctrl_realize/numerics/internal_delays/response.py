@@ -12,6 +12,8 @@ References
 
 from __future__ import annotations
 
+from contextlib import suppress
+
 import numpy as np
 
 from ..arrays import ComplexArray, whole_power
@@ -110,10 +112,8 @@ def solve_each(matrices: ComplexArray, right: ComplexArray) -> ComplexArray:
     except np.linalg.LinAlgError:
         out = np.full(right.shape, np.nan, dtype=np.complex128)
         for k, (M, r) in enumerate(zip(matrices, right, strict=True)):
-            try:
+            with suppress(np.linalg.LinAlgError):
                 out[k] = np.linalg.solve(M, r)
-            except np.linalg.LinAlgError:
-                continue
         return out
 
 

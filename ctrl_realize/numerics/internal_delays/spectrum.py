@@ -82,10 +82,9 @@ def rightmost_poles(form: DelayForm, count: int) -> ComplexArray:
     """
     found = [np.zeros(0, dtype=np.complex128)]
     for part in loops(form):
-        if not part.delays or (not part.states and not np.any(part.D)):
-            found.append(np.asarray(np.linalg.eigvals(part.A), dtype=np.complex128))
-            continue
-        found.append(_of_loop(part, count))
+        plain = not part.delays or (not part.states and not np.any(part.D))
+        own = np.linalg.eigvals(part.A).astype(np.complex128)
+        found.append(own if plain else _of_loop(part, count))
     return in_order(np.concatenate(found), count)
 
 

@@ -40,9 +40,7 @@ def split_delays(delays: IntArray, known: NDArray[np.bool_]) -> list[tuple[IntAr
     """
     p, m = delays.shape
     rows, columns = np.nonzero(known)
-    limits = np.zeros((rows.size, p + m))
-    limits[np.arange(rows.size), rows] = 1.0
-    limits[np.arange(rows.size), p + columns] = 1.0
+    limits = np.hstack([np.eye(p)[rows], np.eye(m)[columns]])
     # Number of entries that each delay serves, with a small penalty on the samples it takes.
     gain = np.concatenate([known.sum(axis=1), known.sum(axis=0)]) - 0.5 / (p + m)
     top = float(delays[known].max(initial=0))

@@ -47,8 +47,7 @@ def zero_order_hold(A: FloatArray, B: FloatArray, dt: float) -> tuple[FloatArray
     """
     n, m = B.shape
     block = np.zeros((n + m, n + m))
-    block[:n, :n] = A
-    block[:n, n:] = B
+    block[:n, :n], block[:n, n:] = A, B
     # exp([[A, B], [0, 0]] dt) = [[Phi, Gamma], [0, I]] (Van Loan 1978).
     grown = expm(block * dt)
     return grown[:n, :n], grown[:n, n:]
