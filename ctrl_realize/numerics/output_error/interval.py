@@ -19,12 +19,12 @@ References
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from ..constants import VERY_STRONG, Z_95
 from ..engine.problem import Structure
 from ..engine.profile import Points, profile_limits
-from ..engine.structures import Scales, charged, least_charge, plausible
+from ..engine.structures import charged, least_charge, plausible
 from ..engine.window_fit import WindowFit
 from ..families.equal_lags import (
     FREE_IN_A_CHAIN,
@@ -38,7 +38,7 @@ from ..rules import Rule
 from .extrapolation import least_extrapolating
 from .friction import latest_slip
 from .margins import CloseDecision, close_choices, close_exclusions
-from .profiles import Profile, curves, laid_profiles, lower_minima, profile_of, solved_profiles
+from .profiles import curves, laid_profiles, lower_minima, profile_of, solved_profiles
 from .result import DelayInterval, DistributedLags, OtherModel, OutputErrorEstimate, assembled
 from .selection import Choice, choose_model
 
@@ -68,14 +68,24 @@ def likelihood_fit(
     are close decisions made before.
     """
     equal_lags = [chain for chain in chains if not chain.truncated]
-    fits, choice, kept = _compared(fits, equal_lags, chains, flows)
+    fits, choice, points = _compared(fits, equal_lags, flows)
     chosen, scales = choice.model, fits.scales
-    own = kept.profile_of(choice, scales)
+    profiles = curves(fits, points)
+    more = least_charge(fits.penalty) - fits.penalty
+    limit = _charged_level(fits, choice) + VERY_STRONG
+    flows = [flow for flow in flows if flow.criterion + more * flow.parameters <= limit]
+    chains = [chain for chain in chains if chain.criterion + more * FREE_IN_A_CHAIN <= limit]
+    of_flows = [profile_of(fits, flow.fit) for flow in flows]
+    pairs = zip(flows, of_flows, strict=True)
+    others = [OtherModel(flow, *profile_limits(*profile)) for flow, profile in pairs]
+    others += [OtherModel(chain, *chain_limits(chain, scales)) for chain in chains]
     if choice.chain is not None:
-        fits = _with_chain(fits, choice.chain)
-        kept.profiles[chosen.structure] = own
-    others = kept.other_models(scales)
-    limits = [profile_limits(*profile) for profile in kept.profiles.values()]
+        profiles[chosen.structure] = chain_profile(choice.chain, scales)
+        criterion = fits.criterion | {chosen.structure: choice.chain.criterion}
+        candidates = fits.candidates | {chosen.structure: chosen}
+        fits = replace(fits, candidates=candidates, criterion=criterion)
+    own = profiles[chosen.structure] if choice.flow is None else of_flows[flows.index(choice.flow)]
+    limits = [profile_limits(*profile) for profile in profiles.values()]
     limits += [(other.low, other.high) for other in others]
     low = min(chosen.dead_time, *(first for first, _ in limits))
     high = max(chosen.dead_time, *(last for _, last in limits))
@@ -83,72 +93,37 @@ def likelihood_fit(
         low = scales.earliest
     open_start = onset is not None and choice.flow is None and chosen.structure.zeros > 0
     if onset is not None and open_start and Rule.OPEN_START.on:
-        low, high = _opened(low, high, chosen.dead_time, onset, scales)
+        # A zero can imitate the onset.
+        unseen = _UNSEEN * max(onset - chosen.dead_time, scales.dt)
+        low = min(low, max(chosen.dead_time - unseen, scales.earliest))
+        high = max(high, min(onset + scales.dt, scales.latest))
     free = choice.chain is None and choice.flow is None
     if may_stick and free and not chosen.structure.zeros and Rule.FRICTION.on:
         high = max(high, latest_slip(fits, chosen) or high)
     first, last = profile_limits(*own)
     interval = DelayInterval(low, high, (last - first) / (2 * Z_95))
-    static = None
+    static, close = None, near
     if free:
+        close += close_choices(fits, choice.level, chosen.structure)
+        close += close_exclusions(fits, _charged_level(fits, choice), chosen.structure)
         chosen, static = least_extrapolating(fits, chosen)
-    found = assembled(fits, chosen, adequate, (), kept.profiles, interval, own, static=static)
-    close: tuple[CloseDecision, ...] = near
-    if free:
-        own_structure = chosen.structure
-        close += close_choices(fits, choice.level, own_structure)
-        close += close_exclusions(fits, _charged_level(fits, choice), own_structure)
-    process = found.process
-    if not free:
-        process = process.without_errors()
+    found = assembled(fits, chosen, adequate, (), profiles, interval, own, static=static)
     distributed = DistributedLags(
-        choice.chain,
-        unlimited,
-        tuple(flow for flow, _ in kept.flows),
-        choice.flow is not None,
-        tuple(others),
+        choice.chain, unlimited, tuple(flows), choice.flow is not None, tuple(others)
     )
     return replace(
         found,
-        process=process,
+        process=found.process if free else found.process.without_errors(),
         distributed=distributed,
         open_start=open_start,
         close=close,
-        points=kept.points,
+        points=points,
     )
 
 
-@dataclass(frozen=True, eq=False)
-class _Kept:
-    """Models that the data cannot rule out: structures, dispersion and chains, with profiles."""
-
-    profiles: dict[Structure, Profile]
-    flows: list[tuple[DispersedFlow, Profile]]
-    chains: list[LagChain]
-    points: dict[Structure, Points]
-
-    def profile_of(self, choice: Choice, scales: Scales) -> Profile:
-        """Misfit over the dead time for the chosen model."""
-        if choice.chain is not None:
-            return chain_profile(choice.chain, scales)
-        for flow, profile in self.flows:
-            if flow is choice.flow:
-                return profile
-        return self.profiles[choice.model.structure]
-
-    def other_models(self, scales: Scales) -> list[OtherModel]:
-        """Models other than the structures, with their intervals."""
-        flows = (OtherModel(flow, *profile_limits(*profile)) for flow, profile in self.flows)
-        chains = (OtherModel(chain, *chain_limits(chain, scales)) for chain in self.chains)
-        return [*flows, *chains]
-
-
 def _compared(
-    fits: WindowFit,
-    equal_lags: Sequence[LagChain],
-    chains: Sequence[LagChain],
-    flows: Sequence[DispersedFlow],
-) -> tuple[WindowFit, Choice, _Kept]:
+    fits: WindowFit, equal_lags: Sequence[LagChain], flows: Sequence[DispersedFlow]
+) -> tuple[WindowFit, Choice, dict[Structure, Points]]:
     """Choose, and lay the profiles of what is not ruled out: again where these lead lower."""
     points: dict[Structure, Points] = {}
     for _ in range(MOST_ROUNDS):
@@ -167,50 +142,9 @@ def _compared(
             break
         fits = fits.of(fits.candidates | lower)
         points = {s: own for s, own in points.items() if s not in lower}
-    return fits, choice, _not_ruled_out(fits, choice, chains, flows, kept)
-
-
-def _not_ruled_out(
-    fits: WindowFit,
-    choice: Choice,
-    chains: Sequence[LagChain],
-    flows: Sequence[DispersedFlow],
-    points: dict[Structure, Points],
-) -> _Kept:
-    more = least_charge(fits.penalty) - fits.penalty
-    limit = _charged_level(fits, choice) + VERY_STRONG
-    return _Kept(
-        curves(fits, points),
-        [
-            (flow, profile_of(fits, flow.fit))
-            for flow in flows
-            if flow.criterion + more * flow.parameters <= limit
-        ],
-        [chain for chain in chains if chain.criterion + more * FREE_IN_A_CHAIN <= limit],
-        points,
-    )
+    return fits, choice, kept
 
 
 def _charged_level(fits: WindowFit, choice: Choice) -> float:
     """Value of the criterion relative to which structures are ruled out."""
     return choice.level + (least_charge(fits.penalty) - fits.penalty) * choice.parameters
-
-
-def _opened(
-    low: float, high: float, dead_time: float, onset: float, scales: Scales
-) -> tuple[float, float]:
-    """Widen an interval for a zero that can imitate the onset."""
-    unseen = _UNSEEN * max(onset - dead_time, scales.dt)
-    return (
-        min(low, max(dead_time - unseen, scales.earliest)),
-        max(high, min(onset + scales.dt, scales.latest)),
-    )
-
-
-def _with_chain(fits: WindowFit, chain: LagChain) -> WindowFit:
-    structure = chain.candidate.structure
-    return replace(
-        fits,
-        candidates=fits.candidates | {structure: chain.candidate},
-        criterion=fits.criterion | {structure: chain.criterion},
-    )
