@@ -27,7 +27,7 @@ from ..families.slow_lags import fit_slow_lags
 from ..signals.noise import correlation_time
 from .interval import likelihood_fit
 from .margins import CloseDecision
-from .other_structures import Compared, better_than, line_of
+from .other_structures import Compared, Requested, better_than, line_of
 from .result import OtherStructures, OutputErrorEstimate, ProcessEstimate, StructureFit
 from .selection import chains_of
 
@@ -38,13 +38,31 @@ IsNoise = Callable[[float, float], bool]
 """Whether a residual counts as noise: of its normalised rms and its correlation time."""
 
 
+def fit_requested(
+    fits: WindowFit,
+    requested: Requested,
+    *,
+    adequate: bool,
+    is_noise: IsNoise,
+    others: Compared,
+    near: tuple[CloseDecision, ...] = (),
+) -> OutputErrorEstimate:
+    """Determine model, dead time and interval among what is requested; see `process_fit`."""
+    if requested.fastest is not None:
+        return fit_without_fast_lags(fits, requested.fastest, is_noise=is_noise, near=near)
+    if requested.forms:
+        return process_fit(fits, requested.forms, is_noise=is_noise, others=others, near=near)
+    found = likelihood_fit(fits, adequate=adequate, near=near)
+    return replace(found, others=others.told(others.better))
+
+
 def process_fit(
     fits: WindowFit,
     forms: Sequence[ProcessForm],
     *,
     is_noise: IsNoise,
     others: Compared,
-    near: tuple[CloseDecision, ...] = (),
+    near: tuple[CloseDecision, ...],
 ) -> OutputErrorEstimate:
     """Determine model, dead time and interval among process models of prescribed forms.
 
@@ -94,7 +112,7 @@ def process_fit(
 
 
 def fit_without_fast_lags(
-    fits: WindowFit, fastest: float, *, is_noise: IsNoise, near: tuple[CloseDecision, ...] = ()
+    fits: WindowFit, fastest: float, *, is_noise: IsNoise, near: tuple[CloseDecision, ...]
 ) -> OutputErrorEstimate:
     """Determine model, dead time and interval among structures without lags that are faster, in s.
 

@@ -69,8 +69,6 @@ from ..engine.modal import respond
 from ..engine.problem import Structure
 from ..engine.structures import ALL_STRUCTURES, SIMPLE_STRUCTURES, Candidate, Scales, choose
 from ..engine.window_fit import WindowFit, among, fit_window, with_noise_of_residual
-from ..families.equal_lags import LagChain
-from ..families.flow import DispersedFlow
 from ..rules import Rule
 from ..signals.edges import difference_noise, level_error
 from ..signals.load_step import LoadStep
@@ -84,7 +82,7 @@ from .interval import likelihood_fit
 from .load import load_of
 from .margins import CloseDecision, close_to
 from .other_structures import Compared, Requested, other_structures
-from .process_models import fit_without_fast_lags, process_fit
+from .process_models import fit_requested
 from .profiles import profile_of
 from .result import DelayInterval, OutputErrorEstimate, RobustKey, assembled
 from .rounded import in_rounded_data
@@ -184,17 +182,12 @@ def _given_structures(
     if adequate and others.better is None:
         fits = with_noise_of_residual(fits)
     level = max(ADEQUATE * data.colour, fits.normalized_rms if adequate else 0.0)
-    if requested.fastest is not None:
-        return fit_without_fast_lags(
-            fits, requested.fastest, is_noise=lambda rms, _: rms <= level, near=near
-        )
-    if requested.forms:
-        return process_fit(
-            fits, requested.forms, is_noise=lambda rms, _: rms <= level, others=others, near=near
-        )
-    given = likelihood_fit(fits, adequate=adequate, near=near)
-    given = replace(given, others=others.told(others.better))
-    return in_rounded_data(given, fits, data.quantum) if adequate and data.coarse else given
+    given = fit_requested(
+        fits, requested, adequate=adequate, is_noise=lambda rms, _: rms <= level, others=others,
+        near=near,
+    )  # fmt: skip
+    plain = adequate and requested.fastest is None and not requested.forms
+    return in_rounded_data(given, fits, data.quantum) if plain and data.coarse else given
 
 
 def _free_choice(
@@ -209,11 +202,12 @@ def _free_choice(
         fits = in_coloured_noise(noisy, data) if whiten else noisy
         fits = with_noise_of_residual(fits)
         chains = chains_of(fits)
+        # Rounding decides on how smoothly a response begins.
         likely = likelihood_fit(
             fits,
             adequate=True,
             chains=chains,
-            flows=_flows(data, fits, chains),
+            flows=[] if data.coarse and Rule.NO_DISPERSION.on else flows_of(fits, chains),
             onset=data.motion.onset * data.dt,
             may_stick=not data.coarse,  # what is rounded begins with a jump
             near=near,
@@ -295,11 +289,6 @@ def _is_louder_noise(data: StepData, fits: WindowFit, candidate: Candidate) -> b
     # The error of a wrong model decays: it is in the first half.
     late = late[late.size // 2 :]
     return bool(np.mean(moving**2) <= ADEQUATE**2 * np.mean(late**2))
-
-
-def _flows(data: StepData, fits: WindowFit, chains: Sequence[LagChain]) -> Sequence[DispersedFlow]:
-    """Dispersion, unless rounding decides on how smoothly a response begins."""
-    return [] if data.coarse and Rule.NO_DISPERSION.on else flows_of(fits, chains)
 
 
 def _robust_fit(

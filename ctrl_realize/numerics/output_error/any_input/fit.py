@@ -42,7 +42,7 @@ from ...validation.own_response import OwnResponse, matched, response_slopes
 from ..interval import likelihood_fit
 from ..margins import close_to
 from ..other_structures import Compared, Requested, other_structures
-from ..process_models import fit_without_fast_lags, process_fit
+from ..process_models import fit_requested
 from ..result import OutputErrorEstimate, followed_by
 from ..selection import chains_of
 from .condensed import MOST_LAGS, Condensed, condensed
@@ -171,7 +171,7 @@ def fit_sampled(
             fits, sums = of_all
     if structures is None and fits.best.structure.order == ORDERS[-1].order and Rule.MORE_LAGS.on:
         fits = extended(fits, MORE_LAGS)
-    others = Compared() if structures is not None else None
+    others = Compared()
     if structures is not None and requested.fastest is None and requested.compared:
         # On the part also if all samples were fitted: what is ruled out there is ruled out in any
         # case. The residual may be what a structure cannot describe, and is then no noise.
@@ -180,22 +180,13 @@ def fit_sampled(
         if others.better is None and filtered is not part:
             part, data, fits = filtered, filtered.data, filtered.fit
     white = fits.correlation <= WHITE
-    if requested.fastest is not None:
-        fit = fit_without_fast_lags(
-            fits, requested.fastest, is_noise=lambda _, correlation: correlation <= WHITE
-        )
-    elif requested.forms and others is not None:
-        fit = process_fit(
-            fits,
-            requested.forms,
-            is_noise=lambda _, correlation: correlation <= WHITE,
-            others=others,
-        )
+    if structures is None and requested.fastest is None:
+        fit = likelihood_fit(fits, adequate=white, chains=chains_of(fits))
     else:
-        chains = chains_of(fits) if structures is None else []
-        fit = likelihood_fit(fits, adequate=white, chains=chains)
-        if others is not None:
-            fit = replace(fit, others=others.told(others.better))
+        fit = fit_requested(
+            fits, requested, adequate=white, is_noise=lambda _, correlation: correlation <= WHITE,
+            others=others,
+        )  # fmt: skip
     if sums is not None:
         later = data.after(fit.dead_time)
         if later.starts > data.starts:
