@@ -14,6 +14,7 @@ from ...data.given import as_records, check_input
 from ...errors import DataError, NoStepError, UnsuitableSystemError
 from ...numerics.arrays import FloatArray
 from ...numerics.constants import SMALLEST
+from ...numerics.engine.poles import separated
 from ...numerics.engine.problem import KnownFactor
 from ...numerics.output_error.step_data import StepData, step_data
 from ...numerics.rules import Rule
@@ -68,16 +69,9 @@ def known_factor(known: Any) -> KnownFactor:
             f"known has a pole at {complex(poles[np.argmax(poles.real)]):.3g} rad/s; expected "
             "a stable system (count integrators to the plant)"
         )
-    return KnownFactor(_apart(poles), np.asarray(num / den[0], dtype=np.float64))
-
-
-def _apart(poles: Any) -> Any:
-    """Separate coincident poles, because partial fractions need distinct ones."""
-    apart = np.array(poles, dtype=np.complex128)
-    for j in range(1, apart.size):
-        while np.any(np.abs(apart[:j] - apart[j]) < 0.5 * _APART * np.abs(apart[j])):
-            apart[j] *= 1 + _APART
-    return apart
+    # Partial fractions need distinct poles.
+    poles = separated(poles[None], _APART)[0]
+    return KnownFactor(poles, np.asarray(num / den[0], dtype=np.float64))
 
 
 def checked_records(records: Record | Sequence[Record]) -> tuple[Record, ...]:

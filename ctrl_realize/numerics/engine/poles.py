@@ -65,7 +65,8 @@ def poles_from_parameters(
     block[:, order::every] = poles[:, start + 1 :: 2]
     block[:, 1::every] = scale * (turn - 1.0)
     block[:, order + 1 :: every] = -scale * (turn + 1.0)
-    return _separate(poles) if apart else poles, derivative
+    # A pair is apart.
+    return separated(poles, _GAP) if apart and order > 2 else poles, derivative
 
 
 def parameters_from_poles(poles: ComplexArray) -> FloatArray:
@@ -85,21 +86,19 @@ def parameters_from_poles(poles: ComplexArray) -> FloatArray:
     return np.array(theta, dtype=np.float64)
 
 
-def _separate(poles: ComplexArray) -> ComplexArray:
-    """Separate coincident poles of different factors by the smallest useful amount."""
+def separated(poles: ComplexArray, part: float) -> ComplexArray:
+    """Separate coincident poles (B, n) by a part of their size."""
     order = poles.shape[1]
-    if order <= 2:
-        return poles  # a pair is apart
-    gap = np.abs(poles[:, :, None] - poles[:, None]) < 0.5 * _GAP * np.abs(poles[:, None])
+    gap = np.abs(poles[:, :, None] - poles[:, None]) < 0.5 * part * np.abs(poles[:, None])
     if np.count_nonzero(gap) == gap.shape[0] * order:  # only every pole with itself
         return poles
     for j in range(1, order):
         for _ in range(order):
-            gap = np.abs(poles[:, :j] - poles[:, j, None]) < 0.5 * _GAP * np.abs(poles[:, j, None])
+            gap = np.abs(poles[:, :j] - poles[:, j, None]) < 0.5 * part * np.abs(poles[:, j, None])
             clash = gap.any(axis=1)
             if not clash.any():
                 break
-            poles[clash, j] *= 1 + _GAP
+            poles[clash, j] *= 1 + part
     return poles
 
 

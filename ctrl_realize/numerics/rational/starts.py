@@ -19,7 +19,7 @@ References
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
+from scipy.linalg import block_diag
 
 from ..arrays import ComplexArray, FloatArray
 from ..engine.eliminate import eliminate
@@ -63,32 +63,19 @@ def relocate_poles(
     -------
     ndarray, shape (n,)
     """
-    n = poles.size
-    real: NDArray[np.bool_] = poles.imag == 0
-    upper = poles[poles.imag > 0]
-    A = np.zeros((n, n))
-    b = np.zeros(n)
-    columns = []
-    place = 0
-    for p in poles[real]:
-        A[place, place], b[place] = p.real, 1.0
-        columns.append(1 / (s - p))
-        place += 1
-    for p in upper:
-        block = [[p.real, p.imag], [-p.imag, p.real]]
-        A[place : place + 2, place : place + 2] = block
-        b[place] = 2.0
-        columns.append(1 / (s - p) + 1 / (s - p.conjugate()))
-        columns.append(1j / (s - p) - 1j / (s - p.conjugate()))
-        place += 2
-    fractions = np.stack(columns, axis=1)
+    real, upper = poles[poles.imag == 0].real, poles[poles.imag > 0]
+    A = block_diag(*real, *([[p.real, p.imag], [-p.imag, p.real]] for p in upper))
+    b = np.append(np.ones(real.size), np.tile([2.0, 0.0], upper.size))
+    single, first, second = (1 / (s[:, None] - p) for p in (real, upper, upper.conj()))
+    pairs = np.stack([first + second, 1j * first - 1j * second], axis=2).reshape(s.size, -1)
+    fractions = np.hstack([single, pairs])
     design = np.hstack([fractions, -response[:, None] * fractions]) * weight[:, None]
     stacked = stacked_parts(design)
     scale = np.linalg.norm(stacked, axis=0)
     solution = np.linalg.lstsq(
         stacked / scale, stacked_parts((weight * response)[:, None])[:, 0], rcond=1e-12
     )[0]
-    sigma = (solution / scale)[n:]
+    sigma = (solution / scale)[poles.size :]
     # New poles: eigenvalues of A - b c' (Gustavsen and Semlyen, appendix on zeros of sigma).
     moved = np.linalg.eigvals(A - np.outer(b, sigma)).astype(np.complex128)
     # Keep a distance from the axis: a pole on it would make the next problem singular.
