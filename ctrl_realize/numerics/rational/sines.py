@@ -127,7 +127,7 @@ def fit_sines(
             if iteration > 2 and np.all(np.abs(step) * span < 1e-11):
                 break
 
-    return _collect(local, omega, kept, at, freedom, centre)
+    return _collect(omega, at, freedom, centre)
 
 
 def dominant_frequency(signals: FloatArray, dt: float) -> FloatArray:
@@ -167,10 +167,11 @@ def dominant_frequency(signals: FloatArray, dt: float) -> FloatArray:
 
 @dataclass(frozen=True, eq=False)
 class _Projection:
-    """Columns of the model (B, N, P), orthonormal basis, coefficients (B, C, P), and residual."""
+    """Columns of the model (B, N, P), their QR factors, coefficients (B, C, P), and residual."""
 
     columns: FloatArray
     basis: FloatArray
+    triangle: FloatArray
     coefficients: FloatArray
     residual: FloatArray
 
@@ -178,23 +179,22 @@ class _Projection:
 def _project(
     local: FloatArray, data: FloatArray, omega: FloatArray, kept: FloatArray, drift: bool
 ) -> _Projection:
-    """Solve for the linear parameters: cosine, sine, level and slope."""
+    """Solve for the linear parameters: level and slope, cosine and sine last."""
     angle = omega[:, None] * local
-    columns = [np.cos(angle), np.sin(angle), np.ones_like(angle)]
-    if drift:
-        columns.append(local)
-    design = np.stack(columns, axis=2) * kept[:, :, None]
+    level = [np.ones_like(angle), local] if drift else [np.ones_like(angle)]
+    design = np.stack([*level, np.cos(angle), np.sin(angle)], axis=2) * kept[:, :, None]
     basis, triangle = np.linalg.qr(design)
     projected = data @ basis
     coefficients = np.linalg.solve(triangle[:, None], projected[..., None])[..., 0]
-    return _Projection(design, basis, coefficients, data - projected @ basis.transpose(0, 2, 1))
+    left = data - projected @ basis.transpose(0, 2, 1)
+    return _Projection(design, basis, triangle, coefficients, left)
 
 
 def _frequency_step(local: FloatArray, at: _Projection, weights: FloatArray) -> FloatArray:
     """Gauss-Newton step of the common frequency."""
-    cosine, sine = at.columns[:, :, 0] * local, at.columns[:, :, 1] * local
-    slope = at.coefficients[..., 1:2] * cosine[:, None]
-    slope -= at.coefficients[..., 0:1] * sine[:, None]
+    cosine, sine = at.columns[:, :, -2] * local, at.columns[:, :, -1] * local
+    slope = at.coefficients[..., -1:] * cosine[:, None]
+    slope -= at.coefficients[..., -2:-1] * sine[:, None]
     slope -= (slope @ at.basis) @ at.basis.transpose(0, 2, 1)
     curvature = (weights * (slope**2).sum(axis=2)).sum(axis=1)
     gradient = (weights * (slope * at.residual).sum(axis=2)).sum(axis=1)
@@ -202,30 +202,22 @@ def _frequency_step(local: FloatArray, at: _Projection, weights: FloatArray) -> 
 
 
 def _collect(
-    local: FloatArray,
-    omega: FloatArray,
-    kept: FloatArray,
-    at: _Projection,
-    freedom: FloatArray,
-    centre: FloatArray,
+    omega: FloatArray, at: _Projection, freedom: FloatArray, centre: FloatArray
 ) -> SineFit:
     """Convert the result from centred time back to the caller's, with its covariance."""
     coefficients = at.coefficients
     noise_variance = (at.residual**2).sum(axis=2) / freedom
-    phasor_local = coefficients[..., 0] - 1j * coefficients[..., 1]
+    phasor_local = coefficients[..., -2] - 1j * coefficients[..., -1]
     turn = np.exp(-1j * omega * centre)
-    has_slope = coefficients.shape[2] == 4
-    slope = coefficients[..., 3] if has_slope else np.zeros(noise_variance.shape)
-    offset = coefficients[..., 2] - slope * centre[:, None]
+    slope = coefficients[..., 1] if coefficients.shape[2] == 4 else np.zeros(noise_variance.shape)
+    offset = coefficients[..., 0] - slope * centre[:, None]
 
-    design = at.columns[:, :, :2] * [1.0, -1.0]
-    others = _level_basis(local, kept, has_slope)
-    design = design - others @ (others.transpose(0, 2, 1) @ design)
-    local_covariance = np.linalg.inv(design.transpose(0, 2, 1) @ design)
+    # The corner of the triangle is that of what the level leaves of cosine and sine.
+    root = np.linalg.inv(at.triangle[:, -2:, -2:]) * [[1.0], [-1.0]]
     rotation = np.stack(
         [np.stack([turn.real, -turn.imag], -1), np.stack([turn.imag, turn.real], -1)], axis=1
     )
-    turned = rotation @ local_covariance @ rotation.transpose(0, 2, 1)
+    turned = (rotation @ root) @ (rotation @ root).transpose(0, 2, 1)
     return SineFit(
         omega=omega,
         phasor=phasor_local * turn[:, None],
@@ -234,9 +226,3 @@ def _collect(
         noise_variance=noise_variance,
         phasor_covariance=noise_variance[..., None, None] * turned[:, None],
     )
-
-
-def _level_basis(local: FloatArray, kept: FloatArray, drift: bool) -> FloatArray:
-    """Return an orthonormal basis, shape (B, N, 1 or 2), of offset and drift."""
-    columns = [np.ones_like(local), local] if drift else [np.ones_like(local)]
-    return np.linalg.qr(np.stack(columns, axis=2) * kept[:, :, None])[0]

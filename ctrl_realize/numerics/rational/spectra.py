@@ -19,6 +19,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 
 from ..arrays import ComplexArray, FloatArray
 
@@ -76,32 +77,20 @@ def segment_sums(u: FloatArray, y: FloatArray, window: FloatArray, hop: int) -> 
         At the F = L // 2 + 1 frequencies of ``rfft``.
     """
     length = window.size
-    n_segments = (u.shape[1] - length) // hop + 1
-    size = length // 2 + 1
-    m, p = u.shape[0], y.shape[0]
+    inputs, outputs = (sliding_window_view(x, length, axis=1)[:, ::hop] for x in (u, y))
+    (m, n_segments), p, size = inputs.shape[:2], y.shape[0], length // 2 + 1
     uu = np.zeros((m, m, size), dtype=np.complex128)
     yu = np.zeros((p, m, size), dtype=np.complex128)
     yy = np.zeros((p, size))
     # Blocks of segments, to limit the memory for long records.
     block = max(1, 2**20 // (length * (m + p)))
     for first in range(0, n_segments, block):
-        count = min(block, n_segments - first)
-        U, Y = (
-            np.stack(
-                [np.fft.rfft(_segments(row, first * hop, count, hop, window), axis=1) for row in x]
-            )
-            for x in (u, y)
-        )
+        parts = (x[:, first : first + block] for x in (inputs, outputs))
+        U, Y = (np.fft.rfft((x - x.mean(axis=2, keepdims=True)) * window) for x in parts)
         uu += np.einsum("isf,jsf->ijf", U, U.conj())
         yu += np.einsum("isf,jsf->ijf", Y, U.conj())
         yy += (Y.real**2 + Y.imag**2).sum(axis=1)
     return SpectralSums(uu, yy, yu, n_segments)
-
-
-def _segments(x: FloatArray, start: int, count: int, hop: int, window: FloatArray) -> FloatArray:
-    views = np.lib.stride_tricks.sliding_window_view(x, window.size)[start::hop][:count]
-    segments = views - views.mean(axis=1, keepdims=True)
-    return np.asarray(segments * window)
 
 
 def independent_segments(window: FloatArray, hop: int, count: int) -> float:
