@@ -276,15 +276,15 @@ def fit_output_error(
         loop=any(map(in_automatic, several))
         or (short and answers_the_output(several) and Rule.LOOP.on),
     )
-    setting = {"own_gains": gains == "own", "may_clip": actuator is None}
-    free = partial(_linear, several, tried, **setting)
+    fit = partial(_fit_linear, own_gains=gains == "own", may_clip=actuator is None)
+    free = partial(_linear, several, partial(fit, requested=tried))
     linear, stated = free, None
     if fastest_lag is not None or dead_time is not None:
         from .stated import bounded, checked_statements, told
 
         beside = {"actuator": actuator, "max_delay": None if dead_time is None else max_delay}
         stated = checked_statements(fastest_lag, dead_time, **beside)
-        linear = partial(_linear, several, bounded(tried, stated), **setting)
+        linear = partial(_linear, several, partial(fit, requested=bounded(tried, stated)))
 
     def without_actuator() -> OutputErrorFit:
         return checked(linear(), alone=known is None)
@@ -294,7 +294,7 @@ def fit_output_error(
     else:
         # What a valve does is no coloured noise, and need not follow a linear model.
         start = replace(tried, compared=False, whiten=False)
-        plain = checked(_linear(several, start, **setting, refuses=False))
+        plain = checked(_linear(several, partial(fit, requested=start, refuses=False)))
         result = with_actuator(plain, without_actuator, actuator, tried.structures)
     if stated is not None:
         result = told(result, stated, free)
@@ -306,7 +306,7 @@ def model_alone(
 ) -> DelayedStateSpace:
     """Fit a record without checks, and without structures that were not requested."""
     tried = replace(_requested((record,), structures, max_delay, noise), compared=False)
-    return fitted_model(_linear((record,), tried, own_gains=False, may_clip=True, refuses=False))
+    return fitted_model(_linear((record,), partial(_fit_linear, requested=tried, refuses=False)))
 
 
 def _requested(
@@ -323,19 +323,12 @@ def _requested(
 
 
 def _linear(
-    several: tuple[Record, ...],
-    requested: Requested,
-    *,
-    own_gains: bool,
-    may_clip: bool,
-    refuses: bool = True,
+    several: tuple[Record, ...], fit: Callable[[tuple[Record, ...]], OutputErrorFit]
 ) -> OutputErrorFit:
-    """Fit linear models. One that hardly follows the output is refused, or not.
+    """Fit linear models, with the input held where it has error codes.
 
     What looks like an error code of the input is a pulse if the output responds to it.
     """
-    fit = partial(_fit_linear, requested=requested, own_gains=own_gains, may_clip=may_clip,
-                  refuses=refuses)  # fmt: skip
     held, codes = _left_out(several, with_held_input)
     if not codes:
         return fit(several)
@@ -356,10 +349,11 @@ def _fit_linear(
     several: tuple[Record, ...],
     requested: Requested,
     *,
-    own_gains: bool,
-    may_clip: bool,
-    refuses: bool,
+    own_gains: bool = False,
+    may_clip: bool = True,
+    refuses: bool = True,
 ) -> OutputErrorFit:
+    """Fit linear models. One that hardly follows the output is refused, or not."""
     any_input = partial(fit_any_input, refuses=refuses)
     kept, flags = _left_out(several, without_codes) if requested.huber else (several, ())
     # Behind an actuator an output may rest because that sticks: these samples are measurements.
