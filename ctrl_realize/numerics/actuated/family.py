@@ -82,11 +82,6 @@ class ActuatedFamily(ShapedFamily):
         jump = self.properties.jump
         return None if jump is None else self.values.start + jump
 
-    @property
-    def size(self) -> Size:
-        """What the size of parameters is measured by."""
-        return sizes(self.records, self.scales, self.levels)
-
     def natural(self, entries: FloatArray) -> FloatArray:
         """Parameters of the actuator from their entries in x."""
         return np.exp(entries) if self.properties.logged else entries
@@ -123,7 +118,8 @@ class ActuatedFamily(ShapedFamily):
         steps[0], steps[self.values.stop :] = _OF_DT * self.scales.dt, _OF_START
         steps = np.where(x + steps <= self.bounds.high, steps, -steps)
         moving = self.bounds.low < self.bounds.high
-        moving[self.values] &= not self.properties.stepwise
+        # It decides alone which steps of a command move a stem: no slope tells it.
+        moving[self.values] &= self.properties.jump != 0
         rows = self.unit(np.append(x[None], (x + np.diag(steps))[moving], axis=0))
         column, change = rows[0], rows[1:] - rows[0]
         # What changes nothing has no slope: rounding would send it anywhere.

@@ -88,11 +88,6 @@ class Properties:
         """Whether it holds a stem back, however slow the command is."""
         return self.starts or self.jump is not None
 
-    @property
-    def stepwise(self) -> bool:
-        """Whether it decides alone which steps of a command move a stem: no slope tells it."""
-        return self.jump == 0
-
 
 class Motion(NamedTuple):
     """An actuator: its kind, its parameters, and the levels of the commands."""

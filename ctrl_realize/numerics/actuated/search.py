@@ -19,7 +19,7 @@ from ..engine.poles import parameters_from_poles
 from ..engine.problem import Problem, Structure
 from ..engine.structures import Candidate, neighbour_starts, pattern_starts
 from ..families.shaped import lowest
-from .family import ActuatedFamily, actuated_family
+from .family import ActuatedFamily, actuated_family, sizes
 
 _QUICK = 0.2  # of the visible rise: the lags of the response are longer than those of the plant
 _SHORTEST, _LONG, _RISES = 3.0, 20.0, 5  # samples, parts of a record: lags behind what sticks
@@ -89,7 +89,8 @@ def _best(problem: Problem, family: ActuatedFamily, xs: FloatArray, count: int) 
 
 def _actuators(family: ActuatedFamily) -> FloatArray:
     """Values, and places within play at the beginning, that are tried."""
-    grid, parts = family.properties.grid(family.size), len(family.records.parts)
+    size = sizes(family.records, family.scales, family.levels)
+    grid, parts = family.properties.grid(size), len(family.records.parts)
     if not family.properties.starts:
         return grid
     places = [np.full((len(grid), parts), place) for place in _PLACES]

@@ -150,7 +150,7 @@ def _about(
     # The error of the numerator beside given poles is one of gain, and grows with their product;
     # with a pole slower than the record it is one of slope, and does not.
     given = variance * LocalErrors(errors.slopes[:, n:], errors.own).covariance()
-    beside = _normal(given, np.full(free, np.inf), count, rng)
+    beside = rng.standard_normal((count, free)) @ _directions(given, np.full(free, np.inf))
     slowest = 1 / scales.length
     own = np.prod(np.abs(candidate.poles) + slowest)
     scale = np.prod(np.abs(poles_from_parameters(drawn[:, 1:])[0]) + slowest, axis=1) / own
@@ -195,10 +195,3 @@ def _directions(covariance: FloatArray, widest: FloatArray) -> FloatArray:
     rows = np.sqrt(np.maximum(values, 0.0))[:, None] * vectors.T * scale
     longest = np.max(np.abs(rows) / widest, axis=1)
     return np.asarray(rows / np.maximum(longest, 1.0)[:, None])
-
-
-def _normal(
-    covariance: FloatArray, widest: FloatArray, count: int, rng: np.random.Generator
-) -> FloatArray:
-    rows = _directions(covariance, widest)
-    return np.asarray(rng.standard_normal((count, len(rows))) @ rows)

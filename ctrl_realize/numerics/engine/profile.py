@@ -182,7 +182,9 @@ def profile_curve(
         dead_times = np.array(sorted(points))
         costs = np.array([points[at].cost for at in dead_times])
         cost = float(np.interp(late, dead_times, costs))
-        if 0 < _before_the_jump(candidate, scales) < _CHANCE:
+        # Part of a jump that is over at the sample before it, where the dead time ends just then.
+        early = max(_jump_sample(candidate, scales) * scales.dt - candidate.dead_time, 0.0)
+        if 0 < 1 - np.exp(-early * np.abs(candidate.poles).max()) < _CHANCE:
             cost = candidate.cost
         points = points | {end: replace(candidate, cost=cost)}
     dead_time = np.array(sorted(points))
@@ -204,12 +206,6 @@ def _jumps(candidate: Candidate, scales: Scales) -> bool:
 
 def _jump_sample(candidate: Candidate, scales: Scales) -> float:
     return float(np.floor(candidate.dead_time / scales.dt + _SHORT))
-
-
-def _before_the_jump(candidate: Candidate, scales: Scales) -> float:
-    """Part of a jump that is over at the sample before it, where the dead time ends just then."""
-    early = _jump_sample(candidate, scales) * scales.dt - candidate.dead_time
-    return float(1 - np.exp(-max(early, 0.0) * np.abs(candidate.poles).max()))
 
 
 def _end(
@@ -294,18 +290,14 @@ def root_of(excess: float) -> float:
     return float(np.sqrt(max(excess, 0.0)))
 
 
-def profile_limits(
-    dead_time: FloatArray, excess: FloatArray, threshold: float = CHI2_95
-) -> tuple[float, float]:
-    """Ends of the set of dead times with an excess below the threshold (default: 95 %)."""
-    inside = np.flatnonzero(excess <= threshold)
-    first, last = int(inside[0]), int(inside[-1])
-    root = np.sqrt(np.maximum(excess, 0.0))
-    edge = float(np.sqrt(threshold))
-    low = float(dead_time[0])
-    if first > 0:
-        low = float(np.interp(edge, root[[first, first - 1]], dead_time[[first, first - 1]]))
-    high = float(dead_time[-1])
-    if last < dead_time.size - 1:
-        high = float(np.interp(edge, root[[last, last + 1]], dead_time[[last, last + 1]]))
+def profile_limits(dead_time: FloatArray, excess: FloatArray) -> tuple[float, float]:
+    """Ends of the 95 % interval of dead times with an excess of misfit."""
+    inside = np.flatnonzero(excess <= CHI2_95)[[0, -1]]
+    # The first and the last dead time have no neighbour outside.
+    outside = np.clip(inside + np.array([-1, 1]), 0, excess.size - 1)
+    root, edge = np.sqrt(np.maximum(excess, 0.0)), np.sqrt(CHI2_95)
+    low, high = (
+        float(np.interp(edge, root[[*pair]], dead_time[[*pair]]))
+        for pair in zip(inside, outside, strict=True)
+    )
     return low, high

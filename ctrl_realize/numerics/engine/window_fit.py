@@ -295,11 +295,7 @@ class _Residual:
     correlation: float
     independent: float
     rivals: dict[Structure, float]
-    counted: float
-
-    @property
-    def variance(self) -> float:
-        return self.level**2 * weighted_correlation(self.correlation, self.counted)
+    variance: float
 
 
 def _residual(
@@ -336,13 +332,14 @@ def _residual(
     # Far below the noise the residual is rounding, and its correlation has no meaning.
     floor = 0.3 * sigma
     correlation = correlation_time(after) if level > floor else 1.0
+    level = max(level, floor)
+    variance = level**2 * weighted_correlation(correlation, window.counted)
     outliers = has_outliers(error)
     kept -= error
     kept += window.output
     return _Residual(
-        best, kept, outliers, max(level, floor), correlation, after.size / correlation, rivals,
-        window.counted,
-    )  # fmt: skip
+        best, kept, outliers, level, correlation, after.size / correlation, rivals, variance
+    )
 
 
 def extended(fit: WindowFit, structures: Sequence[Structure]) -> WindowFit:
