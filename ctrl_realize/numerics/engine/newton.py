@@ -67,7 +67,7 @@ def settle(
     held, slopes = np.array([dead_time_fixed]), partial(_slopes, problem, structure)
     for _ in range(_MOST_CELLS):
         low, high = (bound[0] for bound in cell(x[None], bounds, dt, held))
-        x, cost, slope = minimum(slopes, x, (low, high), _units(x, dt))
+        x, cost, slope = minimum(slopes, x, (low, high), units(x, dt))
         over = int(leaving(x[None], -slope[None], low[None], high[None], bounds, held)[0])
         if not over:
             break
@@ -99,7 +99,7 @@ def solve_level(
     derivatives w.r.t. the others are zero there, and the cost is `goal`. None if it does not
     converge.
     """
-    x, unit = start.copy(), _units(start, dt)
+    x, unit = start.copy(), units(start, dt)
     limits = bounds.low, bounds.high
     slopes = partial(_slopes, problem, structure)
     others = np.arange(x.size) > 0
@@ -236,7 +236,7 @@ def _slopes(
     return state.cost, -2 * np.einsum("bmp,bm->bp", state.jacobian, state.residual)
 
 
-def _units(x: FloatArray, dt: float) -> FloatArray:
+def units(x: FloatArray, dt: float) -> FloatArray:
     """A sample time for the dead time, 1 for logarithms."""
     unit = np.ones(x.size)
     unit[0] = dt

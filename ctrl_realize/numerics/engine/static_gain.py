@@ -19,10 +19,10 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy.special import ndtr, ndtri
 
 from ..arrays import BoolArray, ComplexArray, FloatArray, unit_columns
 from ..constants import PIECE, SMALLEST, Z_95
+from ..statistics import mixture_quantile
 from .eliminate import eliminate, evaluate
 from .local_terms import LocalTerms
 from .modal import partial_fractions, responses
@@ -38,7 +38,6 @@ SIGNIFICANT = Z_95  # standard errors: a gain of less may as well be none, or ha
 
 _STEP = 1e-4  # of logarithms, and part of a numerator: for slopes by differences
 _CLEAR = 0.01  # relative distance of poles, twice that below which they are set apart
-_HALVINGS = 60  # of an interval, until a double has no more digits
 _ROUNDED = 1e-7  # part of a derivative that differences leave of nothing
 _NOTHING = 1e-13  # part of the largest singular value that is rounding
 _INDEPENDENT = 1e-10  # part of it, from which on columns count as several
@@ -306,19 +305,8 @@ def averaged_ends(parts: Sequence[tuple[float, float, float]]) -> tuple[float, f
     0.804 1.196
     """
     means, errors, weights = np.array(parts, dtype=np.float64).T
-    errors, weights = np.maximum(errors, 1e-12 * np.abs(means) + 1e-300), weights / weights.sum()
-
-    def ends(share: float) -> float:
-        # The quantiles of the components bracket that of the mixture.
-        parts = means + errors * ndtri(share)
-        low, high = float(parts.min()), float(parts.max())
-        for _ in range(_HALVINGS):
-            middle = 0.5 * (low + high)
-            below = float(weights @ ndtr((middle - means) / errors)) < share
-            low, high = (middle, high) if below else (low, middle)
-        return 0.5 * (low + high)
-
-    return ends(0.025), ends(0.975)
+    mixture = means, np.maximum(errors, 1e-12 * np.abs(means) + 1e-300), weights
+    return mixture_quantile(0.025, *mixture), mixture_quantile(0.975, *mixture)
 
 
 def reached_after(poles: ComplexArray, numerator: FloatArray, length: float) -> float:

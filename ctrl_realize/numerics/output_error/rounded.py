@@ -25,6 +25,7 @@ from ..arrays import FloatArray
 from ..constants import Z_95
 from ..engine.eliminate import evaluate
 from ..engine.modal import respond
+from ..engine.newton import units
 from ..engine.problem import Structure
 from ..engine.structures import Candidate, parameter_bounds
 from ..engine.window_fit import WindowFit
@@ -140,19 +141,13 @@ class _Likelihood:
 
         Derivatives by dead time in samples, pole parameters, and linear terms.
         """
-        moves, model = _DIFFERENCE * np.diag(self.units(x.size)), terms @ linear
+        moves, model = _DIFFERENCE * np.diag(units(x, self.fits.scales.dt)), terms @ linear
         slopes = [(self.terms(x + move) @ linear - model) / _DIFFERENCE for move in moves]
         jacobian = np.column_stack([*slopes, terms])
         size = np.sqrt(weight @ jacobian**2)
         size[size == 0] = 1.0
         scaled = jacobian / size
         return jacobian, size, scaled.T @ (weight[:, None] * scaled)
-
-    def units(self, count: int) -> FloatArray:
-        """Units of the parameters: one sample, and one for the logarithms."""
-        unit = np.ones(count)
-        unit[0] = self.fits.scales.dt
-        return unit
 
 
 def fit_rounded(fits: WindowFit, start: Candidate, step: float) -> Rounded:
@@ -171,7 +166,7 @@ def fit_rounded(fits: WindowFit, start: Candidate, step: float) -> Rounded:
         slope = score @ (jacobian / size)
         while damping < _GIVEN_UP:
             change = np.linalg.solve(normal + damping * np.eye(size.size), slope) / size
-            moved = x + change[: x.size] * likelihood.units(x.size)
+            moved = x + change[: x.size] * units(x, fits.scales.dt)
             tried = np.clip(moved, bounds.low, bounds.high)
             following, coefficients = likelihood.terms(tried), linear + change[x.size :]
             if likelihood.value(following @ coefficients, noise) > best:
