@@ -90,7 +90,9 @@ class Bound:
         """
         theta, numerator, known = self._parts(signal.size)
         clock, own = self.dt * np.arange(signal.size, dtype=np.float64), np.ones((signal.size, 1))
-        if not self._of_steps(signal):
+        held = self.dt * np.diff(np.flatnonzero(np.diff(signal)))
+        # A fit takes any other test for one of steps, which begin at rest.
+        if np.any(held < DWELL * self.model.dead_time):
             own = operating_terms(clock, self.model.poles)
         problem = Problem(
             np.zeros(signal.size), np.ones(signal.size), self._drive(signal), own, known
@@ -98,11 +100,6 @@ class Bound:
         there = Candidate(Structure(theta.size - 1, theta.size - numerator.size), theta, 0.0)
         found = local_errors(problem, there, numerator, signal.size * self.dt)
         return found.slopes, found.own
-
-    def _of_steps(self, signal: FloatArray) -> bool:
-        """Whether a fit takes a test for steps, which begin at rest."""
-        held = self.dt * np.diff(np.flatnonzero(np.diff(signal)))
-        return bool(np.all(held >= DWELL * self.model.dead_time))
 
     @property
     def point(self) -> FloatArray:

@@ -44,9 +44,8 @@ STILL = 10
 
 @dataclass(frozen=True, eq=False)
 class Outcome:
-    """Result from one start: criterion, model, and whether all outputs showed a response."""
+    """Result from one start: model, and whether all outputs showed a response."""
 
-    bic: float
     system: DelayedStateSpace
     seen: bool
     search: Search
@@ -83,7 +82,7 @@ def from_starts(
         except DataError as error:
             refused.append(error)
             continue
-        if best is None or found.bic < best.bic:
+        if best is None or found.best.bic < best.best.bic:
             best = found
         # An output without response in one start is tried again in the next.
         clear = (best.seen and not short) or tried > 1
@@ -135,7 +134,7 @@ def _from_start(
     flags += tuple(_marginal(search.as_good(moved, CLOSE * VERY_STRONG)))
     choices = _choices(moved, bic, shares)
     system = fitted_system(search.finish(moved), group, bic, choices, flags)
-    return Outcome(moved.bic, system, unseen == 0, search, moved)
+    return Outcome(system, unseen == 0, search, moved)
 
 
 def _marginal(others: Sequence[Candidate]) -> Iterator[Flag]:

@@ -48,7 +48,8 @@ def fit_with_floor(
     if unexplained(data, best) > MISSING:
         seen = replace(data, weight=np.ones(data.s.size))
         best = _best(seen, fit_structures(seen, orders, degrees))
-    floor = error_floor(*_errors(seen, best))
+    residual = seen.misfit(best) / seen.weight
+    floor = error_floor(np.abs(seen.response - residual), np.abs(residual))
     if floor == 0:
         return data, fits
     other = replace(data, weight=1 / np.hypot(np.abs(data.response), floor))
@@ -60,12 +61,6 @@ def fit_with_floor(
 def _best(data: FRFData, fits: dict[Structure, Candidate]) -> Candidate:
     criteria = information_criteria(data, fits)
     return fits[min(criteria, key=lambda key: criteria[key])]
-
-
-def _errors(data: FRFData, fit: Candidate) -> tuple[FloatArray, FloatArray]:
-    """Magnitudes of a model and of its residual, shapes (K,)."""
-    residual = data.misfit(fit) / data.weight
-    return np.abs(data.response - residual), np.abs(residual)
 
 
 def error_floor(size: FloatArray, residual: FloatArray) -> float:

@@ -16,6 +16,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 
@@ -187,44 +188,38 @@ class _Ladder:
 
     def __init__(self, data: FRFData) -> None:
         self._data = data
-        self._grid: dict[int, list[FloatArray]] = {}
-        self._extended: dict[int, list[FloatArray]] = {}
-        self._fits: dict[int, list[Candidate]] = {}
+        # What several structures need is made once.
+        self._from_grid = cache(lambda n: starting_points(data, n, delay_grid(data, n)))
+        self._from_below, self._best = cache(self._extended), cache(self._apart)
 
     def starts(self, structure: Structure) -> list[FloatArray]:
         """Return the starts for a structure: of low order from a grid of dead times."""
         n = structure.order
         if n > _LARGEST_FROM_GRID:
             return self._from_below(n, max(n - 2, 1))
-        if n not in self._grid:
-            self._grid[n] = starting_points(self._data, n, delay_grid(self._data, n))
         # Beside a zero that nearly cancels it, one pole more is no other model than one fewer.
         extended = self._from_below(n, n - 1) if structure.zeros and n > 1 else []
-        return self._grid[n] + extended
+        return [*self._from_grid(n), *extended]
 
-    def _from_below(self, order: int, lowest: int) -> list[FloatArray]:
-        if order not in self._extended:
-            self._extended[order] = [
-                start
-                for below in range(lowest, order)
-                if order <= _STEPS_OF_ONE or below % 2 == order % 2
-                for smaller in self._best(below)
-                for start in grown_starts(self._data, smaller, order)
-            ]
-        return self._extended[order]
+    def _extended(self, order: int, lowest: int) -> list[FloatArray]:
+        return [
+            start
+            for below in range(lowest, order)
+            if order <= _STEPS_OF_ONE or below % 2 == order % 2
+            for smaller in self._best(below)
+            for start in grown_starts(self._data, smaller, order)
+        ]
 
-    def _best(self, order: int) -> list[Candidate]:
+    def _apart(self, order: int) -> list[Candidate]:
         """Fit with a free numerator, the best first, of different dead times."""
-        if order not in self._fits:
-            free = Structure(order, 1)
-            fits = refined(self._data, free, self.starts(free), 2 * _KEPT)
-            apart = np.pi / (4 * self._data.omega.max())
-            kept: list[Candidate] = []
-            for fit in fits:
-                if all(abs(fit.dead_time - other.dead_time) > apart for other in kept):
-                    kept.append(fit)
-            self._fits[order] = kept[:_KEPT]
-        return self._fits[order]
+        free = Structure(order, 1)
+        fits = refined(self._data, free, self.starts(free), 2 * _KEPT)
+        apart = np.pi / (4 * self._data.omega.max())
+        kept: list[Candidate] = []
+        for fit in fits:
+            if all(abs(fit.dead_time - other.dead_time) > apart for other in kept):
+                kept.append(fit)
+        return kept[:_KEPT]
 
 
 def residual_variance(data: FRFData, fit: Candidate, freedom: int, noise_known: bool) -> float:

@@ -66,15 +66,12 @@ class CondensedInput(HeldInput):
         """Evaluate H, E and T for a unit pulse, times the factor; see `HeldInput`."""
         pulse = np.zeros(1 + self.factor.shape[1])
         pulse[0] = 1.0
-        static, mode, slope = SampledInput(pulse, self.dt).modes(tau, poles)
-        parts = [static[:, :, None], mode.real, mode.imag, slope.real, slope.imag]
-        wide = np.concatenate(parts, axis=2).transpose(1, 0, 2)[1:]
-        seen = np.tensordot(self.factor, wide, axes=1).transpose(1, 0, 2)
-        count = poles.shape[1]
-        real, imag, turn, twist = (
-            seen[:, :, 1 + i * count : 1 + (i + 1) * count] for i in range(4)
+        static, mode, slope = (
+            # One product of a wide matrix is several times as fast as many of narrow ones.
+            np.swapaxes(np.tensordot(self.factor, each[:, 1:], axes=(1, 1)), 0, 1)
+            for each in SampledInput(pulse, self.dt).modes(tau, poles)
         )
-        return seen[:, :, 0], real + 1j * imag, turn + 1j * twist
+        return static, mode, slope
 
 
 @dataclass(frozen=True, eq=False)
