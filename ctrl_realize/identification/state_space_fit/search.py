@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -103,7 +104,7 @@ class Search:
         *,
         drift: bool = False,
     ) -> None:
-        self._group, self._drift = group, drift
+        self._group, self._experiments = group, partial(experiments, group, drift=drift)
         self._enough = enough
         self._markov = markov
         self._top = top
@@ -264,9 +265,6 @@ class Search:
                         first, end = _within(last)
                         low, high, missed = min(low, first), max(high, end), 0
         return low, high
-
-    def _experiments(self, shares: Shares, most: int | None = None) -> list[Experiment]:
-        return experiments(self._group, shares, most, drift=self._drift)
 
     def _excites(self, order: int) -> bool:
         lags = order + 1

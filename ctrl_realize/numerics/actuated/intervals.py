@@ -81,20 +81,12 @@ def profiled(
             break
         found = minimum(problem, family, best.parameters[None])
     if family.jump is not None and values:
-        found = _in_the_middle(problem, found, family.jump, ends[-1], variance)
+        # In the middle of its interval, if the misfit is level there: between two steps of the
+        # command, of which one moves the stem, all slip jumps are as good.
+        value = float(np.log((ends[-1].low + ends[-1].high) / 2))
+        middle = _with_entry(problem, found, family.jump, value, found.cost, found.parameters)
+        found = middle if middle.cost <= found.cost + _LEVEL * variance else found
     return found, tuple(ends)
-
-
-def _in_the_middle(
-    problem: Problem, found: Candidate, index: int, ends: Ends, variance: float
-) -> Candidate:
-    """Put a slip jump in the middle of its interval, if the misfit is level there.
-
-    Between two steps of the command, of which one moves the stem, all are as good.
-    """
-    value = float(np.log((ends.low + ends.high) / 2))
-    middle = _with_entry(problem, found, index, value, found.cost, found.parameters)
-    return middle if middle.cost <= found.cost + _LEVEL * variance else found
 
 
 def _with_entry(
