@@ -16,6 +16,7 @@ from ..delayed import DelayedStateSpace, delayed_ss
 from ..numerics.arrays import locked, read_only
 from ..numerics.constants import VERY_STRONG, Z_95
 from ..numerics.engine.problem import Structure
+from ..numerics.engine.static_gain import mixture_quantile
 from ..numerics.engine.structures import Candidate
 from ..numerics.rational.frf_data import FRFData, modal_state_space, pole_deviations
 from ..numerics.rational.search import (
@@ -27,7 +28,6 @@ from ..numerics.rational.search import (
     unexplained,
 )
 from ..numerics.signals.noise import largest_excess
-from ..numerics.statistics import mixture_quantile
 from .comparison import hertz
 from .frf_fit import FRFFit, FRFStructure
 from .frf_structures import ComparedFits, compared_fits, key_of, residual_ratio

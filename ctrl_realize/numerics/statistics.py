@@ -1,7 +1,7 @@
 """Robust summaries of repeated estimates.
 
 Trimmed means follow [1]_; the ratio of a complex normal error to a standard deviation from repeats
-has the distribution given by [2]_ for spectra; mixtures follow [3]_.
+has the distribution given by [2]_ for spectra.
 
 References
 ----------
@@ -9,8 +9,6 @@ References
    165-170, doi:10.1093/biomet/61.1.165.
 .. [2] N. R. Goodman, Statistical analysis based on a certain multivariate complex Gaussian
    distribution, Ann. Math. Statist. 34 (1963) 152-177, doi:10.1214/aoms/1177704250.
-.. [3] K. P. Burnham and D. R. Anderson, Model Selection and Multimodel Inference, 2nd ed., Springer
-   2002, section 4.3, doi:10.1007/b97636.
 """
 
 from __future__ import annotations
@@ -21,8 +19,6 @@ import numpy as np
 from scipy import special
 
 from .arrays import FloatArray
-
-_HALVINGS = 60  # of an interval, until a double has no more digits
 
 
 @dataclass(frozen=True)
@@ -157,32 +153,3 @@ def upper_quantile(tail: float, repeats: float | None) -> float:
     if repeats is None:
         return -float(special.ndtri(tail))
     return -float(special.stdtrit(2 * (repeats - 1), tail))
-
-
-def mixture_quantile(
-    level: float, centres: FloatArray, spreads: FloatArray, shares: FloatArray
-) -> float:
-    """Return a quantile of a mixture of normal distributions.
-
-    Parameters
-    ----------
-    level : float
-        In 0...1, ends excluded.
-    centres, spreads, shares : ndarray, shape (K,)
-        Means, standard deviations and weights (of any sum).
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> print(f"{mixture_quantile(0.975, np.zeros(2), np.ones(2), np.ones(2)):.4f}")
-    1.9600
-    """
-    weights = shares / shares.sum()
-    # The quantiles of the components bracket that of the mixture.
-    parts = centres + spreads * special.ndtri(level)
-    low, high = float(parts.min()), float(parts.max())
-    for _ in range(_HALVINGS):
-        middle = 0.5 * (low + high)
-        below = float(weights @ special.ndtr((middle - centres) / spreads)) < level
-        low, high = (middle, high) if below else (low, middle)
-    return 0.5 * (low + high)

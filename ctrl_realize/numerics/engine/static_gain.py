@@ -19,10 +19,10 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from scipy.special import ndtr, ndtri
 
 from ..arrays import BoolArray, ComplexArray, FloatArray, unit_columns
 from ..constants import PIECE, SMALLEST, Z_95
-from ..statistics import mixture_quantile
 from .eliminate import eliminate, evaluate
 from .local_terms import LocalTerms
 from .modal import partial_fractions, responses
@@ -39,6 +39,7 @@ SIGNIFICANT = Z_95  # standard errors: a gain of less may as well be none, or ha
 _STEP = 1e-4  # of logarithms, and part of a numerator: for slopes by differences
 _CLEAR = 0.01  # relative distance of poles, twice that below which they are set apart
 _ROUNDED = 1e-7  # part of a derivative that differences leave of nothing
+_HALVINGS = 60  # of an interval, until a double has no more digits
 _NOTHING = 1e-13  # part of the largest singular value that is rounding
 _INDEPENDENT = 1e-10  # part of it, from which on columns count as several
 _OTHERS = 1e-3  # part of a column that the other terms leave: less is theirs
@@ -307,6 +308,35 @@ def averaged_ends(parts: Sequence[tuple[float, float, float]]) -> tuple[float, f
     means, errors, weights = np.array(parts, dtype=np.float64).T
     mixture = means, np.maximum(errors, 1e-12 * np.abs(means) + 1e-300), weights
     return mixture_quantile(0.025, *mixture), mixture_quantile(0.975, *mixture)
+
+
+def mixture_quantile(
+    level: float, centres: FloatArray, spreads: FloatArray, shares: FloatArray
+) -> float:
+    """Return a quantile of a mixture of normal distributions.
+
+    Parameters
+    ----------
+    level : float
+        In 0...1, ends excluded.
+    centres, spreads, shares : ndarray, shape (K,)
+        Means, standard deviations and weights (of any sum).
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> print(f"{mixture_quantile(0.975, np.zeros(2), np.ones(2), np.ones(2)):.4f}")
+    1.9600
+    """
+    weights = shares / shares.sum()
+    # The quantiles of the components bracket that of the mixture.
+    parts = centres + spreads * ndtri(level)
+    low, high = float(parts.min()), float(parts.max())
+    for _ in range(_HALVINGS):
+        middle = 0.5 * (low + high)
+        below = float(weights @ ndtr((middle - centres) / spreads)) < level
+        low, high = (middle, high) if below else (low, middle)
+    return 0.5 * (low + high)
 
 
 def reached_after(poles: ComplexArray, numerator: FloatArray, length: float) -> float:
