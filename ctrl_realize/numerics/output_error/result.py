@@ -31,6 +31,7 @@ from ..engine.window_fit import WindowFit
 from ..families.equal_lags import LagChain
 from ..families.flow import DispersedFlow
 from ..families.form_fit import FormFamily
+from ..families.lag_profiles import low_without_short_lags
 from ..families.physical import ProcessParameter, fitted_parameters
 from ..families.process_form import ProcessForm
 from ..signals.correlation import fit_percent
@@ -51,11 +52,6 @@ data such a lag is dead time, and the error of the sum of both is rounding."""
 _ON_THE_GRID = 1e-3
 """Steps by which an end may be beyond a rounded value and count as equal to it: ends often lie on
 samples, which are such values."""
-_LONGER, _SHORTER = 2.0, 0.75
-"""Lag that is ruled out over the longest along profiles of the dead time: with other dead times it
-may be longer. It must be shorter than those of the chosen model. Measured, seeds below 100: with
-2.0 it holds in 29 of 30, with 1.0 in 33 of 36."""
-_HELP, _ROUNDED = 0.7, 0.02  # of a width: of one that is a help, and by which ends are rounded
 RobustKey: TypeAlias = Literal[
     "onset",
     "one_lag_early",
@@ -351,26 +347,17 @@ class OutputErrorEstimate:
     def low_without_short_lags(self) -> tuple[float, float] | None:
         """A lag in s, and the low end of the interval if none is shorter; None if that is no help.
 
-        A dead time is shorter in structures with one more lag, which takes its place. Up to a
-        certain size the data do not rule that lag out; if the plant has none that is as short, the
-        interval is that of the other structures. The lag is twice as long as those that the data do
-        not rule out. How often it holds is measured in `benchmarks.records` (statements).
+        See `families.lag_profiles`.
         """
-        # Low ends of the dead time, and the longest that the fastest lag may be, of all models.
-        models = [(other.low, np.inf) for other in self.distributed.not_ruled_out]
+        ends = [(other.low, np.inf) for other in self.distributed.not_ruled_out]
         for line in self.structures:
             if line.interval is not None:
                 low, high = line.interval
                 points = self.points.get(line.structure, {}).items()
                 lags = [1 / np.abs(one.poles).max() for at, one in points if low <= at <= high]
-                models.append((low, _LONGER * max(lags, default=np.inf)))
-        width, fastest = self.high - self.low, float(1 / np.abs(self.poles).max())
-        short = [lag for _, lag in models if lag <= _SHORTER * fastest]
-        if not short or min(first for first, _ in models) > self.low + _ROUNDED * width:
-            return None
-        kept = [first for first, lag in models if lag > max(short)]
-        without = max(min([self.dead_time, *kept]), self.low)
-        return None if self.high - without > _HELP * width else (max(short), without)
+                ends.append((low, max(lags, default=np.inf)))
+        own = float(1 / np.abs(self.poles).max())
+        return low_without_short_lags(ends, own, self.dead_time, (self.low, self.high))
 
     @property
     def total_ends(self) -> tuple[float, float]:
