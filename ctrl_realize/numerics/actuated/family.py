@@ -90,10 +90,6 @@ class ActuatedFamily(ShapedFamily):
         """The actuator of one member."""
         return Motion(self.kind, tuple(self.natural(x[self.values]).tolist()), self.levels)
 
-    def starts(self, x: FloatArray) -> FloatArray:
-        """Place within play or friction at the beginning of each record; empty if there is none."""
-        return x[self.values.stop :]
-
     def held(self, index: int, value: float) -> ActuatedFamily:
         """Members with an entry of x that is given."""
         low, high = self.bounds.low.copy(), self.bounds.high.copy()
@@ -209,7 +205,8 @@ def actuated_family(
 
 def sizes(records: Records, scales: Scales, levels: tuple[float, ...]) -> Size:
     """What the parameters of an actuator are measured by."""
-    return Size(records.range, scales.rise, scales.length, scales.dt, np.array(levels))
+    reach = max(float(np.ptp(part.command)) for part in records.parts)
+    return Size(reach, scales.rise, scales.length, scales.dt, np.array(levels))
 
 
 def _lagged(

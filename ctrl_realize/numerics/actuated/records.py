@@ -134,20 +134,11 @@ class Records:
         return np.concatenate([part.measured[part.rows] for part in self.parts])
 
     @cached_property
-    def regressors(self) -> FloatArray:
-        """Regressors (M, q) of all records."""
-        return np.asarray(block_diag(*(part.regressors[part.rows] for part in self.parts)))
-
-    @property
-    def range(self) -> float:
-        """Largest range of a command."""
-        return max(float(np.ptp(part.command)) for part in self.parts)
-
-    @cached_property
     def problem(self) -> Problem:
         """The problem of linear models of the same records."""
         inputs = tuple(SampledInput(part.command - part.command[0], part.dt) for part in self.parts)
         rows = tuple(part.rows for part in self.parts)
         drive = SeveralInputs(inputs, rows)
         weight = np.ones(self.output.size)
-        return Problem(self.output, weight, drive, self.regressors, KnownFactor())
+        regressors = block_diag(*(part.regressors[part.rows] for part in self.parts))
+        return Problem(self.output, weight, drive, regressors, KnownFactor())

@@ -75,7 +75,7 @@ def _improved(problem: Problem, family: ActuatedFamily, starts: FloatArray) -> l
 
 def _best(problem: Problem, family: ActuatedFamily, xs: FloatArray, count: int) -> FloatArray:
     """Best `count` of xs; the first of those that are alike, as rates that limit nothing."""
-    basis = problem.regressor_basis[0]
+    basis = np.linalg.qr(problem.weighted_regressors)[0]
     data = problem.data - basis @ (basis.T @ problem.data)
     power, parts = max(float(data @ data), SMALLEST), []
     for piece in np.array_split(xs, 1 + len(xs) * data.size // _AT_ONCE):

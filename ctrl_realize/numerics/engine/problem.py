@@ -94,12 +94,6 @@ class Problem:
         """Fixed regressors (m, q) in units of the noise."""
         return self.weighted(self.regressors)
 
-    @cached_property
-    def regressor_basis(self) -> tuple[FloatArray, FloatArray]:
-        """Factors Q (m, q) and R (q, q) of the fixed regressors in units of the noise."""
-        q, r = np.linalg.qr(self.weighted_regressors)
-        return q, r
-
     def local_terms(self, poles: ComplexArray) -> LocalTerms:
         """Local terms of the segments for poles (B, n)."""
         assert self.segments is not None

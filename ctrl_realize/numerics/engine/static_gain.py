@@ -66,11 +66,6 @@ class StaticGain:
     sign_known: bool
 
     @property
-    def extrapolated(self) -> bool:
-        """Whether the record is shorter than its slowest time constant (integrators excluded)."""
-        return self.slowest < 1.0
-
-    @property
     def significant(self) -> bool:
         """Whether the gain is significant, and has the sign of the observed response.
 
@@ -83,7 +78,7 @@ class StaticGain:
     @property
     def resolved(self) -> bool:
         """Whether a pole as slow as the record, or an integrator, has a significant gain."""
-        return self.significant or not (self.extrapolated or self.integrates)
+        return self.significant or not (self.slowest < 1.0 or self.integrates)
 
     @property
     def ends(self) -> tuple[float, float]:
@@ -118,7 +113,12 @@ def static_gain(
 
     # Poles that are nearly equal would jump apart in one difference, and not in the other.
     def steady_values(at: FloatArray, apart: bool = False) -> FloatArray:
-        return np.array(_steady_values(at[: theta.size], at[theta.size :], length, apart))
+        """Gain, total delay, and the gain that is integrated by poles slower than the record."""
+        poles = poles_from_parameters(at[None, 1 : theta.size], apart=apart)[0][0]
+        pace, powers = np.abs(poles) * length, at[theta.size :]
+        moving = poles[pace >= INTEGRATOR]
+        gain, rate = (powers[0] / np.prod(-kept).real for kept in (moving, poles[pace >= 1.0]))
+        return np.array([gain, at[0] + lag_sum(moving, powers), rate])
 
     gradient = np.stack(
         [(steady_values(there + m) - steady_values(there - m)) / (2 * m.sum()) for m in moves],
@@ -344,16 +344,3 @@ def reached_after(poles: ComplexArray, numerator: FloatArray, length: float) -> 
     residues, level, _ = partial_fractions(poles[None], np.ones(1), numerator.size)
     modes = np.exp(poles * length) @ residues[0]
     return float(modes.real @ numerator + level[0] * numerator[0])
-
-
-def _steady_values(
-    theta: FloatArray, numerator: FloatArray, length: float, apart: bool
-) -> tuple[float, float, float]:
-    """Gain, total delay, and the gain that is integrated by poles slower than the record."""
-    poles = poles_from_parameters(theta[None, 1:], apart=apart)[0][0]
-    pace = np.abs(poles) * length
-    moving = poles[pace >= INTEGRATOR]
-    gain, rate = (
-        float(numerator[0] / np.prod(-kept).real) for kept in (moving, poles[pace >= 1.0])
-    )
-    return gain, float(theta[0]) + lag_sum(moving, numerator), rate

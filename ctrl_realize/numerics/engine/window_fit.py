@@ -103,12 +103,6 @@ class WindowFit:
         """Penalty on a parameter in the criterion: log of the number of independent samples."""
         return parameter_charge(self.independent)
 
-    @property
-    def estimated(self) -> tuple[int, int]:
-        """Parameters that were estimated, and samples from which they were."""
-        window = self.window
-        return _estimated(window, self.best.structure), window.output.size - window.start
-
     @cached_property
     def best(self) -> Candidate:
         """Fit of the chosen structure."""
@@ -177,7 +171,8 @@ def with_noise_of_residual(fit: WindowFit) -> WindowFit:
     samples are independent then, and their variance is known so badly that Student's distribution
     [5]_ takes the place of the normal one. Ablation: noise that the model has taken.
     """
-    parameters, count = fit.estimated
+    count = fit.window.output.size - fit.window.start
+    parameters = _estimated(fit.window, fit.best.structure)
     correlation, missing = fit.correlation, 0.0
     if fit.colour is None:  # otherwise it is that of the noise already
         correlation, missing = correlation_of_noise(correlation, parameters / count)

@@ -159,11 +159,6 @@ class DispersedFlow:
     delta_bic: float
 
     @property
-    def cost(self) -> float:
-        """Weighted sum of squares."""
-        return self.fit.cost
-
-    @property
     def parameters(self) -> int:
         """Number of free parameters besides gain and dead time."""
         return 3 if self.lag else 2

@@ -117,13 +117,9 @@ class _Likelihood:
         responses = (respond(window.drive, known, power, x) for power in powers)
         return np.column_stack([*responses, window.columns])
 
-    def error(self, model: FloatArray) -> FloatArray:
-        """Output minus model."""
-        return self.fits.window.output - model
-
     def value(self, model: FloatArray, noise: float) -> float:
         """Log likelihood."""
-        return float(np.sum(log_probability(self.error(model), self.step, noise)))
+        return float(np.sum(log_probability(self.fits.window.output - model, self.step, noise)))
 
     def noise(self, model: FloatArray) -> float:
         """Most likely standard deviation of the noise."""
@@ -161,7 +157,7 @@ def fit_rounded(fits: WindowFit, start: Candidate, step: float) -> Rounded:
     noise = likelihood.noise(model)
     best, damping = likelihood.value(model, noise), _DAMPING
     for _ in range(_TURNS):
-        score, weight = scores(likelihood.error(model), step, noise)
+        score, weight = scores(fits.window.output - model, step, noise)
         jacobian, size, normal = likelihood.information(x, linear, terms, weight)
         slope = score @ (jacobian / size)
         while damping < _GIVEN_UP:
@@ -181,7 +177,7 @@ def fit_rounded(fits: WindowFit, start: Candidate, step: float) -> Rounded:
         damping = max(damping / 10, _DAMPING**2)
         if best - before < _ENOUGH:
             break
-    score, weight = scores(likelihood.error(model), step, noise)
+    score, weight = scores(fits.window.output - model, step, noise)
     left = (score / np.sqrt(weight))[fits.window.start :]
     _, size, normal = likelihood.information(x, linear, terms, weight)
     std = np.sqrt(np.linalg.pinv(normal)[0, 0]) / size[0] * fits.scales.dt

@@ -114,7 +114,7 @@ def _beside_own_terms(fits: WindowFit, equal_lags: Sequence[LagChain]) -> Sequen
 def _behind(fits: WindowFit, flow: DispersedFlow) -> Candidate | None:
     """Lags and zeros with the dead time of dispersion that fit as well, if there are any."""
     pinned = replace(fits.scales, earliest=flow.dead_time, latest=flow.dead_time)
-    limit = flow.cost + VERY_STRONG * fits.variance
+    limit = flow.fit.cost + VERY_STRONG * fits.variance
     found = search(fits.problem, _BEHIND_A_FLOW, pinned)
     # Their number is not penalised, since they only represent the dispersion model.
     good = {structure: model for structure, model in found.items() if model.cost <= limit}

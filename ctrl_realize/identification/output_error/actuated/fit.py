@@ -236,7 +236,8 @@ def _estimate(result: OutputErrorFit, scales: Scales, found: ActuatedFit) -> Out
 
 def _actuator_fit(result: OutputErrorFit, found: ActuatedFit) -> ActuatorFit:
     family, x = family_of(found.best), found.best.parameters
-    motion, starts = family.motion(x), family.starts(x)
+    # Places within play or friction at the beginning of each record, if there are any.
+    motion, starts = family.motion(x), x[family.values.stop :]
     travel, timed = family.kind == "saturation", family.kind.startswith("slew")
     unit = "" if family.kind == "characteristic" else result.input_unit
     unit += "/s" if unit and timed else ""
