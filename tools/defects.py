@@ -151,7 +151,7 @@ DEFECTS = (
        "NEEDLESS_ZERO, NEEDLESS_POLE = 0.0, 0.0",
        "poles lags_flow decisions step_fit", FITS),
     _d("no chains", "equal lags are never taken for a chain",
-       "if better is not None and better.criterion < level:", "if False:",
+       "if chain is not None and chain.criterion < lags.level:", "if False:",
        "lags_flow", FITS),
     _d("no flows", "axial dispersion never takes the place of lags",
        "if flow is None or flow.criterion >= lags.level:", "if True:",

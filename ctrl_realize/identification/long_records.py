@@ -13,14 +13,12 @@ MOST_SAMPLES = 100_000
 delay of whole samples; memory grows with their number times that of the parameters."""
 
 
-def lively_parts(
-    records: tuple[Record, ...], most: int = MOST_SAMPLES
-) -> tuple[tuple[Record, ...], tuple[Flag, ...]]:
-    """Cut records to `most` samples in total, with a flag; shorter records are not changed."""
+def lively_parts(records: tuple[Record, ...]) -> tuple[tuple[Record, ...], tuple[Flag, ...]]:
+    """Cut records to `MOST_SAMPLES` in total, with a flag; shorter records are not changed."""
     lengths = np.array([record.n_samples for record in records])
-    share = most
-    while np.minimum(lengths, share).sum() > most and share > most // len(records):
-        share = max(int(0.9 * share), most // len(records))
+    share, fair = MOST_SAMPLES, MOST_SAMPLES // len(records)
+    while np.minimum(lengths, share).sum() > MOST_SAMPLES and share > fair:
+        share = max(int(0.9 * share), fair)
     if lengths.max() <= share:
         return records, ()
     starts = [lively_start(np.atleast_2d(record.input), share) for record in records]

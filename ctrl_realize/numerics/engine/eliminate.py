@@ -70,7 +70,9 @@ def compress_mapped(problem: Problem, structure: Structure, mapped: Mapped) -> C
         k = left.shape[2]
     else:
         k = columns.shape[2]
-        parts = models.local.reduced(np.concatenate([columns, models.free_slopes()], axis=2))
+        # Beside them, the derivatives of the modes of free responses.
+        free = models.modes.columns(models.local.slope) * problem.root_weight[:, None]
+        parts = models.local.reduced(np.concatenate([columns, free], axis=2))
         left = np.concatenate([part.left for part in parts], axis=1)
     linear, count = models.linear(left[:, :, :k], q), structure.zeros + 1
     residual, weights, basis, gain = _within(linear, mapped.numerator, mapped.gains)
@@ -176,14 +178,14 @@ class _Models:
         self._poles = np.concatenate(
             [self._free, np.tile(problem.known.poles, (len(parameters), 1))], axis=1
         )
-        self._modes = RealModes(self._poles, structure.order)
+        self.modes = RealModes(self._poles, structure.order)
         residues, gain, self._dresidues = partial_fractions(
             self._poles, problem.known.numerator, structure.zeros + 1
         )
         self._residues, self._gain = residues, gain
         self.weights = np.zeros((len(residues), 1 + residues.shape[1], residues.shape[2]))
         self.weights[:, 0, 0] = gain
-        self.weights[:, 1:] = self._modes.weights(residues)
+        self.weights[:, 1:] = self.modes.weights(residues)
         jumps = structure.relative_degree == 0
         self._sines = problem.drive if jumps and isinstance(problem.drive, Sines) else None
         self.local = None if problem.segments is None else problem.local_terms(self._free)
@@ -202,11 +204,11 @@ class _Models:
         space[:, :q] = problem.weighted_regressors.T
         space[:, -1] = problem.weighted_data
         inside = space[:, q:-1]
-        if not _step_columns(problem, self._tau, self._modes, inside):
+        if not _step_columns(problem, self._tau, self.modes, inside):
             static, mode, slope = problem.drive.modes(self._tau, self._poles)
-            parts = [static[:, :, None], self._modes.columns(mode)]
+            parts = [static[:, :, None], self.modes.columns(mode)]
             if slopes:
-                parts.append(self._modes.columns(slope[:, :, :n]))
+                parts.append(self.modes.columns(slope[:, :, :n]))
             if turning is not None:
                 parts.append(turning.direct_slope(self._tau)[:, :, None])
             made = np.concatenate(parts, axis=2)
@@ -229,7 +231,7 @@ class _Models:
         found = np.zeros((len(numerator), 1 + count + n + (self._sines is not None), 1 + n))
         level = ((-1.0 / self._free)[:, None] @ self.dfree)[:, 0].real
         found[:, 0, 1:] = level * (self._gain * numerator[:, 0])[:, None]
-        found[:, 1 : 1 + count] = self._modes.weights(through)
+        found[:, 1 : 1 + count] = self.modes.weights(through)
         found[:, 1 + count : 1 + count + n, 1:] = self.moved(amplitudes[:, :n])
         if self._sines is not None:
             found[:, -1, 0] = numerator[:, -1]
@@ -237,12 +239,7 @@ class _Models:
 
     def moved(self, amplitudes: ComplexArray) -> FloatArray:
         """Weights (B, n, n) of the modes' derivatives, where modes of amplitudes (B, n) move."""
-        return self._modes.weights(amplitudes[:, :, None] * self.dfree)
-
-    def free_slopes(self) -> FloatArray:
-        """Weighted derivatives (B, m, n) of the modes of free responses."""
-        assert self.local is not None
-        return self._modes.columns(self.local.slope) * self._problem.root_weight[:, None]
+        return self.modes.weights(amplitudes[:, :, None] * self.dfree)
 
     def remainder(self, weights: FloatArray, count: int) -> FloatArray:
         """Weights (B, count) of all columns in the data without regressors and responses."""

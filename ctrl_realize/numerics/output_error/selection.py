@@ -82,22 +82,17 @@ def choose_model(
     Diffusion is not among the chains here: friction has a similar response, so diffusion widens the
     interval and is never the model.
     """
-    lags = _among_lags(fits, equal_lags)
+    best = fits.best
+    lags = Choice(best, fits.criterion[best.structure] + needless_parameters(best.structure))
+    chains = _beside_own_terms(fits, equal_lags)
+    chain = min(chains, key=lambda chain: chain.criterion, default=None)
+    if chain is not None and chain.criterion < lags.level:
+        lags = Choice(chain.candidate, chain.criterion, chain)
     flow = min(flows, key=lambda flow: flow.criterion, default=None)
     if flow is None or flow.criterion >= lags.level:
         return lags
     model = _behind(fits, flow)
     return lags if model is None else Choice(model, flow.criterion, flow=flow)
-
-
-def _among_lags(fits: WindowFit, equal_lags: Sequence[LagChain]) -> Choice:
-    best = fits.best
-    level = fits.criterion[best.structure] + needless_parameters(best.structure)
-    chains = _beside_own_terms(fits, equal_lags)
-    better = min(chains, key=lambda chain: chain.criterion, default=None)
-    if better is not None and better.criterion < level:
-        return Choice(better.candidate, better.criterion, better)
-    return Choice(best, level)
 
 
 def _beside_own_terms(fits: WindowFit, equal_lags: Sequence[LagChain]) -> Sequence[LagChain]:

@@ -111,7 +111,9 @@ def delay_grid(data: FRFData, order: int) -> FloatArray:
     omega, values = np.abs(data.s[clear]), data.response[clear]
     steps, gaps = np.angle(values[1:] / values[:-1]), np.diff(omega)
     allowed = np.pi * (2 * order + 2)
-    octaves = _octaves_below(omega, count)
+    # How far below the highest frequency the search with so many dead times starts.
+    wanted = int(np.ceil(np.log2(max(count / _MAX_TRIED, 1.0))))
+    octaves = min(wanted, int(np.log2(omega[-1] / _lowest_start(omega))))
     # In the lower part of the band few candidates cover all dead times; the remaining ones are
     # divided in two for every further octave.
     first = min(-(-count // 2**octaves), _MAX_TRIED)
@@ -131,12 +133,6 @@ def delay_grid(data: FRFData, order: int) -> FloatArray:
 def longest_search(omega: FloatArray) -> float:
     """Return the longest dead time, in s, that candidates can cover for increasing frequencies."""
     return 2 * np.pi * _MAX_TRIED / (_PER_TURN * _lowest_start(omega))
-
-
-def _octaves_below(omega: FloatArray, count: int) -> int:
-    """Return how far below the highest frequency the search with `count` dead times starts."""
-    wanted = int(np.ceil(np.log2(max(count / _MAX_TRIED, 1.0))))
-    return min(wanted, int(np.log2(omega[-1] / _lowest_start(omega))))
 
 
 def _lowest_start(omega: FloatArray) -> float:
