@@ -117,7 +117,9 @@ def _from_start(
     search = Search(group, markov, max(asked or ORDERS), enough, drift=drift)
     orders = search.orders(asked)
     found = delay_matrix(impulse, level=LEVEL) if delays is None else _given_delays(delays, markov)
-    shares = _split(found)
+    # Channels without response follow the others.
+    outputs, inputs = (tuple(map(int, one)) for one in split_delays(found, found >= 0)[0])
+    shares = inputs, outputs
     fits = search.by_order(orders, shares, feedthrough=feedthrough is not False)
     best = min(fits, key=lambda c: c.bic)
     moved = search.improved(best, delays=delays is None, feedthrough=feedthrough is None)
@@ -179,12 +181,6 @@ def _choices(best: Candidate, bic: dict[int, float], begun: Shares) -> tuple[str
             "were moved while that lowered BIC"
         )
     return tuple(choices)
-
-
-def _split(delays: IntArray) -> Shares:
-    """Split delays into inputs and outputs; channels without response follow the others."""
-    outputs, inputs = split_delays(delays, delays >= 0)[0]
-    return tuple(int(d) for d in inputs), tuple(int(d) for d in outputs)
 
 
 def _given_delays(delays: ArrayLike, markov: FloatArray) -> IntArray:

@@ -95,7 +95,10 @@ def profile_grid(
     grid = np.linspace(low, high, _FAR)
     if np.isfinite(half):
         grid = np.concatenate([candidate.dead_time + half * _NEAR, grid])
-    grid = np.concatenate([within_a_sample(candidate, scales), grid])
+    if _jumps(candidate, scales):
+        # Between the two samples of a jump nothing changes.
+        within = (_jump_sample(candidate, scales) + _INSIDE) * scales.dt
+        grid = np.concatenate([within, grid])
     return np.unique(np.clip(grid, low, high))
 
 
@@ -190,13 +193,6 @@ def profile_curve(
     dead_time = np.array(sorted(points))
     excess = np.array([points[at].cost for at in dead_time])
     return dead_time, (excess - excess.min()) / variance
-
-
-def within_a_sample(candidate: Candidate, scales: Scales) -> FloatArray:
-    """Dead times between the two samples of a jump, where nothing changes; empty without one."""
-    if not _jumps(candidate, scales):
-        return np.zeros(0)
-    return np.asarray((_jump_sample(candidate, scales) + _INSIDE) * scales.dt)
 
 
 def _jumps(candidate: Candidate, scales: Scales) -> bool:

@@ -89,17 +89,13 @@ def with_actuator(
         return replace(result, choices=result.choices + skipped)
     if not found.chosen:
         result, said = linear(), (*skipped, not_needed(identifiable, found.evidence))
-        return replace(_both(result, found), choices=result.choices + said)
+        if found.evidence >= -VERY_STRONG:
+            # The interval covers a model with an actuator that is not ruled out.
+            (low, high), old = found.ends[0], result.estimate
+            estimate = replace(old, low=min(low, old.low), high=max(high, old.high))
+            result = replace(result, estimate=estimate)
+        return replace(result, choices=result.choices + said)
     return _replaced(free, scales, found, skipped)
-
-
-def _both(result: OutputErrorFit, found: ActuatedFit) -> OutputErrorFit:
-    """Let the interval cover a model with an actuator that is not ruled out."""
-    if found.evidence < -VERY_STRONG:
-        return result
-    low, high = found.ends[0]
-    old = result.estimate
-    return replace(result, estimate=replace(old, low=min(low, old.low), high=max(high, old.high)))
 
 
 def _parts(result: OutputErrorFit) -> list[ActuatedRecord]:
