@@ -86,11 +86,6 @@ class ActuatedFit:
     correlation: float
     variance: float
 
-    @property
-    def chosen(self) -> bool:
-        """Whether the evidence against every linear model is very strong."""
-        return self.evidence > VERY_STRONG
-
 
 def fit_actuated(
     parts: Sequence[ActuatedRecord],

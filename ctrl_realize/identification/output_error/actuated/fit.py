@@ -87,7 +87,7 @@ def with_actuator(
     if found is None:
         result = linear()
         return replace(result, choices=result.choices + skipped)
-    if not found.chosen:
+    if found.evidence <= VERY_STRONG:
         result, said = linear(), (*skipped, not_needed(identifiable, found.evidence))
         if found.evidence >= -VERY_STRONG:
             # The interval covers a model with an actuator that is not ruled out.
