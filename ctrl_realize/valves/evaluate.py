@@ -201,32 +201,26 @@ def _statics(
     records: tuple[Record, ...], parts: tuple[tuple[TestPart, ...], ...],
     steps: tuple[StepMetrics, ...], ranges: Ranges,
 ) -> tuple[StaticCurve | None, dict[str, Interval]]:  # fmt: skip
-    bands, resolutions = [], []
+    found: list[tuple[Interval, Interval, Interval]] = []
     delay = _slow_delay(steps)
     curves, waits = [], []
     for k, (record, own) in enumerate(zip(records, parts, strict=True)):
         mine = [one for one in steps if one.record == k]
-        band, resolution = dead_band_and_resolution(mine, own, ranges)
-        bands += [band] if band.is_known else []
-        resolutions += [resolution] if resolution.is_known else []
+        found.append(dead_band_and_resolution(mine, own, ranges))
         noise = noise_of(record, own)
         waits.append(reversal_wait(record, own, ranges, noise, delay))
-        found = static_curve(record, own, mine, ranges, noise, delay)
-        curves += [found] if found is not None else []
+        curves.append(static_curve(record, own, mine, ranges, noise, delay))
     # a ramp before levels, the longer before the shorter
-    curve = max(curves, key=lambda one: (one.origin == "ramp", np.ptp(one.command)), default=None)
-    band, resolution = joined(bands), joined(resolutions)
+    known = [one for one in curves if one is not None]
+    curve = max(known, key=lambda one: (one.origin == "ramp", np.ptp(one.command)), default=None)
+    band, resolution, backlash = (
+        joined([one for one in own if one.is_known]) for own in zip(*found, strict=True)
+    )
     hysteresis, linearity, width = hysteresis_and_linearity(curve, band)
     # A stem that sticks shows less of its dead band in the loop than at the reversal.
     sticks = [wait for wait, least in waits if least > width.high]
     if width.is_known and sticks:
         width = replace(width, high=max(sticks))
-    backlash = Interval()
-    if band.is_known and resolution.is_known:
-        low, high = max(band.low - resolution.high, 0.0), max(band.high - resolution.low, 0.0)
-        # every step moved the valve: all of the dead band may be backlash
-        value = band.value - (resolution.value if resolution.low > 0 else 0.0)
-        backlash = Interval(float(np.clip(value, low, high)), low, high, band.count)
     return curve, {
         "dead_band": band if band.is_known else width,
         "resolution": resolution,

@@ -73,9 +73,9 @@ class StaticCurve:
 
 def dead_band_and_resolution(
     steps: Sequence[StepMetrics], parts: Sequence[TestPart], ranges: Ranges
-) -> tuple[Interval, Interval]:
-    """Dead band and resolution from the staircases of one record, in % of the command's span."""
-    bands, resolutions = [], []
+) -> tuple[Interval, Interval, Interval]:
+    """Dead band, resolution and backlash from the staircases of one record, in % of the span."""
+    bands, resolutions, backlashes = [], [], []
     stairs = [part for part in parts if part.kind == "staircase"]
     # Coarse stairs tell less, and of a stem that sticks only the play.
     finest = min((abs(part.edges[0].amplitude) for part in stairs), default=0.0)
@@ -84,10 +84,11 @@ def dead_band_and_resolution(
         coarse = abs(part.edges[0].amplitude) > _COARSER * finest
         if coarse or max(abs(one.size) for one in own) > _LARGEST_STAIR:
             continue
-        band, resolution = _of_staircase(own, ranges)
+        band, resolution, backlash = _of_staircase(own, ranges)
         bands += [band] if band.is_known else []
         resolutions += [resolution] if np.isfinite(resolution.high) else []
-    return joined(bands), joined(resolutions)
+        backlashes += [backlash] if backlash.is_known else []
+    return joined(bands), joined(resolutions), joined(backlashes)
 
 
 def joined(found: Sequence[Interval]) -> Interval:
@@ -103,7 +104,7 @@ def joined(found: Sequence[Interval]) -> Interval:
     return Interval(value, min(one.low for one in found), max(one.high for one in found), count)
 
 
-def _of_staircase(steps: list[StepMetrics], ranges: Ranges) -> tuple[Interval, Interval]:
+def _of_staircase(steps: list[StepMetrics], ranges: Ranges) -> tuple[Interval, Interval, Interval]:
     scale = 100 / ranges.command_span
     command = np.array([steps[0].before, *(one.after for one in steps)])
     command = (command - ranges.command[0]) * scale
@@ -117,7 +118,7 @@ def _of_staircase(steps: list[StepMetrics], ranges: Ranges) -> tuple[Interval, I
     step = float(np.median(np.abs(change)))
     hidden = 4 * np.sqrt(2) * error > 0.5 * gain * step
     bands, resolutions = _waits(command, change, followed)
-    resolution = _bracket(resolutions)
+    band, resolution = _bracket(bands), _bracket(resolutions)
     if not np.isfinite(resolution.value) and followed.any():
         resolution = Interval(step, 0.0, step, int(followed.sum()))
     if hidden:
@@ -128,9 +129,21 @@ def _of_staircase(steps: list[StepMetrics], ranges: Ranges) -> tuple[Interval, I
         # In noise that hides single small steps, a stem that sticks looks like one with play; its
         # mean lag behind the command differs by up to half a step.
         more = 0.5 * step if hidden else 0.0
-        band = Interval(fit.width, max(fit.low - more, 0.0), fit.high + more, reversals)
-        return band, resolution
-    return _bracket(bands), resolution
+        play = Interval(fit.width, max(fit.low - more, 0.0), fit.high + more, reversals)
+        # A slip jump J below a stair leaves the levels of a play of S - J: the dead band is wider
+        # than that by up to the resolution, and no wider than the first change that was followed.
+        jump = resolution.high if resolution.is_known else step
+        most = np.inf if hidden or not band.is_known else max(band.high, play.high)
+        band = replace(play, high=min(play.high + jump, most))
+        if not resolution.is_known:
+            return band, resolution, Interval()
+        return band, resolution, replace(play, low=max(play.low - jump, 0.0))
+    if not (band.is_known and resolution.is_known):
+        return band, resolution, Interval()
+    low, high = max(band.low - resolution.high, 0.0), max(band.high - resolution.low, 0.0)
+    # every step moved the valve: all of the dead band may be backlash
+    value = band.value - (resolution.value if resolution.low > 0 else 0.0)
+    return band, resolution, Interval(float(np.clip(value, low, high)), low, high, band.count)
 
 
 def _waits(
@@ -306,7 +319,8 @@ def hysteresis_and_linearity(
             if own.is_known and covered >= _LEAST_COVERED:
                 most = float(np.max(np.abs(apart)))
                 noise = _largest_noise(np.sqrt(2) * curve.std, count)
-                low, high = (0.5 * (own.high - own.low) * gain + one for one in noise)
+                low = noise[0] + (own.high - own.value) * gain
+                high = noise[1] + (own.value - own.low) * gain
                 value = max(most - own.value * gain, 0.0)
                 hysteresis = Interval(value, max(value - low, 0.0), value + high, count)
     linearity = unknown

@@ -114,6 +114,20 @@ def test_a_stem_that_sticks_has_the_dead_band_and_the_resolution_of_its_model(S,
     assert any(flag.code == "did_not_move" for flag in report.flags)
 
 
+@pytest.mark.parametrize(("S", "J"), [(1.2, 0.2), (0.7, 0.2), (0.6, 0.15)])
+def test_a_slip_jump_below_a_stair_is_part_of_the_dead_band(S, J):
+    """The levels are those of a play of S - J: 0.996 to 1.001 % was said of 1.2 %."""
+    command = command_of(stairs(), 4.0)
+    moved = cr.actuators.KanoStiction(S=S, J=J).simulate(command)
+    record = record_of(command, moved, 0.02, 1)
+    report = valves.valve_report(record, limits={"dead_band": S - 0.05}, **QUICK)
+    band = report.metric("dead_band")
+    assert held(band.interval, S)
+    assert band.interval.high - band.interval.low < 0.26
+    assert band.judgement == "cannot tell"
+    assert held(report.metric("backlash").interval, S - J)
+
+
 @pytest.mark.parametrize("noise", [0.015, 0.03, 0.05])
 def test_steps_that_noise_hides_have_no_dead_time(noise):
     # with 0.03 % it was 0.45 s for steps of 0.25 %, friction with p = 1e-127
