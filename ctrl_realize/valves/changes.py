@@ -33,7 +33,7 @@ _BLOCKS = 400  # in which a ramp is looked for in noise
 def changes_of(record: Record, span: float) -> list[TestPart]:
     """Steps, strokes and ramps between the levels that the command holds."""
     command = np.ravel(record.input)
-    noise = _noise_of(command)
+    noise = white_noise(command)
     spikes = int(np.clip(command.size // 1000, 1, 6)) if noise else 0
     clean = despike(command, spikes)
     rounding = quantisation_step(command)
@@ -130,8 +130,8 @@ def _noisy_ramps(record: Record, noise: float, span: float) -> list[TestPart]:
     return found
 
 
-def _noise_of(command: FloatArray) -> float:
-    """White noise of a command; third differences do not take a smooth motion for noise."""
-    third = np.diff(command, 3)
+def white_noise(signal: FloatArray) -> float:
+    """White noise of a signal; third differences do not take a smooth motion for noise."""
+    third = np.diff(signal, 3)
     smooth = mad_sigma(third) / np.sqrt(20) if third.size else 0.0
-    return min(difference_noise(command), smooth)
+    return min(difference_noise(signal), smooth)

@@ -103,7 +103,7 @@ def valve_report(
     ...     records, command_range=(4, 20), limits={"overshoot": 10}, fit=False
     ... )
     >>> print(report.verdict)
-    All limits are met: overshoot (25 % opening).
+    All limits are met: overshoot (25 % opening; without full strokes).
     >>> print(f"{1e3 * report.metric('t86').interval.value:.0f} ms")
     205 ms
     """
@@ -200,7 +200,7 @@ def _travel_range(
 def _statics(
     records: tuple[Record, ...], parts: tuple[tuple[TestPart, ...], ...],
     steps: tuple[StepMetrics, ...], ranges: Ranges,
-) -> tuple[StaticCurve | None, dict[str, Interval]]:  # fmt: skip
+) -> tuple[StaticCurve | None, dict[str, tuple[Interval, str]]]:  # fmt: skip
     found: list[tuple[Interval, Interval, Interval]] = []
     delay = _slow_delay(steps)
     curves, waits = [], []
@@ -216,17 +216,27 @@ def _statics(
     band, resolution, backlash = (
         joined([one for one in own if one.is_known]) for own in zip(*found, strict=True)
     )
-    hysteresis, linearity, width = hysteresis_and_linearity(curve, band)
+    lag_known = bool(np.isfinite(delay))
+    # An unknown lag widens the loop at every command alike, as a dead band does.
+    own = band if lag_known else Interval()
+    hysteresis, linearity, width = hysteresis_and_linearity(curve, own)
     # A stem that sticks shows less of its dead band in the loop than at the reversal.
     sticks = [wait for wait, least in waits if least > width.high]
     if width.is_known and sticks:
         width = replace(width, high=max(sticks))
+    origin = ""
+    if not band.is_known and width.is_known:
+        origin = "slow ramp" if lag_known else "slow ramp whose lag no step tells"
+        width = width if lag_known else replace(width, low=0.0)
+    over = ""
+    if curve is not None:
+        over = "{:.3g} to {:.3g} % of the command".format(*curve.command[[0, -1]])
     return curve, {
-        "dead_band": band if band.is_known else width,
-        "resolution": resolution,
-        "backlash": backlash,
-        "hysteresis": hysteresis,
-        "linearity": linearity,
+        "dead_band": (band if band.is_known else width, origin),
+        "resolution": (resolution, ""),
+        "backlash": (backlash, ""),
+        "hysteresis": (hysteresis, over if hysteresis.is_known else ""),
+        "linearity": (linearity, over if linearity.is_known else ""),
     }
 
 

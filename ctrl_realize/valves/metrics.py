@@ -34,7 +34,7 @@ class Metric:
     interval : Interval
         Value and 95 % interval, in ``definition.unit``; unknown if the records cannot tell it.
     where : str
-        Steps from which it comes, such as ``"2 % closing"``.
+        Steps or range of the command from which it comes, such as ``"2 % closing"``.
     limit : tuple of (float or None, float or None)
         Smallest and largest permitted value.
     judgement : {"met", "not met", "cannot tell", ""}
@@ -68,17 +68,20 @@ class Metric:
 
 
 def collected(
-    groups: Sequence[SizeAndDirection], statics: Mapping[str, Interval]
+    groups: Sequence[SizeAndDirection], statics: Mapping[str, tuple[Interval, str]]
 ) -> tuple[Metric, ...]:
     """Metrics of a report: of those that depend on the step, the worst size and direction."""
     steps = [one for one in groups if not one.stroke] or list(groups)
     followed = [one for one in steps if one.moved == one.count] or steps
-    found: dict[str, tuple[Interval, str]] = {key: (one, "") for key, one in statics.items()}
+    found = dict(statics)
+    without = "; without full strokes" if len(steps) < len(groups) else ""
     for key in _TIMES:
         # a response to a step that is lost in the dead band is a part of one
         own = steps if key == "dead_time" else followed
-        found[key] = _largest([(one.estimates[key], words_of(one)) for one in own])
-    found["fitted_dead_time"] = _largest([(one.fitted_dead_time, words_of(one)) for one in steps])
+        found[key] = _largest([(one.estimates[key], words_of(one) + without) for one in own])
+    found["fitted_dead_time"] = _largest(
+        [(one.fitted_dead_time, words_of(one) + without) for one in steps]
+    )
     gains = [(one.estimates["gain"], words_of(one)) for one in groups if one.moved]
     if gains:
         # that farthest from one

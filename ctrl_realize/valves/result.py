@@ -35,8 +35,9 @@ class ValveReport(Result):
     Attributes
     ----------
     metrics : tuple of Metric
-        One for each of `DEFINITIONS`; of those that depend on the step, the worst. After them
-        those with a limit for a step size.
+        One for each of `DEFINITIONS`; of those that depend on the step, the worst, without full
+        strokes if there are other steps: those are among `groups` and have metrics of their own.
+        After them those with a limit for a step size.
     groups : tuple of SizeAndDirection
         Metrics against step size and direction.
     steps : tuple of StepMetrics

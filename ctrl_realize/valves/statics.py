@@ -326,7 +326,12 @@ def hysteresis_and_linearity(
     linearity = unknown
     if known.sum() >= 5 and covered >= _LEAST_COVERED:
         line = np.polyval(np.polyfit(curve.command[known], middle[known], 1), curve.command[known])
-        most = float(np.max(np.abs(middle[known] - line)))
+        away = np.abs(middle[known] - line)
+        place = int(np.argmax(away))
+        most = float(away[place])
         low, high = _largest_noise(curve.std, 2 * int(known.sum()))
+        if curve.origin == "ramp":
+            # between two points, or beyond the last, it may be larger by half of their difference
+            high += 0.5 * float(np.max(np.abs(np.diff(away)[max(place - 1, 0) : place + 1])))
         linearity = Interval(most, max(most - low, 0.0), most + high, int(known.sum()))
     return hysteresis, linearity, width

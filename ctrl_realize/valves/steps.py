@@ -12,6 +12,7 @@ from ..numerics.arrays import FloatArray, lock_fields
 from ..numerics.signals.edges import Edge
 from ..numerics.signals.noise import quantisation_step
 from ..numerics.valve_test.response import UNKNOWN, Estimate, Noise, UnitResponse, steady_noise
+from .changes import white_noise
 from .part import TestPart
 
 LEVEL_63, LEVEL_86, LEVEL_98 = 1 - float(np.exp(-1)), 1 - float(np.exp(-2)), 0.98
@@ -163,11 +164,14 @@ def measured_steps(
 
 
 def noise_of(record: Record, parts: Sequence[TestPart]) -> Noise:
-    """Noise of the output at rest, from the ends of all holds."""
+    """Noise of the output at rest, from the ends of all holds; of ramps alone, white noise."""
     output = np.ravel(record.output)
+    quantum = quantisation_step(output)
+    if not any(part.edges for part in parts):
+        return Noise(max(white_noise(output), quantum / np.sqrt(12)), 1.0, quantum)
     holds = [_tail(output, edge.index, edge.stop) for part in parts for edge in part.edges]
     holds += [output[edge.start : edge.index] for part in parts[:2] for edge in part.edges[:1]]
-    return steady_noise(holds, quantisation_step(output))
+    return steady_noise(holds, quantum)
 
 
 def _measured(

@@ -174,6 +174,48 @@ def test_hysteresis_and_linearity_of_a_slow_ramp_are_those_of_its_curve():
     assert report.curve.origin == "ramp"
 
 
+def test_a_ramp_without_steps_tells_the_dead_band_from_zero_on_as_its_lag_is_unknown():
+    """Twice the slope times dead time and lag was a dead band of 1.085 to 1.089 % without play."""
+    command = np.interp(DT * np.arange(5600), [0, 20, 140, 150, 270], [0, 0, 100, 100, 0])
+    record = record_of(command, command, 0.02, 1)
+    band = valves.valve_report(record, limits={"dead_band": 0.5}, **QUICK).metric("dead_band")
+    lagged = 2 * (DEAD_TIME + LAG) * 100 / 120
+    assert band.interval.low == 0
+    assert band.interval.high == pytest.approx(lagged, rel=0.06)
+    assert band.judgement == "cannot tell"
+    assert "lag" in band.where
+    steps = command_of([0, 5, 0, 5, 0], 5.0)
+    both = record_of(np.r_[steps, command], np.r_[steps, command], 0.02, 1)
+    assert valves.valve_report(both, **QUICK).metric("dead_band").interval.high < 0.05
+
+
+def test_linearity_of_a_ramp_names_its_range_and_has_the_error_of_noise_and_of_its_points():
+    """1.4254 with an interval of zero width; over the range of the curve it is 1.554."""
+    t = 0.1 * np.arange(12600)
+    command = np.interp(t, [0, 20, 620, 630, 1230], [0, 0, 100, 100, 0])
+    noise = 0.02 * np.random.default_rng(0).standard_normal(t.size)
+    bent = command + 2 * np.sin(2 * np.pi * command / 100) + noise
+    report = valves.valve_report(cr.Record(t, command, bent, units=PERCENT), **QUICK)
+    x = np.linspace(*report.curve.command[[0, -1]], 2001)
+    curve = 2 * np.sin(2 * np.pi * x / 100)
+    truth = np.abs(curve - np.polyval(np.polyfit(x, curve, 1), x)).max()
+    linearity = report.metric("linearity")
+    assert held(linearity.interval, truth)
+    assert linearity.interval.high < 1.1 * truth
+    assert linearity.where == "6.25 to 93.8 % of the command"
+    assert report.curve.std == pytest.approx(0.02 / np.sqrt(150), rel=0.1)
+
+
+def test_a_worst_case_without_full_strokes_says_so():
+    command = command_of([50, 60, 50, 0, 100, 0], 7.0)
+    moved = cr.actuators.SlewRateLimit(25.0).simulate(command, DT)
+    record = record_of(command, moved, 0.02, 1)
+    report = valves.valve_report(record, limits={"t86": 3.0}, **QUICK)
+    assert report.groups[-1].estimates["t86"].low > 3.0
+    assert "without full strokes" in report.verdict
+    assert "without full strokes" in report.metric("t86").definition.sentence
+
+
 def test_small_steps_of_a_sticking_valve_are_late_in_table_and_flag_and_the_fit_agrees():
     levels = [50, 52, 50, 52, 50, 60, 50, 60, 50]
     command = command_of(levels, 6.0)
