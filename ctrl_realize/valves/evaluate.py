@@ -218,8 +218,9 @@ def _statics(
     )
     lag_known = bool(np.isfinite(delay))
     # An unknown lag widens the loop at every command alike, as a dead band does.
-    own = band if lag_known else Interval()
-    hysteresis, linearity, width = hysteresis_and_linearity(curve, own)
+    hysteresis, linearity, width = hysteresis_and_linearity(
+        curve, band if lag_known else Interval()
+    )
     # A stem that sticks shows less of its dead band in the loop than at the reversal.
     sticks = [wait for wait, least in waits if least > width.high]
     if width.is_known and sticks:

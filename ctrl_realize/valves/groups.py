@@ -115,14 +115,17 @@ def grouped(
 
 def _group(steps: list[StepMetrics], records: Sequence[Record], fit: bool) -> SizeAndDirection:
     moved = [one for one in steps if one.moved]
+    common = any(one.common for one in steps)
     estimates = {
-        name: mean_of([(one.values[name], one.errors[name]) for one in moved])
+        name: mean_of([(one.values[name], one.errors[name]) for one in moved], common)
         for name in STEP_METRICS
     }
     gains = [(one.values["gain"], one.errors["gain"]) for one in steps]
-    over = estimates["overshoot"]
-    estimates["overshoot"] = replace(over, low=max(over.low, 0.0)) if over.is_known else over
-    estimates["gain"] = mean_of(gains)
+    estimates = {
+        name: replace(one, low=max(one.low, 0.0)) if one.is_known else one
+        for name, one in estimates.items()
+    }
+    estimates["gain"] = mean_of(gains, common)
     estimates["gain_scatter"] = scatter_of([gain for gain, _ in gains])
     return SizeAndDirection(
         size=float(np.mean([abs(one.size) for one in steps])),
@@ -136,11 +139,11 @@ def _group(steps: list[StepMetrics], records: Sequence[Record], fit: bool) -> Si
     )
 
 
-def mean_of(pairs: Sequence[tuple[float, float]]) -> Interval:
+def mean_of(pairs: Sequence[tuple[float, float]], common: bool) -> Interval:
     """Mean of repeats with its 95 % interval.
 
     From three repeats on by their scatter and Student's distribution; before that, and never less,
-    by their standard errors.
+    by their standard errors, which no mean reduces if the repeats have them in common.
     """
     from scipy.special import stdtrit
 
@@ -149,7 +152,7 @@ def mean_of(pairs: Sequence[tuple[float, float]]) -> Interval:
         return Interval()
     values, errors = known.T
     count = values.size
-    half = Z_95 * float(np.sqrt(np.mean(errors**2) / count))
+    half = Z_95 * float(np.sqrt(np.mean(errors**2) / (1 if common else count)))
     if count >= 3:
         scatter = float(np.std(values, ddof=1)) / np.sqrt(count)
         half = max(half, float(stdtrit(count - 1, 0.975)) * scatter)

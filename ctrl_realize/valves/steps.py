@@ -9,6 +9,7 @@ import numpy as np
 
 from ..data import Record
 from ..numerics.arrays import FloatArray, lock_fields
+from ..numerics.constants import Z_95
 from ..numerics.signals.edges import Edge
 from ..numerics.signals.noise import quantisation_step
 from ..numerics.valve_test.response import UNKNOWN, Estimate, Noise, UnitResponse, steady_noise
@@ -24,11 +25,11 @@ _RATE = (0.4, 0.8)
 _RATE_ERROR = 5e-4
 """Relative error of a limited rate by a lag of a twelfth of the stroke time, as simulated."""
 _LEVEL_SHARE = 0.3
-"""Last part of a hold from which a level is taken."""
+"""Last part of a hold from which a level is taken; twice as much tells whether it stands still."""
 _MOVED = 4.0
 """Standard errors by which the output has moved."""
 _STILL_MOVING = 0.03
-"""Difference of two neighbouring means at the end of a hold, as a fraction of the change."""
+"""Way that is left from the mean level at the end of a hold, as a fraction of the change."""
 
 STEP_METRICS = (
     "dead_time", "t63", "t86", "t98", "overshoot", "settling_time", "gain", "slew_rate",
@@ -88,6 +89,9 @@ class StepMetrics:
         Whether the output moved: four standard errors.
     settled : bool
         Whether it stood still at the end of the hold.
+    common : bool
+        Whether repeats have its errors in common: the output still moved at the end of a hold, or
+        its rounding exceeds the noise of a level.
     travel_before, travel_after, travel_error : float
         Output before and after, in % of the travel, and the standard error of the latter.
     values : mapping of str to float
@@ -125,6 +129,7 @@ class StepMetrics:
     reversal: bool
     moved: bool
     settled: bool
+    common: bool
     travel_before: float
     travel_after: float
     travel_error: float
@@ -179,19 +184,19 @@ def _measured(
     noise: Noise, position: int, reversal: bool,
 ) -> StepMetrics:  # fmt: skip
     start = max(edge.start, 0)
-    before = _level(_tail(output, start, edge.index), noise)
-    tail = _tail(output, edge.index, edge.stop)
-    after = _level(tail, noise)
+    before, left_before = _level(output[start : edge.index], noise)
+    after, left = _level(output[edge.index : edge.stop], noise)
     change = after.value - before.value
     error = float(np.hypot(before.std, after.std))
     moved = abs(change) > max(_MOVED * error, 1.2 * noise.quantum)
-    half = tail.size // 2
-    drift = abs(float(np.mean(tail[half:]) - np.mean(tail[: max(half, 1)])))
-    drift_error = noise.of_mean(max(half, 1)) * np.sqrt(2)
-    settled = drift <= max(3 * drift_error, _STILL_MOVING * abs(change), noise.quantum)
-    if drift > 3 * drift_error:  # the level that it creeps to is that uncertain
-        after = Estimate(after.value, float(np.hypot(after.std, drift)))
-        error = float(np.hypot(before.std, after.std))
+    settled = left <= _STILL_MOVING * abs(change)
+    travel_error = float(np.hypot(after.std, min(left, abs(change))))
+    before, after = (
+        Estimate(one.value, float(np.linalg.norm([one.std, min(way, abs(change)), noise.rounding])))
+        for one, way in ((before, left_before), (after, left))
+    )
+    common = max(left_before, left, noise.rounding) > error
+    error = float(np.hypot(before.std, after.std))
     size = 100 * edge.amplitude / ranges.command_span
     travel = 100 / ranges.travel_span
     estimates = dict.fromkeys(STEP_METRICS, UNKNOWN)
@@ -209,7 +214,7 @@ def _measured(
         reversal=reversal, moved=bool(moved), settled=bool(settled),
         travel_before=(before.value - ranges.travel[0]) * travel,
         travel_after=(after.value - ranges.travel[0]) * travel,
-        travel_error=after.std * abs(travel),
+        travel_error=travel_error * abs(travel), common=bool(common),
         values={name: one.value for name, one in estimates.items()},
         errors={name: one.std for name, one in estimates.items()},
         dt=record.dt, mean_delay=mean_delay, command_edge=edge, response=shape,
@@ -220,7 +225,9 @@ def _times(response: UnitResponse, dt: float, change: float, settled: bool) -> d
     """Times in s and rates; those that need the final level only if it was reached."""
 
     def seconds(one: Estimate) -> Estimate:
-        return Estimate(one.value * dt, one.std * dt)
+        # an interval that is longer than the hold tells nothing
+        known = 2 * Z_95 * one.std < response.shape.size
+        return Estimate(one.value * dt, one.std * dt) if known else UNKNOWN
 
     found = {"dead_time": seconds(response.first_motion())}
     if not settled:
@@ -247,5 +254,21 @@ def _tail(output: FloatArray, start: int, stop: int) -> FloatArray:
     return output[max(stop - count, start) : stop]
 
 
-def _level(values: FloatArray, noise: Noise) -> Estimate:
-    return Estimate(float(np.mean(values)), noise.of_mean(values.size))
+def _level(hold: FloatArray, noise: Noise) -> tuple[Estimate, float]:
+    """Mean at the end of a hold, and how far the output still goes from there.
+
+    The latter is 0 if noise explains the difference of the last two of three means before the end;
+    else the limit of the geometric series of all three, or their difference if they are none.
+    """
+    tail = _tail(hold, 0, hold.size)
+    level = Estimate(float(np.mean(tail)), noise.of_mean(tail.size))
+    size = int(2 * _LEVEL_SHARE * hold.size) // 3
+    if not size:
+        return level, 0.0
+    means = hold[hold.size - 3 * size :].reshape(3, size).mean(axis=1)
+    earlier, drift = (float(one) for one in np.diff(means))
+    if abs(drift) <= max(3 * np.sqrt(2) * noise.of_mean(size), noise.quantum):
+        return level, 0.0
+    if not 0 < drift * np.sign(earlier) < abs(earlier):
+        return level, max(abs(drift), abs(earlier))
+    return level, abs(float(means[-1]) + drift**2 / (earlier - drift) - level.value)

@@ -18,9 +18,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..arrays import FloatArray
+from ..constants import Z_95
 from ..signals.filters import moving_mean
-from ..signals.noise import correlation_time
+from ..signals.noise import correlation_time, rounding_of_level
 from ..signals.onset import first_motion
+from .play import slope_of
 
 _REACH = 0.1
 """Half height of the window about a crossing, of the whole change."""
@@ -52,6 +54,14 @@ class Noise:
     def of_mean(self, count: int) -> float:
         """Standard error of the mean of `count` neighbouring samples."""
         return self.sigma * float(np.sqrt(min(self.correlation / max(count, 1), 1.0)))
+
+    @property
+    def rounding(self) -> float:
+        """Error by rounding that no mean reduces."""
+        if self.quantum == 0:
+            return 0.0
+        noise = float(np.sqrt(max(self.sigma**2 - self.quantum**2 / 12, 0.0)))
+        return rounding_of_level(noise, self.quantum)
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,7 +101,8 @@ class UnitResponse:
         # a crossing lasts for as long as the window of the smoothing
         lasting = np.convolve(over, np.ones(width), "full")[width - 1 :] >= 0.8 * width
         first = np.flatnonzero(over & lasting[: over.size])
-        if not first.size or 4 * self.noise.of_mean(width) > 1 - level:
+        # nor is a crossing known of a level within the 95 % interval of the final one
+        if not first.size or max(4 * self.noise.of_mean(width), Z_95 * self.after) > 1 - level:
             return UNKNOWN
         return self._refined(level, int(first[0]), smooth)
 
@@ -102,7 +113,11 @@ class UnitResponse:
         outside = np.flatnonzero(np.abs(smooth - 1) > band)
         # at the end the window of the smoothing is not full
         outside = outside[outside < smooth.size - width]
-        if not outside.size or outside[-1] + 1 >= smooth.size - width or 6 * noise > band:
+        if (
+            not outside.size
+            or outside[-1] + 1 >= smooth.size - width
+            or max(6 * noise, Z_95 * self.after) > band
+        ):
             return UNKNOWN
         last = int(outside[-1])
         level = 1 + np.sign(smooth[last] - 1) * band
@@ -186,20 +201,28 @@ class UnitResponse:
 
     def _error(self, own: float, level: float, slope: float) -> float:
         levels = np.hypot((1 - level) * self.before, level * self.after)
+        own = float(np.hypot(own, self.noise.rounding))
         return float(np.hypot(own, levels) / max(abs(slope), 1e-12))
 
 
 def steady_noise(parts: list[FloatArray], quantum: float) -> Noise:
     """Noise about the levels of stretches in which nothing moves."""
-    residuals = [part - np.mean(part) for part in parts if part.size >= 4]
+    residuals = [_about_line(part) for part in parts if part.size >= 4]
     if not residuals:
         return Noise(quantum / np.sqrt(12), 1.0, quantum)
     # The median of the variances: a stretch that still moves does not count.
-    variances = [float(one @ one) / (one.size - 1) for one in residuals]
+    variances = [float(one @ one) / (one.size - 2) for one in residuals]
     sigma = max(float(np.sqrt(np.median(variances))), quantum / np.sqrt(12))
     longest = max(residuals, key=lambda one: one.size)
     time = correlation_time(longest) if longest.size >= 30 and np.ptp(longest) > 0 else 1.0
     return Noise(sigma, min(time, longest.size / 4), quantum)
+
+
+def _about_line(part: FloatArray) -> FloatArray:
+    """What is left of a stretch without the line of least squares: its end may still move."""
+    index = np.arange(part.size, dtype=np.float64)
+    line = np.mean(part) + slope_of(index, part) * (index - index.mean())
+    return np.asarray(part - line)
 
 
 def _root(curve: np.polynomial.Polynomial, level: float) -> float:
