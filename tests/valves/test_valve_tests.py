@@ -270,6 +270,15 @@ def test_rounding_widens_the_times_of_small_steps(noise):
             assert held(group.estimates["t86"], 0.3 + 2 * 0.5)
 
 
+@pytest.mark.parametrize("dt", [0.25, 0.1, 0.02])
+@pytest.mark.parametrize("late", [0.0, 0.3, 0.45])
+def test_first_motion_lies_between_the_sample_before_and_the_one_that_moved(dt, late):
+    """With 0.25 s of sampling it was 0.395 to 0.605 s for 0.3 s; without dead time two samples."""
+    record = repeated(lambda t: late_lag(t, late), 6.0, 0.02, height=5.0, dt=dt)
+    for group in valves.valve_report(record, **QUICK).groups:
+        assert held(group.estimates["dead_time"], late)
+
+
 def ringing(t, damping=0.5, omega=4.0):
     ring = np.sqrt(1 - damping**2)
     late = np.clip(t - 0.3, 0, None)

@@ -29,6 +29,8 @@ _REACH = 0.1
 _SECOND, _BEGINNING = 15.0, 0.4
 """Standard deviations of the second threshold of an onset, and part of the change that they may be:
 with 0.9 of it the dead time of a lag is 7 % too long, and beyond it is none."""
+_REST = 8
+"""Samples before a step from which `first_motion` takes the level before it."""
 _T86 = 1 - float(np.exp(-2))
 
 
@@ -141,7 +143,9 @@ class UnitResponse:
         """
         if _SECOND * self.noise.sigma > _BEGINNING:
             return UNKNOWN
-        found = first_motion(self.shape, 0, self.noise.sigma, self.noise.quantum, 0.0)
+        # with a rest of zero in front, whose level is not that of the first samples of the motion
+        output = np.concatenate([np.zeros(_REST), self.shape])
+        found = first_motion(output, _REST, self.noise.sigma, self.noise.quantum, 0.0)
         if found is None or found.sign < 0:
             return UNKNOWN
         # The line through two points of one deviation each, five and fifteen of them high, meets
