@@ -202,13 +202,17 @@ def _statics(
     steps: tuple[StepMetrics, ...], ranges: Ranges,
 ) -> tuple[StaticCurve | None, dict[str, tuple[Interval, str]]]:  # fmt: skip
     found: list[tuple[Interval, Interval, Interval]] = []
-    delay = _slow_delay(steps)
-    curves, waits = [], []
+    delay, longest = _slow_delay(steps)
+    curves, waits, rates = [], [], [0.0]
     for k, (record, own) in enumerate(zip(records, parts, strict=True)):
         mine = [one for one in steps if one.record == k]
         found.append(dead_band_and_resolution(mine, own, ranges))
         noise = noise_of(record, own)
         waits.append(reversal_wait(record, own, ranges, noise, delay))
+        rates += [
+            abs(part.after - part.before) / ((part.stop - part.start) * record.dt)
+            for part in own if part.kind == "ramp"
+        ]  # fmt: skip
         curves.append(static_curve(record, own, mine, ranges, noise, delay))
     # a ramp before levels, the longer before the shorter
     known = [one for one in curves if one is not None]
@@ -221,6 +225,13 @@ def _statics(
     hysteresis, linearity, width = hysteresis_and_linearity(
         curve, band if lag_known else Interval()
     )
+    if lag_known:
+        # with a longer delay both branches come closer by its difference times the rate
+        closer = 2 * (longest - delay) * max(rates) * 100 / abs(ranges.command_span)
+        hysteresis, width = (
+            replace(one, low=max(one.low - closer, 0.0)) if one.is_known else one
+            for one in (hysteresis, width)
+        )
     # A stem that sticks shows less of its dead band in the loop than at the reversal.
     sticks = [wait for wait, least in waits if least > width.high]
     if width.is_known and sticks:
@@ -241,20 +252,21 @@ def _statics(
     }
 
 
-def _slow_delay(steps: Sequence[StepMetrics]) -> float:
+def _slow_delay(steps: Sequence[StepMetrics]) -> tuple[float, float]:
     """Mean delay in s of small steps: those of large ones hold half of their travel at the rate.
 
-    The line through the delays over the sizes, at zero, and no more than the smallest have.
+    The line through the delays over the sizes, at zero; and that of the smallest, which it does
+    not exceed.
     """
     known = [one for one in steps if np.isfinite(one.mean_delay) and not one.stroke]
     if not known:
-        return float("nan")
+        return float("nan"), float("nan")
     size = np.array([abs(one.size) for one in known])
     delay = np.array([one.mean_delay for one in known])
     small = float(np.median(delay[size <= _ALIKE * size.min()]))
     if np.ptp(size) <= 0.5 * size.max():
-        return small
-    return float(np.clip(np.polyfit(size, delay, 1, w=size)[1], 0.0, small))
+        return small, small
+    return float(np.clip(np.polyfit(size, delay, 1, w=size)[1], 0.0, small)), small
 
 
 def _fit_of_operation(records: tuple[Record, ...]) -> tuple[Interval, Flag] | None:

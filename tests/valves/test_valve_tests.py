@@ -189,6 +189,20 @@ def test_a_ramp_without_steps_tells_the_dead_band_from_zero_on_as_its_lag_is_unk
     assert valves.valve_report(both, **QUICK).metric("dead_band").interval.high < 0.05
 
 
+@pytest.mark.parametrize("width", [0.0, 0.8])
+def test_a_limited_rate_before_a_lag_leaves_dead_band_and_hysteresis_of_a_ramp(width):
+    """The line through the delays of all sizes was 29 ms short: 0.082 to 0.087 % without play."""
+    steps = command_of([50, 52, 50, 60, 50, 60, 50, 0], [5] * 7 + [8])
+    ramp = np.interp(DT * np.arange(2600), [0, 60, 65, 125], [0, 100, 100, 0])
+    command = np.r_[steps, ramp]
+    moved = cr.actuators.SlewRateLimit(25.0).simulate(command, DT)
+    moved = cr.actuators.Backlash(width).simulate(moved) if width else moved
+    report = valves.valve_report(record_of(command, moved, 0.02, 0, lag=0.4), **QUICK)
+    assert held(report.metric("dead_band").interval, width)
+    assert report.metric("dead_band").interval.high < width + 0.1
+    assert held(report.metric("hysteresis").interval, 0.0)
+
+
 def test_linearity_of_a_ramp_names_its_range_and_has_the_error_of_noise_and_of_its_points():
     """1.4254 with an interval of zero width; over the range of the curve it is 1.554."""
     t = 0.1 * np.arange(12600)
