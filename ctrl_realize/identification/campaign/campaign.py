@@ -201,8 +201,15 @@ class Campaign(Result):
         pandas.DataFrame
             Index ``amplitude``; columns ``records``, ``delay``, ``std`` [samples], ``gain``,
             ``gain_std``.
+
+        Raises
+        ------
+        DataError
+            No record was identified, or the records have different sample times.
         """
         import pandas as pd
+
+        _ = self.dt
 
         frame = pd.DataFrame(
             {
@@ -223,11 +230,15 @@ class Campaign(Result):
         return tuple(campaign_flags(self.rows, self.good, self.failed, self.method))
 
     def _title(self) -> str:
-        return f"Campaign of {len(self.rows)} records ({self.method})"
+        many = len(self.rows)
+        return f"Campaign of {many} record{'s' if many != 1 else ''} ({self.method})"
 
     def _rows(self) -> list[tuple[str, str]]:
-        summary = self.statistics()
-        best = self.best
+        identified = "identified", f"{len(self.good)} of {len(self.rows)} records"
+        try:
+            summary, best = self.statistics(), self.best
+        except DataError as error:
+            return [identified, ("delay", f"no mean: {error}")]
         spread = [
             ("variance", f"{summary.variance:.3g} samples^2"),
             (
@@ -239,7 +250,7 @@ class Campaign(Result):
         if not np.isfinite(summary.variance):
             spread = [("scatter", "unknown: a single record has no scatter")]
         return [
-            ("identified", f"{len(self.good)} of {len(self.rows)} records"),
+            identified,
             (
                 "delay, trimmed mean",
                 f"{summary.mean:.2f} samples = {in_time(summary.mean * self.dt, 4)} "

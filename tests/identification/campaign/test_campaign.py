@@ -63,3 +63,27 @@ def test_the_final_model_is_the_best_record_at_the_common_delay(campaign):
     scan = campaign.best.system.fit
     again = cr.realize(scan.impulse, 3, delay=system.delay, samples=1000, feedthrough=True)
     assert_array_equal(system.A, again.A)
+
+
+def test_records_of_different_sample_times_have_a_report_but_no_mean_delay():
+    """Table by amplitude averaged samples of 10 and 20 ms to 8.99, and the report raised."""
+    rng = np.random.default_rng(0)
+    records = []
+    for k in range(4):
+        dt = 0.01 * (1 + k % 2)
+        t = dt * np.arange(400)
+        y = 1 - np.exp(-np.clip(t - 100 * dt - 0.12, 0, None) / 0.3)
+        noisy = y + 1e-3 * rng.standard_normal(t.size)
+        records.append(cr.Record(t, np.where(np.arange(400) < 100, 0, 1), noisy, name=f"{k}"))
+    campaign = cr.identify_campaign(records, method="scan", progress=False)
+    assert len(campaign.good) == 4
+    with pytest.raises(cr.errors.DataError, match=r"0\.01 s to 0\.02 s"):
+        campaign.by_amplitude()
+    assert "sample times from 0.01 s to 0.02 s" in campaign.report()
+
+
+def test_a_campaign_of_failed_records_has_a_report():
+    flat = cr.Record(0.01 * np.arange(100), np.zeros(100), np.zeros(100), name="flat")
+    campaign = cr.identify_campaign([flat], progress=False)
+    assert "Campaign of 1 record " in campaign.report()
+    assert "0 of 1" in campaign.report()
