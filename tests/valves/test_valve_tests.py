@@ -300,6 +300,20 @@ def ringing(t, damping=0.5, omega=4.0):
     return 1 - np.exp(-damping * omega * late) * (np.cos(angle) + damping / ring * np.sin(angle))
 
 
+@pytest.mark.parametrize(("damping", "noise"), [(0.5, 0.02), (0.5, 0.05), (0.3, 0.05), (0.7, 0.05)])
+def test_noise_makes_no_overshoot_larger(damping, noise):
+    """The largest noisy sample was 16.84 % for 16.30 %, and held in 54 of 100."""
+    truth = 100 * np.exp(-np.pi * damping / np.sqrt(1 - damping**2))
+    hits = []
+    for seed in range(4):
+        record = repeated(lambda t: ringing(t, damping), 8.0, noise, seed)
+        found = [one.estimates["overshoot"] for one in valves.valve_report(record, **QUICK).groups]
+        assert [one.value for one in found] == pytest.approx([truth] * 2, abs=20 * noise)
+        hits += [held(one, truth) for one in found]
+    # fewer than 6 of 8 intervals of 95 % hold: 6e-3
+    assert sum(hits) >= 6
+
+
 def test_the_interval_of_a_settling_time_lies_within_the_hold():
     """One error of 27 s beside three of 0.3 s made 2.3 s (-10.9 to 15.5 s)."""
     report = valves.valve_report(repeated(ringing, 8.0, 0.05), **QUICK)
