@@ -6,12 +6,21 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
+import numpy as np
+
 from .._flags import flagged
 from .._wording import in_time
 from ..data import Record
+from ..data.given import as_record
 from ..experiment.command import PlannedInput, duration_in_words
+from ..numerics.signals.edges import difference_noise
 from .evaluate import valve_report
 from .result import ValveReport
+
+_WHITE = 1.25
+"""Standard deviation over that of neighbours up to which noise is white, as of noisy ramps."""
+_AVERAGE = 5.0
+"""Standard errors of the mean of noise that has none."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -50,6 +59,9 @@ class ValveTestPlan(PlannedInput):
     def evaluate(self, records: Record | Sequence[Record], **options: Any) -> ValveReport:
         """Evaluate the records of this test.
 
+        Where the command of a record is that of the plan with noise, as one that was measured, that
+        of the plan is used.
+
         Parameters
         ----------
         records : Record or sequence of Record
@@ -67,9 +79,26 @@ class ValveTestPlan(PlannedInput):
         DataError, OptionError
             As `valve_report`.
         """
-        given = (records,) if isinstance(records, Record) else tuple(records)
-        result = valve_report(given, **{"command_range": self.command_range, **options})
+        given = (records,) if isinstance(records, Record) else tuple(map(as_record, records))
+        played = tuple(map(self._played, given))
+        result = valve_report(played, **{"command_range": self.command_range, **options})
+        if played != given:
+            told = "the command is that of the plan: that of the records is the same with noise"
+            result = replace(result, choices=(*result.choices, told))
         return _with_plan(result, self)
+
+    def _played(self, record: Record) -> Record:
+        """Give a record the command of the plan if its own differs from it by white noise."""
+        if not record.issiso():
+            return record
+        planned = self.record(np.ravel(record.output), time=record.time).input
+        noise = np.ravel(record.input) - np.ravel(planned)
+        size = float(np.std(noise))
+        error = size / np.sqrt(noise.size)
+        white = 0 < size <= _WHITE * difference_noise(noise)
+        if not white or abs(float(np.mean(noise))) > _AVERAGE * error:
+            return record
+        return record.__replace__(input=planned)
 
     _heading = "Plan of a valve test"
 
