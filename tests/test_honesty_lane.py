@@ -28,6 +28,7 @@ def test_every_flag_of_the_package_has_a_world_in_which_it_is_due():
         "frf_contradicts_records",  # tests/identification/joint/test_joint_fit.py
         # tests/valves/test_valve_tests.py
         *("dead_time_varies", "did_not_move", "no_valve_test", "operation_fit", "plan_incomplete"),
+        "range_in_doubt",
         # tests/valves/test_loop_diagnosis.py
         *("constant_signal", "few_cycles", "few_samples_per_cycle", "filled_samples"),
         *("missing_samples", "saturated_output", "set_point_moves"),

@@ -125,7 +125,7 @@ def valve_report(
     groups = grouped(steps, given, fit=fit)
     curve, statics = _statics(given, parts, steps, ranges)
     metrics = collected(groups, statics)
-    flags = [*flags_of(steps, groups, parts)]
+    flags = [*flags_of(steps, groups, parts, ranges)]
     if fit and any(flag.code == "no_valve_test" for flag in flags):
         model = _fit_of_operation(given)
         flags += [model[1]] if model else []

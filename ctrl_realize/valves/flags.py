@@ -11,9 +11,11 @@ from ..numerics.constants import Z_95
 from ..numerics.validation.own_response import homogeneity
 from .groups import SizeAndDirection
 from .part import TestPart
-from .steps import StepMetrics
+from .steps import Ranges, StepMetrics
 
 _BY_CHANCE = 1e-3
+_LARGEST = 110.0
+"""Step in % of the span beyond which the range is wrong: NAMUR NE 43 has 3.6 to 21 mA, 109 %."""
 _LATER = 1.25
 """Dead times that differ by less do not matter, whatever their errors."""
 
@@ -22,8 +24,17 @@ def flags_of(
     steps: tuple[StepMetrics, ...],
     groups: tuple[SizeAndDirection, ...],
     parts: tuple[tuple[TestPart, ...], ...],
+    ranges: Ranges,
 ) -> Iterator[Flag]:
     """List the flags of a test."""  # fmt: skip
+    largest = max((abs(one.size) for one in steps), default=0.0)
+    if largest > _LARGEST:
+        low, high = ranges.command
+        yield flagged("range_in_doubt", size=largest, low=low, high=high)
+    gains = [one.values["gain"] for one in steps if one.moved and abs(one.size) >= 0.5 * largest]
+    if gains and np.median(gains) < 0:
+        high, low = ranges.travel
+        yield flagged("range_in_doubt.reversed", low=low, high=high)
     if not steps and all(part.kind != "ramp" for own in parts for part in own):
         yield flagged("no_valve_test")
     still = [one for one in steps if not one.moved]

@@ -470,6 +470,21 @@ def test_parts_are_found_in_a_command_with_noise_or_rounding(noise, rounding):
     ]  # fmt: skip
 
 
+def test_a_wrong_range_of_the_command_and_a_reversed_travel_are_flagged_with_what_to_do():
+    command = np.r_[command_of([50, 60, 50, 0, 100, 0], 4.0), np.linspace(0, 100, 4000)]
+    command = np.r_[command, np.full(200, 100.0), np.linspace(100, 0, 4000), np.zeros(200)]
+    record = record_of(command, command, 0.02, 0)
+    wrong = valves.valve_report(record, command_range=(4, 20), **QUICK)
+    (flag,) = (one for one in wrong.flags if one.code == "range_in_doubt")
+    assert "625 %" in str(flag)
+    falling = cr.Record(record.time, command, 100 - record.output, units=PERCENT)
+    (flag,) = valves.valve_report(falling, **QUICK).flags
+    assert "travel_range=(100, 0)" in str(flag)
+    right = valves.valve_report(falling, travel_range=(100, 0), **QUICK)
+    assert right.flags == ()
+    assert right.metric("hysteresis").interval.is_known
+
+
 def test_records_of_operation_end_in_a_verdict_that_names_the_missing_tests():
     measured = cr.datasets.load("sugar_actuator").record[0:400]
     record = cr.Record(measured.time, measured.input, measured.output[0])
