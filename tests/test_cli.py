@@ -310,6 +310,8 @@ def test_a_valve_test_gives_tables_and_a_report_and_limits_are_judged(tmp_path, 
     assert page.count("<svg ") == 6
     assert "not verified against the document" in page
     assert "t86@2=0.5" in page
+    assert main([*words, "--limit", "t86=3", "-o", str(tmp_path / "no")]) == 2
+    assert "either for all sizes or by size" in capsys.readouterr().err
     assert main([*words, "--limit", "t86", "-o", str(tmp_path / "no")]) == 2
     assert "expected metric=largest" in capsys.readouterr().err
 

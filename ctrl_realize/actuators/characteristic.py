@@ -72,17 +72,18 @@ class Characteristic(StaticMap):
         positive(self.full_flow, "full_flow", "flow of the open valve")
         if positive(self.rangeability, "rangeability", "ratio of flows") <= 1:
             raise OptionError(f"rangeability={self.rangeability!r}; expected a value above 1")
-        positive(self.exponent, "exponent", "exponent of the travel")
+        if positive(self.exponent, "exponent", "exponent of the travel") >= 1:
+            raise OptionError(f"exponent={self.exponent!r}; expected a value below 1")
         given = finite(self.points, "points")
         if self.kind == "points" and (
             given.ndim != 2
             or given.shape[0] < 2
             or given.shape[1] != 2
-            or not (np.diff(given[:, 0]) > 0).all()
+            or not (np.diff(given[:, 0], prepend=-1e-9, append=1 + 1e-9) > 0).all()
         ):
             raise OptionError(
                 f"points={self.points!r}; expected at least two pairs (relative travel, relative "
-                "flow) with increasing travels"
+                "flow) with increasing travels from 0 to 1"
             )
         object.__setattr__(self, "points", tuple((float(h), float(f)) for h, f in self.points))
 

@@ -93,7 +93,8 @@ class SlewRateLimit(_OfTwoSamples):
 class Backlash(_OfTwoSamples):
     """Play between drive and stem: after a reversal the command moves by `width` in vain.
 
-    The same as a dead band, and as stiction without a slip jump, ``Stiction(width, 0)``.
+    The same as a dead band, and as stiction without a slip jump that remembers the side of the
+    friction, ``KanoStiction(width, 0)``.
 
     Parameters
     ----------

@@ -58,8 +58,8 @@ def relay_test(
     Raises
     ------
     OptionError
-        Levels beyond the range of the input, or a relay that does not switch: a bias as large as
-        the amplitude, or a hysteresis that the output does not reach.
+        Levels beyond the range of the input, or a relay that does not switch, as with too large
+        a bias, or a hysteresis that the output does not reach.
 
     References
     ----------

@@ -116,7 +116,7 @@ def check_complete(record: Record, task: str) -> None:
         )
     if record.missing == "keep" and record.n_missing:
         raise DataError(
-            f"{task} needs complete data; missing samples in this record: {record.n_missing}. "
+            f"{task} needs complete data; missing samples in this record: {record.n_missing}; "
             "identify(record) and fit_output_error use the samples that there are; otherwise "
             "select a complete part with record.between(t0, t1), or interpolate"
         )

@@ -18,6 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import special
 
+from ..errors import OptionError
 from .arrays import FloatArray
 
 
@@ -77,6 +78,11 @@ def trimmed_statistics(values: FloatArray, trim: int, *, ddof: int = 1) -> Trimm
     TrimmedStatistics
         The standard error is NaN if fewer than two values remain.
 
+    Raises
+    ------
+    OptionError
+        No value remains, or a negative `trim`.
+
     Notes
     -----
     The paper pools the 40 delays of its Table 1 and leaves out "the three smallest and highest
@@ -97,6 +103,8 @@ def trimmed_statistics(values: FloatArray, trim: int, *, ddof: int = 1) -> Trimm
     """
     ordered = np.sort(np.ravel(values).astype(np.float64))
     n = ordered.size
+    if not 0 <= 2 * trim < n:
+        raise OptionError(f"trim={trim} of {n} values; expected 0 <= 2 trim < number of values")
     kept = ordered[trim : n - trim]
     # Rounding may make the mean of equal values differ from them.
     mean = float(np.clip(kept.mean(), kept[0], kept[-1]))

@@ -128,7 +128,7 @@ def gain_plot(
         ):
             thin = {"color": looks["color"], "alpha": 0.45}
             if np.isfinite([low, high]).all():
-                axes.plot([x, x], [low, high], linewidth=1.6, **thin)
+                axes.plot([x, x], [low, high], linewidth=1.6, marker="_", markersize=12, **thin)
             if gains.scheduled_over == "input level":
                 axes.plot(span, [g, g], linewidth=0.8, **thin)
         used = gains.kept

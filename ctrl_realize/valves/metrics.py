@@ -203,6 +203,8 @@ def _limit(given: Any, key: str) -> tuple[float | None, float | None]:
         )
     what = "limit, largest or (smallest, largest)"
     low, high = (None if end is None else real(end, f"limits[{key!r}]", what) for end in ends)
+    if low is not None and high is not None and low > high:
+        raise OptionError(f"limits[{key!r}]={given!r}; expected (smallest, largest) in this order")
     return low, high
 
 

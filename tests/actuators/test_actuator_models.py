@@ -156,6 +156,8 @@ def test_the_open_loop_is_process_and_controller(process):
         (lambda: Saturation(float("nan"), 5), "finite"),
         (lambda: Characteristic("parabolic"), "kind"),
         (lambda: Characteristic("points", points=[(0, 0), (0, 1)]), "increasing"),
+        (lambda: Characteristic("points", points=[(0, 0), (50, 20), (100, 100)]), "from 0 to 1"),
+        (lambda: Characteristic("quick-opening", exponent=1), "below 1"),
         (lambda: Series([]), "at least one"),
         (lambda: Series([3]), "expected an actuator"),
         (lambda: SlewRateLimit(1).simulate([0, 1]), "needs dt"),

@@ -520,6 +520,7 @@ PLANNED = {"dead_time": 1, "time_constant": 1}
         (DataError, "output has", lambda r: valves.valve_test_plan(**PLANNED).record([1.0, 2])),
         (OptionError, "'t87'", lambda r: valves.valve_report(r, limits={"t87": 1})),
         (OptionError, "largest", lambda r: valves.valve_report(r, limits={"t86": "1"})),
+        (OptionError, "in this order", lambda r: valves.valve_report(r, limits={"t86": (3, 1)})),
         (OptionError, "by step", lambda r: valves.valve_report(r, limits={"linearity": {2: 1}})),
         (OptionError, "positive", lambda r: valves.valve_report(r, command_range=(1, 1))),
         (OptionError, "expected one of", lambda r: valves.valve_report(r, **QUICK).metric("x")),

@@ -58,6 +58,10 @@ def _limits(given: Sequence[str]) -> dict[str, Any]:
     for text in given:
         name, equals, value = text.partition("=")
         key, at, size = name.strip().partition("@")
+        if equals and key in found and isinstance(found[key], dict) != bool(at):
+            raise OptionError(
+                f"--limit {text!r}; expected limits of {key} either for all sizes or by size"
+            )
         try:
             if not equals:
                 raise ValueError

@@ -16,6 +16,8 @@ from .rows import CampaignRow
 
 Rows = tuple[CampaignRow, ...]
 
+_NO_GAIN = {"not_died_away", "unstable"}
+"""Flags of a row whose gain is not determined."""
 _SAME_HEIGHT = 1e-6  # relative difference up to which heights count as equal
 
 
@@ -25,7 +27,9 @@ def campaign_flags(rows: Rows, good: Rows, failed: Rows, method: str) -> Iterato
         more = "" if len(failed) <= 5 else f" and {len(failed) - 5} more"
         names = ", ".join(row.name for row in failed[:5]) + more
         yield flagged("failed_records", failed=len(failed), records=len(rows), names=names)
-    yield from _different_gains(good)
+    # a record that ends before its response does not tell the gain
+    ended = tuple(row for row in good if _NO_GAIN.isdisjoint(flag.code for flag in row.flags))
+    yield from _different_gains(ended)
     yield from _different_times(good)
     yield from _same_records(good)
     yield from _amplitude_trend(good, method)

@@ -154,6 +154,8 @@ def identify_each(
     """
     check_type(records, Iterable, "records", "several records")
     method = one_of(method, "method", METHODS)
+    if store is not None and not hasattr(store, "opened"):
+        raise OptionError(f"store={store!r}; expected a ctrl_realize.io.CampaignStore(path)")
     known = set(signature(identify).parameters) - {"record", "method"}
     strange = sorted(set(options) - known)
     if strange:

@@ -226,6 +226,8 @@ def valve_plan_plot(
         looks = {"color": style.INPUT, "linewidth": 1.2, **kwargs}
         lines = list(axes[0].plot(plan.time * unit, plan.command, **looks))
         bottom, top = axes[0].get_ylim()
+        # the names stand above the command, where it has no values
+        axes[0].set_yticks([one for one in axes[0].get_yticks() if bottom <= one <= top])
         axes[0].set_ylim(bottom, top + 0.5 * (top - bottom))
         for k, (word, start, stop) in enumerate(plan.sections):
             if k % 2:

@@ -87,3 +87,26 @@ def test_a_campaign_of_failed_records_has_a_report():
     campaign = cr.identify_campaign([flat], progress=False)
     assert "Campaign of 1 record " in campaign.report()
     assert "0 of 1" in campaign.report()
+
+
+def test_records_that_end_before_their_response_do_not_tell_that_the_plant_has_changed():
+    records = []
+    for amplitude in (16.0, 8.0):
+        for seed in range(3):
+            t = 0.01 * np.arange(600)
+            y = 2 * amplitude * (1 - np.exp(-np.clip(t - 1.12, 0, None) / 30))
+            noise = 0.05 * np.random.default_rng(seed).standard_normal(t.size)
+            u = np.where(t < 1, 0, amplitude)
+            records.append(cr.Record(t, u, y + noise, name=f"{amplitude:g}_{seed}"))
+    campaign = cr.identify_campaign(records, method="scan", progress=False)
+    ended = {"not_died_away", "unstable"}
+    assert all(ended & {flag.code for flag in row.flags} for row in campaign.good)
+    assert not {"gains_differ", "no_common_gain"} & {flag.code for flag in campaign.flags}
+
+
+def test_a_store_that_is_a_path_and_a_trim_that_leaves_no_value_are_refused(records):
+    with pytest.raises(cr.errors.OptionError, match="CampaignStore"):
+        cr.identify_campaign(records[:1], store="x.sqlite", progress=False)
+    for values, trim in (([0, 1], -1), ([0, 1], 1), ([], 0)):
+        with pytest.raises(cr.errors.OptionError, match="trim"):
+            cr.paper.trimmed_statistics(np.array(values), trim)
