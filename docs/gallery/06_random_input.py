@@ -1,7 +1,7 @@
 """Random binary input, and what is left
 
-Residual of a flow loop under a random binary input: white, and independent of the input.
-Simulated.
+Residual of a flow loop under a random binary input: independent of the input, and not quite
+white, since the flow is disturbed. Simulated.
 
 See: ../../howto/random_inputs, ../../howto/other_inputs
 """

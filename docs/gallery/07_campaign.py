@@ -1,6 +1,6 @@
 """A campaign of steps
 
-Steps of two heights, each identified by itself; the histogram beside the true delay. Simulated
+Steps of two heights, each identified by itself; the intervals beside the true delay. Simulated
 valve.
 
 See: ../../howto/several_records, ../notebooks/05_forty_records
