@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import control as ct
 import numpy as np
 from matplotlib.axes import Axes
@@ -41,7 +43,7 @@ def pid_comparison_plot(
     >>> plant = cr.design.ProcessModel(gain=1.0, lag=0.08, dead_time=0.029).system(0.001)
     >>> cplt = cr.plots.pid_comparison_plot(cr.design.compare_pid(plant, ["simc", "amigo"], ["PI"]))
     >>> cplt.figure.axes[0].get_xlabel(), cplt.figure.axes[0].get_ylabel()
-    ('sensitivity peak Ms', 'integrated absolute load error [s]')
+    ('sensitivity peak Ms', 'integrated absolute load error [output s / input]')
     """
     kinds = sorted({c.kind for c in result.controllers})
     rows = zip(result.controllers, result.margins, result.performance, strict=True)
@@ -57,7 +59,8 @@ def pid_comparison_plot(
             of_kind = [(x, y) for name, x, y, _ in points if name == kind]
             if of_kind:
                 lines += axes.plot(*zip(*of_kind, strict=True), "o", color=colour, label=kind)
-        axes.set(xlabel="sensitivity peak Ms", ylabel="integrated absolute load error [s]")
+        unit = _load_error_unit(result.controllers[0].gain_unit if result.controllers else "")
+        axes.set(xlabel="sensitivity peak Ms", ylabel=f"integrated absolute load error [{unit}]")
         axes.margins(x=0.05)
         axes.set_yscale("log")
         low, high = axes.get_ylim()
@@ -69,6 +72,13 @@ def pid_comparison_plot(
         axes.set_xlim(low, high + 0.35 * (high - low))
         _name_points(axes, [(x, y, name, colours[kind]) for kind, x, y, name in points])
         return style.finished([axes], [lines], loc="upper center")
+
+
+def _load_error_unit(gain_unit: str) -> str:
+    """Output times s per input, from the unit of a controller's gain (input per output)."""
+    parts = re.fullmatch(r"(\([^)]*\)|[^/(]*)/(.+)", gain_unit)
+    below, above = parts.groups() if parts else ("1", "output")
+    return plain(f"{above} s / {'input' if below == '1' else below}")
 
 
 def _rule_label(rule: str, peak: float) -> str:

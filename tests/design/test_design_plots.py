@@ -69,6 +69,26 @@ def test_rules_that_ring_stand_at_the_edge_with_their_peak():
     plt.close(drawn.figure)
 
 
+@pytest.mark.parametrize(
+    ("units", "shown"),
+    [
+        ({"u": "%", "y": "degC"}, "degC s / %"),
+        ({"u": "l/min", "y": "bar"}, "bar s / (l/min)"),
+        ({"y": "K"}, "K s / input"),
+        ({}, "output s / input"),
+    ],
+)
+def test_the_load_error_is_in_the_unit_of_the_output_times_seconds_per_input(units, shown):
+    t = np.arange(400.0)
+    y = np.where(t > 105, -np.expm1(-(t - 105) / 30), 0.0)
+    y += 1e-3 * np.random.default_rng(0).standard_normal(t.size)
+    record = cr.Record(t, 1.0 * (t >= 100), y, units=units)
+    sys = cr.identify(record, structures="FOPDT")
+    drawn = cr.design.compare_pid(sys, ["simc"], ["PI"]).plot()
+    assert np.ravel(drawn.axes)[0].get_ylabel() == f"integrated absolute load error [{shown}]"
+    plt.close(drawn.figure)
+
+
 def test_the_loop_is_drawn_with_its_actuator_limits_and_noise(valve):
     plant = valve(37)
     pid = cr.design.pid(plant, "simc", "PI")
