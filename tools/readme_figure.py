@@ -15,11 +15,9 @@ DATA, MODEL, SHADE = "#0072b2", "#d55e00", "#f2cf7a"
 
 
 def main() -> None:
-    valve = cr.bench.valve()
-    rng = np.random.default_rng(5)
-    record = valve.step_record(16.0, rng)
+    record = cr.read_record(cr.datasets.path("simulated_valve"))
     system = cr.identify(record)
-    frf = cr.stepped_sine_frf(valve.stepped_sine(rng))
+    frf = cr.read_frf(cr.datasets.path("simulated_valve", "frf"))
     fit = system.fit
 
     plt.rcParams.update({"font.size": 15, "axes.spines.top": False, "axes.spines.right": False})
@@ -36,7 +34,7 @@ def main() -> None:
     low, high = fit.interval
     axes["step"].axvspan(1e3 * low, 1e3 * high, color=SHADE, lw=0)
     axes["step"].axvline(1e3 * fit.dead_time, color=MODEL, lw=1.5)
-    truth = 1e3 * valve.truth.dead_time
+    truth = 1e3 * cr.datasets.load("simulated_valve").info.dead_time_band[0]
     axes["step"].axvline(
         truth, color="k", lw=1.5, ls=":", label=f"truth (simulated valve): {truth:.1f} ms"
     )
