@@ -10,7 +10,7 @@ import numpy as np
 import ctrl_realize as cr
 from ctrl_realize.actuators import Characteristic
 from ctrl_realize.numerics.actuators.friction import backlash, kano
-from ctrl_realize.numerics.actuators.limits import saturated, slew_limited
+from ctrl_realize.numerics.actuators.limits import slew_limited
 
 from ..honesty.worlds import DT as HONESTY_DT
 from ..honesty.worlds import NOISES, step_case
@@ -114,7 +114,7 @@ def positions(rng: Rng, moved: Callable[[np.ndarray], np.ndarray], plant: Plant)
 def end_of_travel(rng: Rng) -> Trial:
     """Staircase of nine moves, 20 to 90 %; the travel ends 3 to 15 % before the highest command"""
     plant, cut = drawn(rng), float(rng.uniform(3.0, 15.0))
-    made = positions(rng, lambda u: saturated(u, high=90.0 - cut), plant)
+    made = positions(rng, lambda u: np.minimum(u, 90.0 - cut), plant)
     truth, sizes = {"travel_high": 90.0 - cut}, {"travel_high": cut}
     return Trial(made, "saturation", plant.dead_time, truth, LAGS, sizes)
 
@@ -122,7 +122,7 @@ def end_of_travel(rng: Rng) -> Trial:
 def both_ends(rng: Rng) -> Trial:
     """The same, with both ends within the commands by 3 to 15 %"""
     plant, (below, above) = drawn(rng), rng.uniform(3.0, 15.0, 2).tolist()
-    made = positions(rng, lambda u: saturated(u, 20.0 + below, 90.0 - above), plant)
+    made = positions(rng, lambda u: np.clip(u, 20.0 + below, 90.0 - above), plant)
     truth = {"travel_low": 20.0 + below, "travel_high": 90.0 - above}
     sizes = {"travel_low": below, "travel_high": above}
     return Trial(made, "saturation", plant.dead_time, truth, LAGS, sizes)

@@ -59,10 +59,14 @@ def test_models_that_fit_a_record_with_a_load_as_well_have_gains_near_that_of_th
     # than the record its gain would be any number of either sign
     one = case("load", 222)
     fit = cr.fit_output_error(one.record).fit
-    assert levels(fit)["tuning"] == "good"
+    # a late path that takes 78 % of the response back is another plant for a controller
+    assert levels(fit)["tuning"] == "no"
     gains = np.array([np.real(ct.dcgain(sys)) for sys in fit.plausible_models.systems])
-    # their standard deviation is 1.5 %; about a pole at its bound two were 2364 and 2634
-    assert gains == pytest.approx(one.plant.gain, rel=0.1)
+    # their standard deviation is 1.5 %; about a pole at its bound two were 2364 and 2634. Every
+    # second one has the load as a late path of the plant
+    assert gains[1::2] == pytest.approx(one.plant.gain, rel=0.1)
+    late = gains[::2] - fit.estimate.load.own_gain
+    assert late == pytest.approx(one.plant.gain, rel=0.1)
 
 
 def test_flags_that_do_not_go_with_wrong_answers_are_notes():

@@ -25,6 +25,7 @@ from .ultimate import critical_point
 
 RULES = (*MODEL_RULES, *SYSTEM_RULES)
 KINDS = ("P", "PI", "PD", "PID")
+_CHOICES = {"rule": RULES, "kind": KINDS, "reduction": REDUCTIONS, "method": DISCRETIZATIONS}
 _USUAL_MS = 1.4  # of the optimal rule
 SAFE = ("amigo", "simc", "lambda")
 """Rules that are suggested if the loop of another is unstable; then the optimal PI."""
@@ -189,9 +190,9 @@ class TuningOptions:
 
     def __post_init__(self) -> None:
         """Check every argument that does not depend on the plant."""
-        rule, kind = one_of(self.rule, "rule", RULES), one_of(self.kind, "kind", KINDS)
-        one_of(self.reduction, "reduction", REDUCTIONS)
-        one_of(self.method, "method", DISCRETIZATIONS)
+        for name, choices in _CHOICES.items():  # whose case does not matter
+            object.__setattr__(self, name, one_of(getattr(self, name), name, choices))
+        rule, kind = self.rule, self.kind
         known = kinds_of(rule)
         if kind not in known:
             raise OptionError(f"rule={rule!r} has no {kind}; available: {', '.join(known)}")

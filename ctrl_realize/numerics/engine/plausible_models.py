@@ -23,6 +23,8 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
+from scipy.interpolate import pade
+from scipy.special import factorial
 
 from ..arrays import ComplexArray, FloatArray
 from ..blas_threads import one_blas_thread
@@ -45,6 +47,9 @@ _WIDER = 1.5  # standard deviations of the proposals, over those of the errors: 
 _PROPOSED = 16  # for each model that is drawn
 _EFFECTIVE = 0.7  # independent proposals for each, in effect, below which they are moved instead
 _SWEEPS = 25  # of these moves
+_PADE = 6
+"""Order for the delay of a second path. With it Ms is 2.0, 8 and 50 to 100 for PIs that have 2.1,
+14 and 36 on the plant itself; with ten equal lags in its place, 1.5, 1.7 and 7.5."""
 _WIDEST = 1.5  # standard deviation of the log of a pole: a factor of twenty on each side
 
 
@@ -69,14 +74,14 @@ class PlausibleDraw:
         Of the structures that are not ruled out, on any scale.
     best : callable
         The fit of each: best(structure) -> Candidate.
-    other : WindowFit, optional
-        Another fit that is as likely, of whose best half of the models are drawn.
+    late : tuple of float, optional
+        Gain of a second path that half of the models have, its delay and its lag in s.
     """
 
     fits: WindowFit
     evidence: Mapping[Structure, float]
     best: Callable[[Structure], Candidate]
-    other: WindowFit | None = None
+    late: tuple[float, float, float] | None = None
 
     def __getstate__(self) -> dict[str, tuple[PlausibleModel, ...]]:
         """What is stored or sent: the models, which are far smaller than the fits."""
@@ -86,18 +91,29 @@ class PlausibleDraw:
     def models(self) -> tuple[PlausibleModel, ...]:
         """`COUNT` equally likely models; the same for the same data."""
         rng = np.random.default_rng(COUNT)
-        others = 0 if self.other is None else COUNT // 2
         weights = np.array(list(self.evidence.values()))
-        ends = np.round(np.cumsum(weights / weights.sum()) * (COUNT - others) - 1e-9)
+        ends = np.round(np.cumsum(weights / weights.sum()) * COUNT - 1e-9)
         counts = np.diff(ends, prepend=0.0)  # of each, within one of its share
         models: list[PlausibleModel] = []
         with one_blas_thread():
-            if self.other is not None:
-                models += _about(self.other, self.other.best, others, rng)
             for structure, count in zip(self.evidence, counts, strict=True):
                 if count:
                     models += _about(self.fits, self.best(structure), int(count), rng)
+        if self.late is not None:
+            models[::2] = [_with_late_path(model, *self.late) for model in models[::2]]
         return tuple(models)
+
+
+def _with_late_path(model: PlausibleModel, gain: float, delay: float, lag: float) -> PlausibleModel:
+    """Add a path of a gain, delay and lag; its delay behind that of the model by Pade."""
+    scale = max(delay - model.dead_time, 1e-3 * lag) ** np.arange(_PADE, -1, -1.0)
+    # exp(x) is about p(x) / q(x), and exp(-x) therefore q(x) / p(x).
+    p, q = pade(1 / factorial(np.arange(2 * _PADE + 1)), _PADE)
+    own, path = np.poly(model.poles).real, np.convolve(p.c * scale, [lag, 1.0])
+    other = np.polymul(gain * q.c * scale, own)
+    numerator = np.polyadd(np.polymul(model.numerator[::-1], path), other) / path[0]
+    poles = np.concatenate([model.poles, np.roots(path)])
+    return PlausibleModel(model.dead_time, poles, numerator[::-1])
 
 
 def _about(

@@ -132,10 +132,11 @@ def fit_step_record(
     loaded = None if data.load is not None else load_of(data, fits, fit, free, _is_noise)
     if loaded is not None and not loaded[0].early:
         load, part = loaded
-        load = replace(load, own_gain=_own_gain(data, load))
+        late = _late_path(data, load)
+        load = replace(load, own_gain=late[0])
         data, found = fit_step_record(given.with_load(load, part), requested)
         if load.own_gain and found.drawn is not None:
-            found = replace(found, drawn=replace(found.drawn, other=fits))
+            found = replace(found, drawn=replace(found.drawn, late=late))
         return data, replace(found, load=load)
     if structures is None and requested.fastest is None:
         found = _free_choice(data, fits, fit, requested.whiten)
@@ -151,15 +152,19 @@ def fit_step_record(
     return data, found if loaded is None else replace(found, load=loaded[0])
 
 
-def _own_gain(data: StepData, load: LoadStep) -> float:
-    """What a load adds to the gain if it is a late part of the response to the step before it."""
+def _late_path(data: StepData, load: LoadStep) -> tuple[float, float, float]:
+    """Gain, delay and lag of a load if it is a late part of the response to the step before it.
+
+    A gain of 0 where such a part would have followed another step as well.
+    """
     times = data.dt * np.array([index for index, _ in data.edges])
     own = int(np.flatnonzero(times <= load.time)[-1])
-    late = np.delete(times, own) + load.time - times[own]  # it would follow the others as well
-    if np.any(late + load.lag <= data.clock[-1]):
-        return 0.0
+    since = load.time - times[own]
+    if np.any(np.delete(times, own) + since + load.lag <= data.clock[-1]):
+        return 0.0, since, load.mean_lag
     index, samples = data.edges[own]
-    return load.size / float(data.input[index + samples] - data.input[index - 1])
+    height = float(data.input[index + samples] - data.input[index - 1])
+    return load.size / height, since, load.mean_lag
 
 
 def _input_error(data: StepData) -> float:

@@ -32,6 +32,12 @@ class LoadStep:
     early: bool = False
     own_gain: float = 0.0
 
+    @property
+    def mean_lag(self) -> float:
+        """Mean delay of the response behind the time of the load, in s."""
+        parts = self.residues / self.poles
+        return self.lag * float((np.sum(parts / self.poles) / -np.sum(parts)).real)
+
     def columns(self, clock: FloatArray) -> FloatArray:
         """Response to a unit step (N, 3), and its changes for a later step and a longer lag."""
         since = np.maximum(clock - self.time, 0.0) / self.lag

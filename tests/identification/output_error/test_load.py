@@ -62,7 +62,7 @@ def test_a_late_part_of_the_response_to_one_step_may_be_the_plant_s_own():
     fit = cr.identify(cr.Record(TIME, np.where(TIME < STEP, 40.0, 46.0), output)).fit
     _, gain, tuning = fit.verdicts
     assert gain.level == "no"
-    assert tuning.level != "good"
+    assert tuning.level == "no"  # Ms of the PI is 14 on this plant
     low, high = fit.gain_interval
     assert low <= GAIN / 2 <= GAIN <= high
     (flag,) = told(fit)
