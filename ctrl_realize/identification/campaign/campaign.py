@@ -205,12 +205,12 @@ class Campaign(Result):
         Raises
         ------
         DataError
-            No record was identified, or the records have different sample times.
+            The records have different sample times.
         """
         import pandas as pd
 
-        _ = self.dt
-
+        if self.good:
+            _ = self.dt
         frame = pd.DataFrame(
             {
                 "amplitude": [float(f"{row.amplitude:.2g}") for row in self.good],
