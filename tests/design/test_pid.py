@@ -203,3 +203,12 @@ def test_an_optimal_controller_holds_where_feedthrough_and_dead_time_turn_the_lo
     assert np.max(1 / np.abs(1 + controller * plant * np.exp(-dead_time * s))) < 1.01 * limit
     assert 0 < found.ti < 60
     assert found.td < 60
+
+
+def test_a_comparison_takes_the_robust_closed_loop_time_of_a_single_tuning():
+    plant = cr.design.ProcessModel(gain=1.0, lag=0.08, dead_time=0.029).system(0.001)
+    alone = cr.design.pid(plant, "lambda", closed_loop_time="robust")
+    found = cr.design.compare_pid(plant, ["lambda"], ["PI"], closed_loop_time="robust")
+    assert found.controllers[0].kp == alone.kp
+    with pytest.raises(cr.errors.OptionError, match="not of 'amigo'"):
+        cr.design.compare_pid(plant, ["amigo"], ["PI"], closed_loop_time="robust")

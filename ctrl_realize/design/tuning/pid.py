@@ -161,7 +161,7 @@ def pid(
     """
     given = locals()
     options = TuningOptions(**{one.name: given[one.name] for one in fields(TuningOptions)})
-    if options.closed_loop_time == "robust":
+    if options.closed_loop_time == "robust":  # as a number, with which the advice compares
         options = _robust(system, options)
     made, plant = tuned(system, options)
     check = loop_check(plant, made)

@@ -100,9 +100,16 @@ def white_step(
     gain = numerator[0] / a[0]
     total = dead_time + (a[1] if n > 1 else 1.0) / a[0]
     total -= numerator[1] / numerator[0] if m > 1 else 0.0
-    values = np.array([dead_time, gain, total]) + gradients @ step
+    moved = gradients @ step
     errors = np.linalg.norm(gradients @ root, axis=1) * np.sqrt(float(left @ left) / freedom)
-    return WhiteStep(*np.stack([values, errors], axis=1).ravel().tolist())  # each with its error
+    return WhiteStep(
+        dead_time + float(moved[0]),
+        float(errors[0]),
+        float(gain + moved[1]),
+        float(errors[1]),
+        float(total + moved[2]),
+        float(errors[2]),
+    )
 
 
 def _gradients(a: FloatArray, b: FloatArray) -> FloatArray:
