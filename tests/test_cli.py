@@ -159,9 +159,13 @@ def test_tune_tells_a_doubtful_verdict_beside_the_numbers(tmp_path, capsys):
 
 
 def test_a_model_is_kept_where_no_controller_can_be_tuned(tmp_path, capsys):
-    file = tmp_path / "short.csv"
-    csv(*(one[:50] for one in signals(noise=3.0)))(file)
-    words = [str(file), "--structures", "SOPDT"]
+    # (1 - 30 s) / ((20 s + 1)(8 s + 1)) behind 5 s, recorded until it is about to turn.
+    file, t = tmp_path / "short.csv", np.arange(65.0)
+    since = np.clip(t - 45, 0, None)
+    y = 1 + (38 * np.exp(-since / 8) - 50 * np.exp(-since / 20)) / 12
+    y += 0.02 * np.random.default_rng(1).standard_normal(t.size)
+    csv(t, np.where(t < 40, 0.0, 1.0), y)(file)
+    words = [str(file), "--structures", "P2DZ"]
     assert main(["identify", *words, "--json", "-", "--tune", "ideal"]) == 0
     said = capsys.readouterr()
     assert '"controller": null' in said.out

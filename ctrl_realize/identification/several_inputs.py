@@ -36,7 +36,6 @@ from ..numerics.blas_threads import single_threaded
 from ..numerics.constants import SMALLEST
 from ..numerics.engine.plausible_models import PlausibleModel
 from ..numerics.engine.poles import lag_sum
-from ..numerics.engine.static_gain import StaticGain
 from ..numerics.families.physical import ProcessParameter, process_parameters
 from ..numerics.output_error.result import ProcessEstimate
 from .impulse.from_io import impulse_from_io
@@ -224,13 +223,10 @@ def _wider(
         high = at + factor * (estimate.high - at)
         estimate = replace(estimate, low=low, high=high, std=factor * estimate.std)
         if estimate.static is not None:
-
-            def widened(one: StaticGain, wider: dict[str, float] = wider) -> StaticGain:
-                gain_std, total_std = wider["gain"] * one.gain_std, wider["total"] * one.total_std
-                return replace(one, gain_std=gain_std, total_std=total_std)
-
-            alike = tuple((widened(other), weight) for other, weight in estimate.alike)
-            estimate = replace(estimate, static=widened(estimate.static), alike=alike)
+            more = wider["gain"], wider["total"]
+            static = estimate.static.widened(*more)
+            alike = tuple((other.widened(*more), weight) for other, weight in estimate.alike)
+            estimate = replace(estimate, static=static, alike=alike)
         process = replace(estimate.process, find=partial(_widened, estimate.process, wider))
         found.append(replace(fit, estimate=replace(estimate, process=process)))
     return tuple(found)

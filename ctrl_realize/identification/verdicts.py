@@ -129,7 +129,10 @@ def _gain(fit: FractionalDelayFit) -> Verdict:
     half = max(high - gain, gain - low) / abs(gain) if gain else np.inf
     some = half <= _ROUGH and (low > 0 or high < 0)
     level, why = _level(fit.flags, "gain", half <= _CLOSE, some)
-    said = f"known to {plainly(100 * half, 2)} %" if np.isfinite(half) else "not determined"
+    said = f"known to {plainly(100 * half, 2)} %"
+    if not np.isfinite(half):
+        said = f"at least {low:.3g}" if low > 0 else f"at most {high:.3g}"
+        said = said if low > 0 or high < 0 else "not determined"
     return Verdict("gain", level, _because(said, why), float(half))
 
 

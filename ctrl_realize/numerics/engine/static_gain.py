@@ -10,12 +10,14 @@ References
    2002, section 4.3, doi:10.1007/b97636.
 .. [3] C. R. Rao, Large sample tests of statistical hypotheses concerning several parameters, Proc.
    Cambridge Philos. Soc. 44 (1948) 50-57, doi:10.1017/S0305004100023987.
+.. [4] E. C. Fieller, Some problems in interval estimation, J. R. Stat. Soc. B 16 (1954) 175-185,
+   doi:10.1111/j.2517-6161.1954.tb00159.x.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -52,8 +54,8 @@ class StaticGain:
     `gain` is that at zero frequency (the slope per second of a model with an integrator) and
     `total` dead time and lags less leads, in s. `slowest` is the length of the record in units of
     the slowest time constant that is no integrator's; `integrates`: there is one. `reached` is the
-    response to a unit step at the end of the record. `sign_known`: the sign of the gain is known if
-    poles slower than the record are taken for integrators.
+    response to a unit step at the end of the record, with its relative standard error
+    `reached_std`; `share_std` is that of the part of the gain that this is.
     """
 
     gain: float
@@ -63,7 +65,8 @@ class StaticGain:
     slowest: float
     integrates: bool
     reached: float
-    sign_known: bool
+    reached_std: float
+    share_std: float
 
     @property
     def significant(self) -> bool:
@@ -81,14 +84,48 @@ class StaticGain:
         return self.significant or not (self.slowest < 1.0 or self.integrates)
 
     @property
+    def sign_known(self) -> bool:
+        """Whether the response at the end is significant, and has the sign of a gain."""
+        seen = SIGNIFICANT * self.reached_std < 1 and self.reached * self.gain > 0
+        return seen and not self.integrates
+
+    @property
     def ends(self) -> tuple[float, float]:
-        """95 % interval of the gain; infinite if it is extrapolated and not significant."""
-        if self.resolved:
-            reach = SIGNIFICANT * self.gain_std
-            return self.gain - reach, self.gain + reach
-        if not self.sign_known or self.reached * self.gain <= 0:
+        """95 % interval of the gain if it is not resolved: what was reached, and more."""
+        if not self.sign_known:
             return -np.inf, np.inf
-        return (self.reached, np.inf) if self.gain > 0 else (-np.inf, self.reached)
+        seen = min(abs(self.reached), abs(self.gain))
+        return (seen, np.inf) if self.gain > 0 else (-np.inf, -seen)
+
+    def widened(self, gain: float, total: float) -> StaticGain:
+        """With factors on the errors of gain and total delay."""
+        return replace(
+            self,
+            gain_std=gain * self.gain_std,
+            reached_std=gain * self.reached_std,
+            share_std=gain * self.share_std,
+            total_std=total * self.total_std,
+        )
+
+    def below(self, value: float, rounding: float) -> float:
+        """Probability that the gain is below a value; `rounding` is a further standard error.
+
+        The gain is the ratio of the response at the end of the record and the part of the gain that
+        this is. Of a response that has not settled the part may be nothing, and the gain without
+        end: Fieller's theorem [4]_. It is a normal distribution where the sign is open.
+        """
+        off = (value - self.gain) / max(abs(self.gain), SMALLEST)
+        if not self.sign_known:
+            std = np.hypot(self.gain_std, rounding) / max(abs(self.gain), SMALLEST)
+            return float(ndtr(off / max(std, _NOTHING)))
+        off *= np.sign(self.gain)
+        if off < -1:  # of the other sign
+            return float(self.gain < 0)
+        # The logarithm of the response is the sum of those of its part and of the gain.
+        std = self.gain_std / abs(self.gain)
+        both = (self.reached_std**2 - self.share_std**2 - std**2) / 2
+        square = std**2 - 2 * off * both + (off * self.share_std) ** 2 + (rounding / self.gain) ** 2
+        return float(ndtr(np.sign(self.gain) * off / np.sqrt(max(square, _NOTHING**2))))
 
 
 def static_gain(
@@ -113,19 +150,23 @@ def static_gain(
 
     # Poles that are nearly equal would jump apart in one difference, and not in the other.
     def steady_values(at: FloatArray, apart: bool = False) -> FloatArray:
-        """Gain, total delay, and the gain that is integrated by poles slower than the record."""
+        """Gain, total delay, and the response at the end of the record."""
         poles = poles_from_parameters(at[None, 1 : theta.size], apart=apart)[0][0]
-        pace, powers = np.abs(poles) * length, at[theta.size :]
-        moving = poles[pace >= INTEGRATOR]
-        gain, rate = (powers[0] / np.prod(-kept).real for kept in (moving, poles[pace >= 1.0]))
-        return np.array([gain, at[0] + lag_sum(moving, powers), rate])
+        powers, moving = at[theta.size :], poles[np.abs(poles) * length >= INTEGRATOR]
+        gain = (powers[0] / np.prod(-moving)).real
+        distinct = poles_from_parameters(at[None, 1 : theta.size])[0][0]
+        reached = reached_after(distinct, powers, length - at[0])
+        return np.array([gain, at[0] + lag_sum(moving, powers), reached])
 
     gradient = np.stack(
         [(steady_values(there + m) - steady_values(there - m)) / (2 * m.sum()) for m in moves],
         axis=1,
     )
     errors = local_errors(problem, candidate, numerator, length)
-    gain_std, _, rate_std = errors.std(gradient, variance)
+    value = steady_values(there)
+    logs = gradient / np.where(value == 0, 1.0, value)[:, None]
+    gain_std = errors.std(gradient[:2], variance)[0]
+    share_std, reached_std = errors.std(np.stack([logs[2] - logs[0], logs[2]]), variance)
     if errors.tangent is None and theta.size > 1:
         # A lag that no sample shows has a slope of nothing, but is one of those between a sample
         # and the record: the standard deviation of a uniform distribution of its logarithm.
@@ -133,8 +174,8 @@ def static_gain(
         known = np.eye(count)[1 : theta.size] * np.sqrt(12 * variance) / np.log(problem.data.size)
         slopes, own = np.split(known, [errors.slopes.shape[1]], axis=1)
         errors = LocalErrors(np.vstack([errors.slopes, slopes]), np.vstack([errors.own, own]))
-    total_std = errors.std(gradient, variance)[1]
-    gain, total, rate = (float(value) for value in steady_values(point, apart=True))
+    total_std = errors.std(gradient[:2], variance)[1]
+    gain, total, reached = (float(value) for value in steady_values(point, apart=True))
     slow = np.abs(candidate.poles)
     # An integrator has no slowest time constant, but a constant slope.
     slow = slow[slow * length >= INTEGRATOR]
@@ -145,8 +186,9 @@ def static_gain(
         total_std=float(total_std),
         slowest=float(slow.min(initial=np.inf)) * length,
         integrates=slow.size < candidate.poles.size,
-        reached=reached_after(candidate.poles, numerator, length),
-        sign_known=bool(abs(rate) > SIGNIFICANT * rate_std),
+        reached=reached,
+        reached_std=float(reached_std),
+        share_std=float(share_std),
     )
 
 
@@ -292,6 +334,22 @@ def parameter_steps(candidate: Candidate, numerator: FloatArray, length: float) 
     return np.diag(steps)
 
 
+def gain_ends(parts: Sequence[tuple[StaticGain, float]], rounding: float) -> tuple[float, float]:
+    """95 % interval of the gain from several structures, each with its evidence.
+
+    As `averaged_ends`, but for `StaticGain.below`; `rounding` is a further standard error.
+    """
+    reach = max(abs(one.gain) + one.gain_std for one, _ in parts) / INTEGRATOR
+    total = sum(weight for _, weight in parts)
+
+    def below(value: float) -> float:
+        return sum(weight * one.below(value, rounding) for one, weight in parts) / total
+
+    low = _where(below, 0.025, -reach, reach) if below(-reach) < 0.025 else -np.inf
+    high = _where(below, 0.975, -reach, reach) if below(reach) > 0.975 else np.inf
+    return low, high
+
+
 def averaged_ends(parts: Sequence[tuple[float, float, float]]) -> tuple[float, float]:
     """95 % interval from several structures: (estimate, standard error, evidence) each.
 
@@ -331,11 +389,18 @@ def mixture_quantile(
     weights = shares / shares.sum()
     # The quantiles of the components bracket that of the mixture.
     parts = centres + spreads * ndtri(level)
-    low, high = float(parts.min()), float(parts.max())
+
+    def below(value: float) -> float:
+        return float(weights @ ndtr((value - centres) / spreads))
+
+    return _where(below, level, float(parts.min()), float(parts.max()))
+
+
+def _where(below: Callable[[float], float], level: float, low: float, high: float) -> float:
+    """Value between two at which a probability is reached."""
     for _ in range(_HALVINGS):
         middle = 0.5 * (low + high)
-        below = float(weights @ ndtr((middle - centres) / spreads)) < level
-        low, high = (middle, high) if below else (low, middle)
+        low, high = (middle, high) if below(middle) < level else (low, middle)
     return 0.5 * (low + high)
 
 

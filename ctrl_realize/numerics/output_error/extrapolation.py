@@ -81,6 +81,9 @@ def least_extrapolating(
             own = fits.static(found)
             # The errors of an integrator are those of a slope.
             errors = own if static.integrates else static
-            return found, replace(errors, gain=own.gain, total=own.total)
+            std = errors.gain_std * abs(own.gain / (errors.gain or own.gain))
+            return found, replace(
+                errors, gain=own.gain, gain_std=std, total=own.total, reached=own.reached
+            )
         rate /= _RATIO
     return candidate, static

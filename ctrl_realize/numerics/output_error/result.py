@@ -25,7 +25,7 @@ from ..engine.plausible_models import PlausibleDraw, PlausibleModel
 from ..engine.poles import lag_sum
 from ..engine.problem import Structure
 from ..engine.profile import Points, profile_limits
-from ..engine.static_gain import StaticGain, averaged_ends
+from ..engine.static_gain import StaticGain, averaged_ends, gain_ends
 from ..engine.structures import Candidate, Scales, needless_parameters
 from ..engine.window_fit import WindowFit
 from ..families.equal_lags import LagChain
@@ -326,9 +326,7 @@ class OutputErrorEstimate:
         if not self.static.resolved:
             return self.static.ends
         every = ((self.static, 1.0), *self.alike)
-        own = averaged_ends(
-            [(one.gain, np.hypot(one.gain_std, self.rounding), weight) for one, weight in every]
-        )
+        own = gain_ends(every, self.rounding)
         late = 0.0 if self.load is None else self.load.own_gain
         own = own[0] + min(late, 0.0), own[1] + max(late, 0.0)
         if self.beyond is None:
@@ -363,10 +361,12 @@ class OutputErrorEstimate:
     def total_ends(self) -> tuple[float, float]:
         """95 % interval of the total delay, in s, as that of the gain.
 
-        It is a ratio with the gain for its denominator: without end if that may be zero.
+        It is a ratio with the gain for its denominator: without end if that may be zero, or if the
+        response may go on.
         """
         low, high = self.gain_ends
-        if self.static is None or not self.static.resolved or low <= 0 <= high:
+        open_end = low <= 0 <= high or not np.isfinite(high - low)
+        if self.static is None or not self.static.resolved or open_end:
             return self.low, np.inf
         every = ((self.static, 1.0), *self.alike)
         low, high = averaged_ends([(one.total, one.total_std, weight) for one, weight in every])
