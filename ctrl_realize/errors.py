@@ -79,7 +79,7 @@ class UnresolvedWarning(ModelWarning):
     """The record does not determine a quantity that the design relies on."""
 
 
-def warn_caller(message: str, category: type[Warning]) -> None:
+def warn_caller(message: str, category: type[Warning] = DataWarning) -> None:
     """Warn at the line that called this toolbox, directly or through python-control.
 
     Parameters

@@ -27,7 +27,7 @@ import control as ct
 import numpy as np
 
 from .._checks import sample_time_of
-from ..errors import DataError, DataWarning, warn_caller
+from ..errors import DataError, warn_caller
 from ..numerics.arrays import ComplexArray, FloatArray
 from .frf_operands import (
     SAME,
@@ -115,10 +115,7 @@ class FRFAlgebra(ct.FrequencyResponseData):  # type: ignore[misc]  # control is 
         if not known and any(side.variance is not None for side in measured):
             lost.append("standard deviation")
         if lost:
-            warn_caller(
-                f"{what} of measured responses has no known {' and '.join(lost)}; dropped",
-                DataWarning,
-            )
+            warn_caller(f"{what} of measured responses has no known {' and '.join(lost)}; dropped")
         values = np.asarray(values + np.zeros(self.omega.size))
         single = values.shape[:2] == (1, 1) and self._single
         repeats = [side.repeats for side in measured if side.repeats is not None]

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import DataError, DataWarning, warn_caller
+from ..errors import DataError, warn_caller
 from ..numerics.arrays import ComplexArray, FloatArray
 
 SAME = 1e-9
@@ -79,8 +79,7 @@ def warn_of_hold(what: str, hold: float) -> None:
     """Warn that a result contains no hold, or two, which its sample time cannot describe."""
     warn_caller(
         f"{what} of measured responses does not contain exactly one hold of {hold:g} s, so "
-        "sample_time is dropped; give hold and dt where the result is fitted or compared",
-        DataWarning,
+        "sample_time is dropped; give hold and dt where the result is fitted or compared"
     )
 
 

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import DataError, DataWarning, OptionError, TimeAxisError, warn_caller
+from ..errors import DataError, OptionError, TimeAxisError, warn_caller
 from ..numerics.arrays import FloatArray
 from ..numerics.signals.counters import counter_period
 from ..numerics.signals.sample_grid import regular_step, usual_step
@@ -116,8 +116,7 @@ class Samples:
                 said += samples._late()
         if said:
             warn_caller(
-                f"{path}: {said}; they are kept as they are (missing='refuse' refuses them)",
-                DataWarning,
+                f"{path}: {said}; they are kept as they are (missing='refuse' refuses them)"
             )
         return samples, "keep"
 
@@ -184,8 +183,7 @@ class Samples:
         period = min(map(float, periods))  # type: ignore[arg-type]
         warn_caller(
             f"{path}: the output jumps like a counter that starts again after {period:.6g}, whose "
-            "turns are joined; wrap=0 takes it as it is",
-            DataWarning,
+            "turns are joined; wrap=0 takes it as it is"
         )
         return self.joined(period)
 

@@ -10,7 +10,7 @@ import numpy as np
 from .._checks import integer, one_of, within
 from ..data import MeasuredFRF, Record
 from ..data.given import check_complete, records_alike
-from ..errors import DataError, DataWarning, OptionError, warn_caller
+from ..errors import DataError, OptionError, warn_caller
 from .periods import from_periods
 from .welch import Stream, from_segments
 
@@ -164,8 +164,7 @@ def _aligned(records: Record | Iterable[Record], delay: int) -> Stream:
                 f"{record!r} has a set point: noise that the controller answers pulls the response "
                 "towards the inverse of the controller. identify(record) uses the set point r; so "
                 "does the quotient of spectral_frf(Record(t, r, y)) and spectral_frf(Record(t, r, "
-                "u)), for fit_frf(..., hold='zoh', dt=)",
-                DataWarning,
+                "u)), for fit_frf(..., hold='zoh', dt=)"
             )
         check_complete(record, "spectral_frf")
         u, y = np.atleast_2d(record.input), np.atleast_2d(record.output)
