@@ -184,19 +184,21 @@ def _columns(table: Table, asked: Mapping[str, Any]) -> dict[str, int]:
     return {part: index for part, index in columns.items() if part in kept}
 
 
+def _unit(table: Table, index: int, given: str | None) -> str:
+    """Unit that was given, or that of the header."""
+    return plain_unit(table.columns[index].unit) if given is None else given
+
+
 def _frequency_unit(table: Table, index: int, unit: str | None) -> str:
-    column = table.columns[index]
-    if unit is not None:
-        return unit
-    named_omega = plain_name(column.name) in ("omega", "ω", "w")
-    return plain_unit(column.unit) or ("rad/s" if named_omega else "hz")
+    named_omega = plain_name(table.columns[index].name) in ("omega", "ω", "w")
+    return _unit(table, index, unit) or ("rad/s" if named_omega else "hz")
 
 
 def _frequency_hz(table: Table, index: int, unit: str | None) -> FloatArray:
     unit = _frequency_unit(table, index, unit)
     if unit not in _IN_HZ:
         raise OptionError(
-            f"{table.path}: {table.title(index)} is in {unit!r}; give frequency_unit='mHz', "
+            f"{table.at(index)} is in {unit!r}; give frequency_unit='mHz', "
             "'Hz', 'kHz', 'MHz' or 'rad/s'"
         )
     return table.numbers(index) * _IN_HZ[unit]
@@ -218,15 +220,14 @@ def _response(
 
 def _magnitude(table: Table, index: int, unit: str | None) -> FloatArray:
     values = table.numbers(index)
-    unit = plain_unit(table.columns[index].unit) if unit is None else unit
+    unit = _unit(table, index, unit)
     if unit == "db":
         if values.max() > 400:
-            raise DataError(f"{table.path}: {table.title(index)} goes up to {values.max():g} dB")
+            raise DataError(f"{table.at(index)} goes up to {values.max():g} dB")
         return np.asarray(10 ** (values / 20), dtype=np.float64)
     if values.min() < 0:
         raise OptionError(
-            f"{table.path}: {table.title(index)} has negative values; is it in dB? give "
-            "magnitude_unit='dB'"
+            f"{table.at(index)} has negative values; is it in dB? give magnitude_unit='dB'"
         )
     return values
 
@@ -237,16 +238,13 @@ def _phase(table: Table, index: int, unit: str | None, radians: bool, falls: boo
     A response that `falls` by so much has a phase of more than `_SHALLOW` degrees: less are rad.
     """
     values = table.numbers(index)
-    unit = plain_unit(table.columns[index].unit) if unit is None else unit
+    unit = _unit(table, index, unit)
     if unit not in ("", "deg", "rad"):
-        raise OptionError(
-            f"{table.path}: {table.title(index)} is in {unit!r}; give phase_unit='deg' or 'rad'"
-        )
+        raise OptionError(f"{table.at(index)} is in {unit!r}; give phase_unit='deg' or 'rad'")
     largest = np.abs(values).max(initial=0.0)
     doubtful = radians or largest <= 2 * np.pi or (falls and largest <= _SHALLOW)
     if not unit and largest and doubtful:
         raise OptionError(
-            f"{table.path}: {table.title(index)} could be in degrees or in radians; give "
-            "phase_unit='deg' or 'rad'"
+            f"{table.at(index)} could be in degrees or in radians; give phase_unit='deg' or 'rad'"
         )
     return values if unit == "rad" else np.deg2rad(values)

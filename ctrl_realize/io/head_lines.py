@@ -32,6 +32,11 @@ class Line:
     start: int
 
 
+def holds_cells(line: str, comment: str | None) -> bool:
+    """Whether a line is neither blank nor a comment."""
+    return bool(line.strip()) and not (comment and line.lstrip().startswith(comment))
+
+
 def head_lines(path: Path, head: bytes, encoding: str, skip: int) -> list[Line]:
     """Complete lines at the start of a file; a quoted cell with line ends is in one line.
 

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import json
-import math
 import sys
 from collections.abc import Mapping
 from dataclasses import is_dataclass
+from itertools import chain
 from typing import Any, cast, get_args, get_type_hints
 
 import numpy as np
@@ -27,16 +27,11 @@ def parsed(text: str) -> Any:
 def field(content: Mapping[str, Any], key: str, kind: Any) -> Any:
     """Return ``content[key]`` if it has the requested type."""
     value = content.get(key)
+    if isinstance(value, bool):  # numbers in Python
+        raise FileFormatError(f"{key!r} is true or false; expected another type")
     if not isinstance(value, kind) or (isinstance(value, str) and not _is_text(value)):
         raise FileFormatError(f"{key!r} is missing or has the wrong type")
     return value
-
-
-def boolean_free(content: Mapping[str, Any], key: str, kind: Any) -> Any:
-    """Return a number; true and false, numbers in Python, are refused."""
-    if isinstance(content.get(key), bool):
-        raise FileFormatError(f"{key!r} is true or false; expected a number")
-    return field(content, key, kind)
 
 
 def of_kind(value: Any, kind: Any) -> Any:
@@ -65,9 +60,7 @@ def of_kind(value: Any, kind: Any) -> Any:
         return tuple(of_kind(one, each) for one, each in zip(value, kinds, strict=True))
     if kind is Actuator:
         return from_plain(value)
-    # a whole number in a file may exceed the range of doubles
-    number = type(value) in (int, float) and abs(value) <= sys.float_info.max
-    if kind is float and (number or value in ("inf", "-inf", "nan")):
+    if kind is float and (_is_number(value) or value in ("inf", "-inf", "nan")):
         return float(value)
     if value in parts or type(value) is kind:
         return value
@@ -87,8 +80,8 @@ def texts(content: Mapping[str, Any], key: str) -> list[str]:
 def whole_numbers(content: Mapping[str, Any], key: str, count: int) -> list[int]:
     """Return `count` whole numbers, none negative."""
     values: list[Any] = field(content, key, list)
-    whole = all(isinstance(value, int) and not isinstance(value, bool) for value in values)
-    if not whole or len(values) != count or min(values, default=0) < 0:
+    good = all(type(value) is int and value >= 0 for value in values)
+    if not good or len(values) != count:
         raise FileFormatError(f"{key!r} must contain {count} non-negative whole numbers")
     return values
 
@@ -96,32 +89,23 @@ def whole_numbers(content: Mapping[str, Any], key: str, count: int) -> list[int]
 def finite_numbers(content: Mapping[str, Any], key: str) -> list[float]:
     """Return a list of finite numbers, none negative."""
     values: list[Any] = field(content, key, list)
-    if not all(type(value) in (int, float) and _is_finite(value) for value in values):
-        raise FileFormatError(f"{key!r} must contain finite numbers")
-    if min(values, default=0) < 0:
-        raise FileFormatError(f"{key!r} must contain non-negative numbers")
+    if not all(_is_number(value) and value >= 0 for value in values):
+        raise FileFormatError(f"{key!r} must contain non-negative finite numbers")
     return values
 
 
 def matrix(content: Mapping[str, Any], key: str, shape: tuple[int, int]) -> FloatArray:
     """Return a matrix of finite numbers from a list of its rows."""
     rows: list[Any] = field(content, key, list)
-    numbers = (
-        len(rows) == shape[0]
-        and all(isinstance(row, list) and len(row) == shape[1] for row in rows)
-        and all(type(value) in (int, float) and _is_finite(value) for row in rows for value in row)
-    )
-    if not numbers:
+    good = all(isinstance(row, list) and len(row) == shape[1] for row in rows)
+    if not good or len(rows) != shape[0] or not all(map(_is_number, chain(*rows))):
         raise FileFormatError(f"{key!r} must be {shape[0]} rows of {shape[1]} finite numbers")
     return np.array(rows, dtype=np.float64).reshape(shape)
 
 
-def _is_finite(value: int | float) -> bool:
-    try:
-        return math.isfinite(value)
-    except OverflowError:
-        # a whole number beyond the range of doubles
-        return False
+def _is_number(value: Any) -> bool:
+    """Whether a value is a finite number; a whole one may exceed the range of doubles."""
+    return type(value) in (int, float) and abs(value) <= sys.float_info.max
 
 
 def _is_text(value: str) -> bool:

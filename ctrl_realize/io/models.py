@@ -7,6 +7,7 @@ import json
 import os
 import platform
 from collections.abc import Mapping
+from itertools import product
 from typing import Any, TypeAlias
 
 import control as ct
@@ -19,7 +20,7 @@ from ..delayed.parts import signals_of
 from ..errors import CtrlRealizeError, FileFormatError, OptionError
 from .atomic import write_text
 from .checks import usable_file
-from .json_content import boolean_free, field, finite_numbers, matrix, parsed, texts, whole_numbers
+from .json_content import field, finite_numbers, matrix, parsed, texts, whole_numbers
 from .stored_fit import summary_from_json, summary_of, summary_to_json
 
 FORMAT = "ctrl_realize model"
@@ -221,7 +222,7 @@ def _model_from(content: Mapping[str, Any]) -> Model:
     if inside and model.get("dt", 0.0) is None:  # a gain of any time base
         core = _core(model, None, len(inputs), len(outputs))
         return DelaySystem(core, finite_numbers(model, "internal_delays"), **names)
-    dt = float(boolean_free(model, "dt", int | float))
+    dt = float(field(model, "dt", int | float))
     if inside:
         if not 0 <= dt < float("inf"):
             raise FileFormatError(f"dt={dt} is neither a sample time nor 0 for continuous time")
@@ -239,19 +240,14 @@ def _model_from(content: Mapping[str, Any]) -> Model:
 
 
 def _core(model: Mapping[str, Any], dt: float | None, ninputs: int, noutputs: int) -> ct.StateSpace:
-    order = boolean_free(model, "order", int)
+    order = field(model, "order", int)
     if order < 0:
         raise FileFormatError("the model has a negative order")
     states = texts(model, "states") if "states" in model else order
     if isinstance(states, list) and len(states) != order:
         raise FileFormatError(f"{len(states)} names for {order} states")
-    shapes = {
-        "A": (order, order),
-        "B": (order, ninputs),
-        "C": (noutputs, order),
-        "D": (noutputs, ninputs),
-    }
-    matrices = [matrix(model, letter, shape) for letter, shape in shapes.items()]
+    shapes = product((order, noutputs), (order, ninputs))
+    matrices = [matrix(model, *one) for one in zip("ABCD", shapes, strict=True)]
     return ct.StateSpace(*matrices, dt, states=states, remove_useless_states=False)
 
 
@@ -260,15 +256,14 @@ def _check_origin(content: object) -> None:
     if not isinstance(content, dict) or content.get("format") != FORMAT:
         raise FileFormatError(f"not a model file of ctrl_realize (expected the format {FORMAT!r})")
     schema = content.get("schema")
-    if isinstance(schema, bool) or not isinstance(schema, int) or schema < 1:
+    if type(schema) is not int or schema < 1:
         raise FileFormatError(f"schema {schema!r} is not known")
     if schema > SCHEMA:
         raise FileFormatError(
             f"written by a later version: schema {schema}, this one reads up to {SCHEMA}; "
             "update ctrl_realize"
         )
-    stored = content.get("sha256")
-    if stored != checksum(content):
+    if content.get("sha256") != checksum(content):
         raise FileFormatError(
             "the checksum does not match the content: the file was edited or damaged"
         )

@@ -28,8 +28,7 @@ _READERS = {
     "npz:read_npz": (b"PK\x03\x04", b"\x93NUMPY"),
     "parquet:read_parquet": (b"PAR1",),
     "tdms:read_tdms": (b"TDSm",),
-    "mat:read_hdf5": (b"\x89HDF",),
-    "mat:read_mat": (b"MATLAB 5.0 MAT-file", b"MATLAB 7.3 MAT-file"),
+    "mat:read_mat": (b"MATLAB 5.0 MAT-file", b"MATLAB 7.3 MAT-file", b"\x89HDF"),
 }
 """Readers by the first bytes of a file; each needs its own heavy library, loaded on demand."""
 

@@ -74,6 +74,11 @@ class Table:
         name = self.columns[index].name
         return f"column {name!r}" if name else f"column {index}"
 
+    def at(self, index: int, row: int | None = None) -> str:
+        """File and column, and the place of a row, as messages begin."""
+        place = "" if row is None else f", {self.place(row)}"
+        return f"{self.path}: {self.title(index)}{place}"
+
     def listing(self) -> str:
         """List of the columns for a message, at most twenty."""
         names = [f"{k} {column.name!r}" for k, column in enumerate(self.columns) if column.name]
@@ -132,7 +137,7 @@ class Table:
             row = int(np.argmax(bad))
             self._refuse(index, row, missing=missing[row], infinite=np.isinf(values[row]))
         if np.iscomplexobj(values) and not complex_too:
-            raise DataError(f"{self.path}: {self.title(index)} is complex; expected real numbers")
+            raise DataError(f"{self.at(index)} is complex; expected real numbers")
         kind = np.complex128 if complex_too else np.float64
         return np.where(missing | skipped, np.nan, values).astype(kind)
 
@@ -173,9 +178,9 @@ class Table:
             )
             name = "a percent sign" if kinds[0] == "%" else f"the unit {kinds[0]!r}"
             raise DataError(
-                f"{self.path}: {self.title(index)} has {first.size} cells with {name} and "
-                f"{other.size} without, such as {shown}; expected one unit in all of them (in a "
-                "spreadsheet: one number format for the column)"
+                f"{self.at(index)} has {first.size} cells with {name} and {other.size} without, "
+                f"such as {shown}; expected one unit in all of them (in a spreadsheet: one number "
+                "format for the column)"
             )
 
     def _refuse(self, index: int, row: int, *, missing: bool, infinite: bool) -> NoReturn:
@@ -191,4 +196,4 @@ class Table:
             what = f"{text[:60]} is not finite (or too large for double precision)"
         elif missing:
             what = f"{text[:60]!r}: a value is missing; missing='keep' keeps gaps in a record"
-        raise DataError(f"{self.path}: {self.title(index)}, {self.place(row)}: {what}")
+        raise DataError(f"{self.at(index, row)}: {what}")

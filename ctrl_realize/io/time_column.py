@@ -9,7 +9,7 @@ from typing import Any, NamedTuple, NoReturn
 import numpy as np
 
 from .._wording import ASSUMED
-from ..errors import DataError, DataWarning, OptionError, warn_caller
+from ..errors import DataError, OptionError, warn_caller
 from ..numerics.arrays import FloatArray
 from ..numerics.signals.counters import clock_change, clock_unit
 from .columns import holds_numbers
@@ -21,7 +21,6 @@ from .units import checked_time_unit, plain_unit, sample_time_unit, to_seconds, 
 _EXACT_INTEGERS = 2**53
 # in 0.1 us since 1601, as TwinCAT and Windows count; years 1968 to 2101
 _FILETIME = (1.16e17, 1.58e17)
-_TICKS = {"ms": 1e3, "us": 1e6, "ns": 1e9}
 # 12:34, 12:34.5, 12:34:56 and 12:34:56.789
 _SHORT = r"\d{1,3}:\d{2}(\.\d*)?"
 _CLOCK = rf"{_SHORT}|\d{{1,3}}:\d{{2}}:\d{{2}}(\.\d*)?"
@@ -117,8 +116,8 @@ def _stated_unit(table: Table, index: int) -> str:
     if np.isclose(step, to_seconds(np.asarray(value), unit), rtol=_AS_STATED):
         return "s"
     raise OptionError(
-        f"{table.path}: {table.title(index)} runs in steps of {step:g}, and the file states "
-        f"{name} {value:g}; give time_unit=, the unit of the column"
+        f"{table.at(index)} runs in steps of {step:g}, and the file states {name} {value:g}; give "
+        "time_unit=, the unit of the column"
     )
 
 
@@ -126,7 +125,7 @@ def _epoch_unit(table: Table, index: int) -> str:
     """Unit of a clock that counts since 1970, or days as in a spreadsheet; otherwise empty."""
     values = table.numbers(index)
     unit = clock_unit(values)
-    begins = f"{table.path}: {table.title(index)} begins at {(*values[:1], 0.0)[0]:.14g}"
+    begins = f"{table.at(index)} begins at {(*values[:1], 0.0)[0]:.14g}"
     if unit is None:
         raise OptionError(
             f"{begins}, which is no clock in s; give time_unit='ms', 'us' or 'ns', or time_format= "
@@ -135,7 +134,7 @@ def _epoch_unit(table: Table, index: int) -> str:
     if unit:
         since = "days since 1900 or 0 (Excel, datenum)" if unit == "day" else f"{unit} since 1970"
         said = f"{begins} and is taken for {since}; time_unit= says otherwise, such as 's'"
-        warn_caller(said, DataWarning)
+        warn_caller(said)
     return unit
 
 
@@ -152,9 +151,7 @@ def _since_first(
     missing = np.isnat(stamps)
     if missing.any():
         row = int(np.argmax(missing))
-        raise DataError(
-            f"{table.path}: {table.title(index)}, {table.place(row)}: the time is missing"
-        )
+        raise DataError(f"{table.at(index, row)}: the time is missing")
     if not stamps.size:
         return TimeAxis(np.empty(0), None)
     if zone is not None:
@@ -163,17 +160,16 @@ def _since_first(
         try:
             stamps = in_utc(stamps, zone)
         except (DataError, OptionError) as error:
-            raise type(error)(f"{table.path}: {table.title(index)}: {error}") from error
+            raise type(error)(f"{table.at(index)}: {error}") from error
     elif stamps.dtype.kind == "M":
         order = direction(stamps)  # historians list the newest sample first
         row, hours = clock_change(stamps[::order])
         if hours:
             place = table.place(row if order == 1 else stamps.size - 1 - row)
             warn_caller(
-                f"{table.path}: {table.title(index)}: the clock is taken to be set "
+                f"{table.at(index)}: the clock is taken to be set "
                 f"{'back' if hours < 0 else 'forward'} by an hour for summer time at {place}; "
-                "time_zone= says otherwise, such as 'UTC'",
-                DataWarning,
+                "time_zone= says otherwise, such as 'UTC'"
             )
             stamps = stamps - (np.arange(stamps.size) >= row)[::order] * np.timedelta64(hours, "h")
     seconds = np.asarray((stamps - stamps[0]) / np.timedelta64(1, "ns") / 1e9, dtype=np.float64)
@@ -198,8 +194,8 @@ def _refuse_other_clock(table: Table, index: int, dates: Dates, zone: str | None
             hours.append((clock[-1] - clock[0]) / np.timedelta64(1, "h") - moved)
     if hours[0] != hours[1]:
         raise OptionError(
-            f"{table.path}: {table.title(index)}: the clock is set for summer time on one of two "
-            f"possible days: {dates.doubt}"
+            f"{table.at(index)}: the clock is set for summer time on one of two possible days: "
+            f"{dates.doubt}"
         )
 
 
@@ -212,22 +208,21 @@ def _parsed_dates(
     if _are_times_of_day(cells) and date is not None:
         days = [str(cell).strip() for cell in table.columns[date].cells]
         cells = [f"{day} {cell}" for day, cell in zip(days, cells, strict=True)]
-    elif time_format is None and all(re.fullmatch(_CLOCK, cell) for cell in cells[:3]):
-        return Dates(_parsed_times_of_day(table, index, cells, unit), "")
     try:
-        if time_format is None and all(re.match(r"-?\d+ days?\b", cell) for cell in cells[:3]):
+        if time_format is None and all(re.fullmatch(_CLOCK, cell) for cell in cells[:3]):
+            dates = Dates(_times_of_day(cells, unit, table.place(0)), "12:34:56")
+        elif time_format is None and all(re.match(r"-?\d+ days?\b", cell) for cell in cells[:3]):
             dates = Dates(_durations(cells), "0 days 00:00:00")
         else:
             dates = stamps_of(cells, time_format)
-    except OptionError as error:
-        raise OptionError(f"{table.path}: {table.title(index)}: {error}") from error
+    except (DataError, OptionError) as error:
+        raise type(error)(f"{table.at(index)}: {error}") from error
     bad = np.isnat(dates.stamps)
     if bad.any():
         row = int(np.argmax(bad))
         raise DataError(
-            f"{table.path}: {table.title(index)}, {table.place(row)}: {cells[row][:60]!r} is "
-            f"neither a number nor a time in the format {dates.form}; give time_format=, or dt= to "
-            "ignore the column"
+            f"{table.at(index, row)}: {cells[row][:60]!r} is neither a number nor a time in the "
+            f"format {dates.form}; give time_format=, or dt= to ignore the column"
         )
     return dates
 
@@ -244,34 +239,26 @@ def _are_times_of_day(cells: list[str]) -> bool:
     return all(re.fullmatch(rf"({_CLOCK})( ?[AaPp][Mm])?", cell) for cell in cells[:3])
 
 
-def _parsed_times_of_day(
-    table: Table, index: int, cells: list[str], unit: str
-) -> np.ndarray[Any, Any]:
+def _times_of_day(cells: list[str], unit: str, place: str) -> np.ndarray[Any, Any]:
     """Times as 12:34:56 or 12:34:56.789, on one day or across midnight, or as `unit` says.
 
     ``12:34`` may be hours and minutes, or minutes and seconds: `unit` is that of the first number.
+    NaT where a cell is none. `place` is that of the first cell.
     """
     shorts = [bool(re.fullmatch(_SHORT, cell)) for cell in cells]
     first = _FIRST.get(unit.lower(), plain_unit(unit))
     if any(shorts) and not all(shorts):
         raise DataError(
-            f"{table.path}: {table.title(index)} mixes times with two and three fields, such "
-            f"as {cells[shorts.index(True)]!r}"
+            f"times with two and three fields, such as {cells[shorts.index(True)]!r}; expected one "
+            "kind"
         )
     if any(shorts) and first not in ("h", "min"):
         raise OptionError(
-            f"{table.path}: {table.title(index)}, {table.place(0)}: {cells[0]!r} may "
-            "be hours and minutes, or minutes and seconds; give time_unit='h' or "
-            "time_unit='min', the unit of the first field"
+            f"{cells[0]!r} in {place} may be hours and minutes, or minutes and seconds; give "
+            "time_unit='h' or time_unit='min', the unit of the first field"
         )
     ends = ("", "") if not any(shorts) else ("00:", "") if first == "min" else ("", ":00")
     stamps = _durations([ends[0] + cell + ends[1] for cell in cells])
-    if np.isnat(stamps).any():
-        row = int(np.argmax(np.isnat(stamps)))
-        raise DataError(
-            f"{table.path}: {table.title(index)}, {table.place(row)}: {cells[row][:60]!r} "
-            "is not a time of day"
-        )
     # a clock that falls back by most of a day has passed midnight, or a full hour
     turn = np.timedelta64(3600 if ends[0] else 86400, "s")
     turns = np.cumsum(np.diff(stamps) < -turn / 2)

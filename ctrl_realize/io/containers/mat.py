@@ -25,54 +25,37 @@ _TIMEOUT = 600.0  # s
 
 
 def read_mat(path: Path, *, variable: str | None, max_bytes: float) -> Table:
-    """Read the numeric variables and struct fields of a ``.mat`` file as columns.
+    """Read the numbers of a ``.mat`` or HDF5 file as columns.
 
-    Fields are named as in MATLAB: ``run.time``, ``run.signals[0].values``. Text, sparse matrices,
-    objects and functions are left out.
-
-    Raises
-    ------
-    FileFormatError
-        Damaged, too large when unpacked, without numbers, or version 7.3 without h5py.
-    """
-    return table_of_arrays(path, _arrays(path, max_bytes), variable)
-
-
-def read_hdf5(path: Path, *, variable: str | None, max_bytes: float) -> Table:
-    """Read the datasets of an HDF5 file as columns, named ``group.dataset``.
-
+    Variables and fields are named as in MATLAB, ``run.time``, ``run.signals[0].values``, and
+    datasets of HDF5 ``group.dataset``. Text, sparse matrices, objects and functions are left out.
     The fields of a compound dataset are columns; an attribute ``unit`` or ``units`` is the unit.
 
     Raises
     ------
     FileFormatError
-        Damaged, too large when unpacked, without numbers, or h5py is not installed.
+        Damaged, too large when unpacked, without numbers, or h5py is needed and not installed.
     """
-    if find_spec("h5py") is None:
-        raise FileFormatError(
-            f"{path} is an HDF5 file: pip install 'ctrl-realize[hdf5]' (h5py) to read it, or save "
-            "it as .mat, .npz, Parquet or CSV"
-        )
-    return table_of_arrays(path, _by_worker(path, max_bytes, "an HDF5 file"), variable)
-
-
-def _arrays(path: Path, max_bytes: float) -> dict[str, AnyArray]:
-    """Read all numeric arrays of a ``.mat`` file, including those in structs and cells."""
     head = read_head(path, 128)
-    if head[126:128] not in (b"IM", b"MI") and not _is_version_4(head):
+    plain = head.startswith(b"\x89HDF")
+    if not plain and head[126:128] not in (b"IM", b"MI") and not _is_version_4(head):
         raise FileFormatError(f"{path} is not a .mat file: it does not begin like one")
-    if head.startswith(b"MATLAB 7.3") and find_spec("h5py") is None:
-        raise FileFormatError(
-            f"{path} is a v7.3 (HDF5) .mat file: pip install 'ctrl-realize[matlab]' (h5py) to "
-            "read it, or in MATLAB save it with save(file, '-v7')"
-        )
-    return _by_worker(path, max_bytes, "a .mat file")
+    kind = "an HDF5 file" if plain else "a .mat file"
+    if plain or head.startswith(b"MATLAB 7.3"):
+        # not imported here: its compiled part reads in a process of its own
+        if find_spec("h5py") is None:
+            found, extra = (kind, "hdf5") if plain else ("a v7.3 (HDF5) .mat file", "matlab")
+            raise FileFormatError(
+                f"{path} is {found}: pip install 'ctrl-realize[{extra}]' (h5py) to read it, or "
+                "save it as .mat (in MATLAB with save(file, '-v7')), .npz, Parquet or CSV"
+            )
+        # HDF5 announces sizes that take no room in the file
+        max_bytes = unpacked_limit(path, max_bytes)
+    return table_of_arrays(path, _by_worker(path, max_bytes, kind), variable)
 
 
 def _by_worker(path: Path, max_bytes: float, kind: str) -> dict[str, AnyArray]:
-    """Read all arrays in a separate process; HDF5 announces sizes that take no room in the file."""
-    if read_head(path, 10) == b"MATLAB 7.3" or kind == "an HDF5 file":
-        max_bytes = unpacked_limit(path, max_bytes)
+    """Read all arrays, those in structs and cells included, in a separate process."""
     try:
         done = subprocess.run(
             [sys.executable, "-P", str(_WORKER), str(path), str(max_bytes)],

@@ -11,7 +11,7 @@ from itertools import product
 import numpy as np
 
 from ..._facts import facts
-from ...errors import DataError, DataWarning, OptionError, warn_caller
+from ...errors import DataError, OptionError, warn_caller
 from ...numerics.arrays import FloatArray
 from ...numerics.signals.jumps import moves_in_steps
 from ..cells import kind_of
@@ -107,9 +107,8 @@ def choose_columns(
         if inputs and (outputs or len(rest) == 1):
             outputs = outputs or rest
             warn_caller(
-                f"{table.path}: {table.title(inputs[0])} is taken as input, since it moves in "
-                f"steps, and {table.title(outputs[0])} as output; input= and output= say otherwise",
-                DataWarning,
+                f"{table.at(inputs[0])} is taken as input, since it moves in "
+                f"steps, and {table.title(outputs[0])} as output; input= and output= say otherwise"
             )
     elif len(rest) == 1 and bool(inputs) != bool(outputs):
         inputs, outputs = inputs or rest, outputs or rest
@@ -166,7 +165,7 @@ def _no_cascade(table: Table, inputs: Sequence[int], references: Sequence[int]) 
         both = both[:, np.isfinite(both).all(axis=0)]
         if (np.ptp(both, axis=1) > 0).all() and np.corrcoef(both)[0, 1] > _SAME:
             raise OptionError(
-                f"{table.path}: {table.title(r)} follows {table.title(k)}, as the set point of an "
+                f"{table.at(r)} follows {table.title(k)}, as the set point of an "
                 "inner loop follows the controller of an outer one; read one loop at a time with "
                 "input=, output= and reference="
             )

@@ -30,7 +30,7 @@ from typing import Any
 
 import numpy as np
 
-from ...errors import DataError, DataWarning, OptionError, warn_caller
+from ...errors import DataError, OptionError, warn_caller
 from ...numerics.arrays import BoolArray, FloatArray
 from ..cells import BAD_VALUES, number_of
 from ..columns import find_column
@@ -83,11 +83,10 @@ class Rules:
         # the codes are told by those of the whole column
         marked = self._marked(table, index)[rows]
         table = table.rows(rows, [index])
-        title = f"{table.path}: {table.title(index)}"
         if marked.any() and not self.keep:
             row = int(np.argmax(marked))
             raise DataError(
-                f"{title}, {table.place(row)}: its quality is bad; missing='keep' leaves such "
+                f"{table.at(index, row)}: its quality is bad; missing='keep' leaves such "
                 f"samples out ({np.sum(marked)} here), quality=None ignores the quality"
             )
         values = table.numbers(
@@ -96,9 +95,8 @@ class Rules:
         if marked.any():
             first = table.place(int(np.argmax(marked)))
             warn_caller(
-                f"{title}: {np.sum(marked)} of {marked.size} samples are left out, since their "
-                f"quality is bad, the first in {first}; quality=None keeps them",
-                DataWarning,
+                f"{table.at(index)}: {np.sum(marked)} of {marked.size} samples are left out, since "
+                f"their quality is bad, the first in {first}; quality=None keeps them"
             )
         return values
 
@@ -123,8 +121,7 @@ class Rules:
                 elif len(set(cells.tolist())) > 1 and "status" not in name:
                     warn_caller(
                         f"{table.path}: the codes of {table.title(column)} are not known, such as "
-                        f"{cells[0]}; good= tells the good ones, quality=None ignores them",
-                        DataWarning,
+                        f"{cells[0]}; good= tells the good ones, quality=None ignores them"
                     )
         return out
 

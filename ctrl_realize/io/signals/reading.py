@@ -14,7 +14,7 @@ import numpy as np
 from ..._checks import one_of, positive
 from ...data import Record
 from ...data.samples import COARSE, Samples
-from ...errors import DataError, DataWarning, OptionError, TimeAxisError, warn_caller
+from ...errors import DataError, OptionError, TimeAxisError, warn_caller
 from ...numerics.signals.noise import far_value
 from ..frf import parts_of_frf
 from ..read import read_table
@@ -120,8 +120,7 @@ def _warn_of_codes(table: Table, record: Record) -> None:
             code = f"{values[far[0]]:g}"
             warn_caller(
                 f"{table.path}: {label} is {code} in {far.size} of {values.size} samples, far from "
-                f"all others; na_values={code} if that stands for a missing value",
-                DataWarning,
+                f"all others; na_values={code} if that stands for a missing value"
             )
 
 

@@ -24,7 +24,7 @@ def in_manual(table: Table, index: int) -> BoolArray:
     """
     if strange := strange_modes(table, index):
         raise OptionError(
-            f"{table.path}: {table.title(index)} has the modes {', '.join(sorted(strange)[:5])}; "
+            f"{table.at(index)} has the modes {', '.join(sorted(strange)[:5])}; "
             f"expected {', '.join(MODES['manual'][:3])}, {', '.join(MODES['automatic'][:3])}, "
             "cas, or 0 and 1"
         )

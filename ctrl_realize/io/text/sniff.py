@@ -17,14 +17,13 @@ from __future__ import annotations
 import codecs
 import re
 from collections import Counter
-from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
 from ...errors import FileFormatError
 from ..cells import DELIMITERS, FILLED, kind_of, refuse_thousands, split_line
 from ..checks import MAX_COLUMNS, MAX_NAME
-from ..head_lines import HEAD_BYTES, MAX_HEAD_LINES, head_lines
+from ..head_lines import HEAD_BYTES, MAX_HEAD_LINES, Line, head_lines, holds_cells
 from ..text_options import TextOptions
 from .header import Head, column_names, first_data_row
 from .source import TextSource
@@ -48,29 +47,22 @@ _BOMS = (
 )
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class TextLayout:
     """Format of a text table.
 
-    ``names`` and ``units`` have ``n_columns`` entries; the names are empty without a header. The
-    data begin with physical line ``first_line`` (0-based), after ``start`` characters, and
-    ``first_row`` are the cells of its first line. ``n_rows`` lines of data were read, all of them
-    if ``whole`` is true. ``sample_times`` stand above the data, with their unit.
+    ``names`` and ``units`` have an entry for each column; the names are empty without a header. The
+    data begin with row ``first`` of the head, which is line ``begin`` of the file. The head is all
+    of the text if ``whole`` is true.
     """
 
     encoding: str
-    delimiter: str
-    decimal: str
-    comment: str | None
-    first_line: int
-    n_columns: int
-    names: tuple[str, ...]
-    units: tuple[str, ...]
-    start: int
-    first_row: tuple[str, ...]
-    n_rows: int
+    head: Head
+    names: list[str]
+    units: list[str]
+    first: int
+    begin: Line
     whole: bool
-    sample_times: Mapping[str, float]
 
 
 def sniff(source: TextSource, options: TextOptions) -> TextLayout:
@@ -89,9 +81,7 @@ def sniff(source: TextSource, options: TextOptions) -> TextLayout:
     rows = [
         index
         for index in range(len(lines))
-        if found[index].number >= options.skip_rows
-        and lines[index].strip()
-        and not (comment and lines[index].lstrip().startswith(comment))
+        if found[index].number >= options.skip_rows and holds_cells(lines[index], comment)
     ]
     if not rows:
         raise FileFormatError(f"{path} has no data lines in its first {len(head_bytes)} bytes")
@@ -112,12 +102,8 @@ def sniff(source: TextSource, options: TextOptions) -> TextLayout:
     names = [re.sub(r"\s*[\r\n]\s*", " ", name)[:MAX_NAME] for name in names]
     if options.decimal == options.thousands == "auto":
         refuse_thousands(path, cells[first:], delimiter, decimal)
-    begin = found[rows[first]]
     whole = len(head_bytes) < HEAD_BYTES and len(lines) < MAX_HEAD_LINES
-    return TextLayout(
-        encoding, delimiter, decimal, comment, begin.number, width, tuple(names), tuple(units),
-        begin.start, tuple(cells[first]), len(rows) - first, whole, head.sample_times(first),
-    )  # fmt: skip
+    return TextLayout(encoding, head, names, units, first, found[rows[first]], whole)
 
 
 def _encoding(path: Path, head: bytes) -> str:
