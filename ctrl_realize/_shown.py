@@ -13,83 +13,61 @@ SHORT_LABEL = 16
 """Letters of a label up to which it is not wrapped."""
 
 
-def text_card(
-    title: str,
-    rows: Sequence[tuple[str, str]],
-    choices: Sequence[str] = (),
-    flags: Sequence[str] = (),
-) -> str:
-    """Format label-value rows as text, followed by choices and flags.
-
-    Parameters
-    ----------
-    title : str
-    rows : sequence of (label, value)
-    choices, flags : sequence of str, optional
-
-    Examples
-    --------
-    >>> from ctrl_realize._shown import text_card
-    >>> print(text_card("Delay", [("delay", "37 samples"), ("order", "3")], (), ["look twice"]))
-    Delay
-      delay  37 samples
-      order  3
-      ! look twice
-    """
-    width = max((len(label) for label, _ in rows), default=0)
-    lines = [title]
-    lines += [f"  {label:<{width}}  {value}" for label, value in rows]
-    lines += [f"  - {choice}" for choice in choices]
-    lines += [f"  ! {flag}" for flag in flags]
-    return "\n".join(lines)
-
-
-def html_card(
-    title: str,
-    rows: Sequence[tuple[str, str]],
-    choices: Sequence[str] = (),
-    flags: Sequence[str] = (),
-) -> str:
-    """Format label-value rows as a small HTML table; everything is escaped.
-
-    Parameters
-    ----------
-    title, rows, choices, flags
-        As for `text_card`.
-
-    Examples
-    --------
-    >>> from ctrl_realize._shown import html_card
-    >>> card = html_card("Delay", [("delay", "37 samples")], flags=["look <twice>"])
-    >>> print(card[card.index("⚠"):])
-    ⚠ look &lt;twice&gt;</div></div>
-    """
-    cell = "text-align:left;vertical-align:top"
-    body = "".join(
-        f"<tr><th style='{cell};font-weight:500;padding:2px 16px 2px 0;"
-        # On a narrow screen the values wrap first.
-        f"white-space:{'nowrap' if len(label) <= SHORT_LABEL else 'normal'}'>"
-        f"{escape(label)}</th>"
-        f"<td style='{cell};padding:2px 0'>{escape(value)}</td></tr>"
-        for label, value in rows
-    )
-    lines = "".join(f"<div style='margin-top:4px'>{escape(text)}</div>" for text in choices)
-    lines += "".join(f"<div style='margin-top:4px'>⚠ {escape(text)}</div>" for text in flags)
-    return (
-        "<div style='display:inline-block;border:1px solid #8886;border-radius:6px;"
-        "padding:8px 14px;max-width:46em'>"
-        f"<div style='font-weight:600;margin-bottom:4px'>{escape(title)}</div>"
-        f"<table style='border-collapse:collapse;margin:0'>{body}</table>{lines}</div>"
-    )
-
-
 class Card(NamedTuple):
-    """Title, (label, value) rows, choices and flags, as for `text_card`."""
+    """Title, label-value rows, choices and flags, as text or HTML."""
 
     title: str
     rows: Sequence[tuple[str, str]]
     choices: Sequence[str] = ()
     flags: Sequence[str] = ()
+
+    def text(self) -> str:
+        """Format the card as text.
+
+        Examples
+        --------
+        >>> from ctrl_realize._shown import Card
+        >>> rows = [("delay", "37 samples"), ("order", "3")]
+        >>> print(Card("Delay", rows, flags=["look twice"]).text())
+        Delay
+          delay  37 samples
+          order  3
+          ! look twice
+        """
+        width = max((len(label) for label, _ in self.rows), default=0)
+        lines = [self.title]
+        lines += [f"  {label:<{width}}  {value}" for label, value in self.rows]
+        lines += [f"  - {choice}" for choice in self.choices]
+        lines += [f"  ! {flag}" for flag in self.flags]
+        return "\n".join(lines)
+
+    def html(self) -> str:
+        """Format the card as a small HTML table; everything is escaped.
+
+        Examples
+        --------
+        >>> from ctrl_realize._shown import Card
+        >>> card = Card("Delay", [("delay", "37 samples")], flags=["look <twice>"]).html()
+        >>> print(card[card.index("⚠"):])
+        ⚠ look &lt;twice&gt;</div></div>
+        """
+        cell = "text-align:left;vertical-align:top"
+        body = "".join(
+            f"<tr><th style='{cell};font-weight:500;padding:2px 16px 2px 0;"
+            # On a narrow screen the values wrap first.
+            f"white-space:{'nowrap' if len(label) <= SHORT_LABEL else 'normal'}'>"
+            f"{escape(label)}</th>"
+            f"<td style='{cell};padding:2px 0'>{escape(value)}</td></tr>"
+            for label, value in self.rows
+        )
+        said = [*self.choices, *(f"⚠ {flag}" for flag in self.flags)]
+        lines = "".join(f"<div style='margin-top:4px'>{escape(text)}</div>" for text in said)
+        return (
+            "<div style='display:inline-block;border:1px solid #8886;border-radius:6px;"
+            "padding:8px 14px;max-width:46em'>"
+            f"<div style='font-weight:600;margin-bottom:4px'>{escape(self.title)}</div>"
+            f"<table style='border-collapse:collapse;margin:0'>{body}</table>{lines}</div>"
+        )
 
 
 class ShownSystem:
@@ -133,7 +111,7 @@ class ShownSystem:
         return escape(line) if html else line
 
     def _repr_html_(self) -> str:
-        return html_card(*self._card())
+        return self._card().html()
 
     def _repr_markdown_(self) -> None:
         return None

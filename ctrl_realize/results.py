@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from ._flags import Flag, in_doubt
 from ._parameters import Parameter, checked_time_unit, formula, parameter_table
-from ._shown import html_card, text_card
+from ._shown import Card
 from ._wording import ASSUMED, chosen, in_time, shown_unit, times_in
 
 if TYPE_CHECKING:
@@ -110,12 +110,15 @@ class Result(Drawable):
     def _notes(self) -> list[str]:
         return [str(flag) for flag in self.flags]
 
+    def _card(self) -> Card:
+        return Card(self._title(), self._rows(), self._choices(), self._notes())
+
     def report(self) -> str:
         """Return the result as plain text, choices and flags included."""
-        return text_card(self._title(), self._rows(), self._choices(), self._notes())
+        return self._card().text()
 
     def _repr_html_(self) -> str:
-        return html_card(self._title(), self._rows(), self._choices(), self._notes())
+        return self._card().html()
 
 
 class ModelFit(Result):

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .._checks import check_finite, finite, numbers, one_of, positive, real, spelled_out
-from .._shown import html_card, text_card
+from .._shown import Card
 from .._wording import ASSUMED, in_time, shown_unit, times_in
 from ..errors import DataError, OptionError, TimeAxisError
 from ..numerics.arrays import BoolArray, read_only
@@ -200,12 +200,12 @@ class Record(RecordConversions):
           input u   40 to 50 %
           output y  180 to 183 °C
         """
-        return text_card(*self._card())
+        return self._card().text()
 
     def _repr_html_(self) -> str:
-        return html_card(*self._card())
+        return self._card().html()
 
-    def _card(self) -> tuple[str, list[tuple[str, str]]]:
+    def _card(self) -> Card:
         told = self.units.get("time", "s")
         step = f"{in_time(self.dt, 6)}" + " (assumed)" * (told == ASSUMED)
         with times_in(shown_unit(told)):
@@ -229,7 +229,7 @@ class Record(RecordConversions):
                 rows.append((f"{kind} {label}", f"{ends} {unit}".rstrip()))
         if self.n_missing and not self.irregular:
             rows.append(("missing", f"{self.n_missing} values"))
-        return f"Record {self.name}".rstrip(), rows
+        return Card(f"Record {self.name}".rstrip(), rows)
 
     def __len__(self) -> int:
         return self.n_samples

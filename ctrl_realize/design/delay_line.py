@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .._shown import Card, ShownSystem, text_card
+from .._shown import Card, ShownSystem
 from .._wording import in_time
 from ..delayed.operators import DelayOperators
 from ..numerics.arrays import ComplexArray, FloatArray, read_only
@@ -164,7 +164,7 @@ class DelayLineController(ShownSystem, DelayOperators):
 
     def report(self) -> str:
         """Describe the controller and its closed loop as plain text."""
-        return text_card(*self._card())
+        return self._card().text()
 
     def _made_by(self) -> tuple[Any, ...]:
         settings = {

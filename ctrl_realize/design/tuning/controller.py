@@ -9,7 +9,7 @@ import numpy as np
 
 from ..._checks import not_negative, one_of, positive, real, system_name
 from ..._parameters import SECONDS, checked_time_unit, slope_unit
-from ..._shown import Card, ShownSystem, text_card
+from ..._shown import Card, ShownSystem
 from ..._wording import in_time, times_in
 from ...data.shown_units import in_shown_units
 from ...delayed.operators import BesideDelays
@@ -161,7 +161,7 @@ class PIDController(ShownSystem, BesideDelays):
 
     def report(self) -> str:
         """List the parameters and the loop check as plain text."""
-        return text_card(*self._card())
+        return self._card().text()
 
     def _again(self, **changes: Any) -> PIDController:
         settings = {**self._settings(), **changes}
