@@ -58,42 +58,33 @@ class Stopped(KeyboardInterrupt):
     """The system terminates the process: cleaned up as after Ctrl-C."""
 
 
-class Ending:
-    """How the run ended, as an exit code; None while it was not stopped."""
-
-    code: int | None = None
-
-
 @contextmanager
-def stopped_by_signals() -> Iterator[Ending]:
+def stopped_by_signals() -> Iterator[list[int]]:
     """Raise `Stopped` on SIGTERM and SIGHUP in the block, once; handlers are restored afterwards.
 
     By default Python ends at once at these signals, without cleaning up: incomplete folders would
     remain, and workers would continue.
     """
-    ending = Ending()
-    if threading.current_thread() is not threading.main_thread():
-        yield ending  # only the main thread may handle signals
-        return
-    # the available signals depend on the operating system
-    known = [getattr(signal, name) for name in _SIGNALS if hasattr(signal, name)]
+    codes: list[int] = []
+    # only the main thread may handle signals, which depend on the operating system
+    main = threading.current_thread() is threading.main_thread()
+    known = [getattr(signal, name) for name in _SIGNALS if main and hasattr(signal, name)]
 
     def stop(number: int, frame: FrameType | None) -> None:
         for one in known:
             signal.signal(one, signal.SIG_IGN)  # cleaning up takes a moment
-        ending.code = 128 + number
+        codes.append(128 + number)
         raise Stopped
 
     # a signal that is ignored (nohup), or handled by other code, is left unchanged
-    before = {one: signal.getsignal(one) for one in known}
-    mine = [one for one, handler in before.items() if handler is signal.SIG_DFL]
+    mine = [one for one in known if signal.getsignal(one) is signal.SIG_DFL]
     try:
         for one in mine:
             signal.signal(one, stop)
-        yield ending
+        yield codes
     finally:
         for one in mine:
-            signal.signal(one, before[one])
+            signal.signal(one, signal.SIG_DFL)
 
 
 @functools.cache
@@ -107,7 +98,7 @@ def run(words: Sequence[str]) -> int:
     command = _command()
     # The matrices are small: on a busy machine, BLAS threads waiting for each other cost ten times
     # what they save. Use processes instead (--jobs).
-    with threadpool_limits(limits=1), warnings.catch_warnings(), stopped_by_signals() as ending:
+    with threadpool_limits(limits=1), warnings.catch_warnings(), stopped_by_signals() as codes:
         warnings.showwarning = plain_warning
         try:
             code = command.main(list(words), prog_name="ctrl-realize", standalone_mode=False)
@@ -130,7 +121,7 @@ def run(words: Sequence[str]) -> int:
             complain(one_line(error.format_message()) + " (see --help)")
             return 2
     if code == INTERRUPTED:  # typer tells of it by an exception or by the code
-        code = ending.code or INTERRUPTED
+        code = (codes or [INTERRUPTED])[0]
         how = "interrupted" if code == INTERRUPTED else "terminated"
         complain(f"{how}; unfinished results were not written")
     return code if isinstance(code, int) else 0

@@ -56,8 +56,7 @@ def command(module: str, function: str) -> Callable[[Callable[..., None]], Calla
         def run(**values: Any) -> int:
             for group in groups:
                 values[group] = given(**{name: values.pop(name) for name in GROUPS[group]})
-            folder, overwrite = values.get("folder"), values.pop("overwrite", False)
-            report = not values.pop("no_report", False)
+            folder, written = values.get("folder"), values.pop("written", {})
             named = [value for name, value in values.items() if name != "folder"]
             several = [value if isinstance(value, list) else [value] for value in named]
             paths = [path for each in several for path in each if isinstance(path, Path)]
@@ -69,7 +68,7 @@ def command(module: str, function: str) -> Callable[[Callable[..., None]], Calla
                 call = getattr(import_module(module, __package__), function)
             whole = [*words, *([] if folder is None else ["--output", str(folder)])]
             command, typed = (typed_call(declared.__name__, one) for one in (words, whole))
-            code: int = call(**values, run=Run(command, tuple(paths), overwrite, typed, report))
+            code: int = call(**values, run=Run(command, tuple(paths), typed, **written))
             return code
 
         hints = get_type_hints(declared, include_extras=True)

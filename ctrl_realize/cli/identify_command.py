@@ -21,7 +21,13 @@ from ..results import ModelFit
 from .inputs import Reading, Settings, Source, calls_again
 from .machine import Told, told_as_json
 from .manifest import Run, refuse_other_results
-from .results import Provenance, campaign_table, write_campaign_files, write_record_files
+from .results import (
+    Provenance,
+    campaign_table,
+    say_written,
+    write_campaign_files,
+    write_record_files,
+)
 from .staging import appearing, kept_rows, refuse_a_file
 from .terminal import complain, one_line, printable, progress, say, working
 from .tuning import Tuning
@@ -126,7 +132,7 @@ def identified(
         return _many(task, sources, folder, calls, jobs)
     with appearing(folder, run) as staged:
         code = _one(task, sources, staged, calls)
-    _say_what_is_written(folder, ["model.json"], run.report and code != 1)
+    say_written(folder, ["model.json"], run.report and code != 1)
     return code
 
 
@@ -204,11 +210,6 @@ def _one(
     return _judged(system, task.required) if written else 1
 
 
-def _say_what_is_written(output: Path, names: list[str], reported: bool) -> None:
-    more = ["report.html", "figures/"] if reported else []
-    say(f"\nwritten to {printable(str(output))}: {', '.join([*names, *more])}")
-
-
 def _say_model(system: DelayedStateSpace, comparison: FRFComparison | None) -> None:
     say(fit_of(system, ModelFit).report())
     if comparison is not None:
@@ -234,8 +235,7 @@ def _many(
             files = [source.file for source in sources]
             provenance = task.provenance(campaign.system, files, comparison, calls)
             written = write_campaign_files(folder, campaign, provenance)
-    names = ["model.json", "records.csv", "models/"]
-    _say_what_is_written(output, names, task.run.report and written)
+    say_written(output, ["model.json", "records.csv", "models/"], task.run.report and written)
     return 1 if campaign.failed or not written else _judged(campaign.system, task.required)
 
 
@@ -258,16 +258,12 @@ def _each_alone(task: _Task, sources: list[Source], output: Path, how: Reading) 
     names = unique_names([source.name for source in sources])
     for name in names:
         refuse_other_results(output / name, task.run)
-
-    def position(source: Source) -> int:
-        """Number of a test in its file."""
-        return [one for one in sources if one.file == source.file].index(source)
-
     for source, name in progress(zip(sources, names, strict=True), len(sources), "identify"):
         try:
             # each folder appears as soon as it is finished, so that an interruption loses no other
             with appearing(output / name, task.run) as folder:
-                test = position(source)
+                # number of a test in its file
+                test = [one for one in sources if one.file == source.file].index(source)
                 typed = task.run.typed
                 calls = calls_again([source.file], task.settings, how, typed, None, test)
                 code = _one(task, [source], folder, calls)

@@ -34,8 +34,8 @@ class Run:
 
     command: str
     inputs: tuple[Path, ...] = ()
-    overwrite: bool = False
     typed: str = ""
+    overwrite: bool = False
     report: bool = True
 
 

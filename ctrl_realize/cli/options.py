@@ -38,9 +38,6 @@ MaybeFolder = Annotated[
     Path | None,
     _OPTION("--output", "-o", help="Output folder for table, report and figures.", **_INTO),
 ]
-Overwrite = Annotated[
-    bool, _OPTION("--overwrite", help="Overwrite the results of another run in the folder.")
-]
 
 # how to identify
 Frf = Annotated[Path | None, _OPTION(help="Measured frequency response to compare the model with.")]
@@ -59,9 +56,6 @@ Require = Annotated[
     _OPTION(help="Exit with 4 unless the verdict on dead-time, gain or tuning is good; "
             "repeatable."),
 ]  # fmt: skip
-NoReport = Annotated[
-    bool, _OPTION("--no-report", help="Write models and tables alone, without report and figures.")
-]
 
 
 def _form(name: str | None) -> str | None:
@@ -144,12 +138,24 @@ GROUPS: dict[str, dict[str, Any]] = {
     "compared": options_of("frequency/compare.py", "compare_frf"),
     "measured": options_of("valves/evaluate.py", "valve_report", "limits"),
     "diagnosed": options_of("valves/loops/diagnose.py", "diagnose_loop"),
+    "written": {
+        "no_report": Annotated[
+            bool, _OPTION("--no-report", help="Write models and tables alone, without report and "
+                          "figures."),
+        ],
+        "overwrite": Annotated[
+            bool, _OPTION("--overwrite", help="Overwrite the results of another run in the "
+                          "folder."),
+        ],
+    },
 }  # fmt: skip
 """Options that several commands share, or that go together to one function of Python."""
 
-ARGUMENTS = frozenset(
-    name.removeprefix("no_") for group in GROUPS.values() for name in group if name != "split"
-)
+ARGUMENTS = frozenset(name.removeprefix("no_") for group in GROUPS.values() for name in group) - {
+    "split",
+    "report",
+    "overwrite",
+}
 """Arguments of Python that have an option."""
 
 _COLUMNS = ("time", "input", "output", "quality", "by")

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import shutil
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from types import MappingProxyType
@@ -72,12 +71,8 @@ def _write_files(folder: Path, write: Callable[..., Path], provenance: Provenanc
     files = list(dict.fromkeys(provenance.files))  # several tests may be in one
     if provenance.frf_file is not None:
         files.append(provenance.frf_file)
-    with told_if_it_fails(folder, "the model") as written:
-        shown = {name: getattr(provenance, name) for name in _SHOWN}
-        shown |= provenance.tuned
-        write(folder / "report.html", files=files, figures=folder / "figures", **shown)
-        written.append("report.html")
-    return bool(written)
+    shown = {name: getattr(provenance, name) for name in _SHOWN} | {**provenance.tuned}
+    return _reported(folder, partial(write, files=files, **shown), "the model")
 
 
 def write_results(
@@ -91,31 +86,33 @@ def write_results(
 
     Returns the exit code; `result` names what is written even if the report fails.
     """
-    written: list[str] = []
     with appearing(output, run) as folder:
         for name, (table, index) in tables.items():
             write_csv(folder / name, table, index=index)
-        if run.report:
-            with told_if_it_fails(folder, result) as written:
-                write(folder / "report.html", figures=folder / "figures")
-                written.append("report.html, figures/")
-    say(f"\nwritten to {printable(str(output))}: {', '.join([*tables, *written])}")
-    return 0 if written or not run.report else 1
+        reported = run.report and _reported(folder, write, result)
+    say_written(output, tables, reported)
+    return 0 if reported or not run.report else 1
 
 
-@contextmanager
-def told_if_it_fails(folder: Path, result: str) -> Iterator[list[str]]:
-    """Report an error while a report is written, but keep the results: the list stays empty."""
-    written: list[str] = []
+def say_written(output: Path, names: Iterable[str], reported: bool) -> None:
+    """Name the files of the results."""
+    more = ["report.html", "figures/"] if reported else []
+    say(f"\nwritten to {printable(str(output))}: {', '.join([*names, *more])}")
+
+
+def _reported(folder: Path, write: Callable[..., Path], result: str) -> bool:
+    """Write a report; return whether that was possible, since the results are kept in any case."""
     try:
         with working("drawing the figures of the report"):
-            yield written
+            write(folder / "report.html", figures=folder / "figures")
     except Exception as error:  # for instance a defect of this program, or a full disk
         shutil.rmtree(folder / "figures", ignore_errors=True)
         complain(
             f"the report could not be written ({type(error).__name__}: {one_line(error)}); "
             f"{result} is"
         )
+        return False
+    return True
 
 
 def save_models(folder: Path, campaign: Campaign, settings: Mapping[str, Any]) -> None:

@@ -49,8 +49,7 @@ def identify(
     require: o.Require = None,
     tune: o.Tune = None,
     json: o.Json = None,
-    no_report: o.NoReport = False,
-    overwrite: o.Overwrite = False,
+    written: o.Given,
 ) -> None:
     """Identify a model with dead time from one record, or from many of one plant.
 
@@ -85,8 +84,7 @@ def tune(
     tests: o.Given,
     record: o.Given,
     require: o.Require = None,
-    no_report: o.NoReport = False,
-    overwrite: o.Overwrite = False,
+    written: o.Given,
 ) -> None:
     """Tune a PID controller from records of its plant, and tell what to enter.
 
@@ -112,8 +110,7 @@ def compare(
     *,
     compared: o.Given,
     response_file: o.Given,
-    no_report: o.NoReport = False,
-    overwrite: o.Overwrite = False,
+    written: o.Given,
 ) -> None:
     """Compare a model with a measured frequency response.
 
@@ -136,8 +133,7 @@ def valve(
     limit: o.Limit = None,
     tests: o.Given,
     record: o.Given,
-    no_report: o.NoReport = False,
-    overwrite: o.Overwrite = False,
+    written: o.Given,
 ) -> None:
     """Measure the metrics of a step test of a control valve.
 
@@ -164,8 +160,7 @@ def loop(
     diagnosed: o.Given,
     set_point: o.SetPoint = None,
     trend: o.Given,
-    no_report: o.NoReport = False,
-    overwrite: o.Overwrite = False,
+    written: o.Given,
 ) -> None:
     """Tell from operating data whether the valve makes a control loop oscillate.
 

@@ -140,11 +140,9 @@ def _move_into(staged: Path, target: Path, old: Sequence[Path]) -> None:
             path.unlink()
     for folder in {path.parent for path in old} - {target}:
         _remove_if_empty(folder)
-    for path in sorted(staged.rglob("*")):
-        place = target / path.relative_to(staged)
-        if path.is_dir():
-            place.mkdir(exist_ok=True)
     for path in sorted(staged.rglob("*"), key=lambda one: (one.name == MANIFEST, one)):
         if path.is_file():
-            os.replace(path, target / path.relative_to(staged))
+            place = target / path.relative_to(staged)
+            place.parent.mkdir(exist_ok=True)
+            os.replace(path, place)
     shutil.rmtree(staged)

@@ -6,7 +6,7 @@ import os
 import sys
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager, nullcontext
-from typing import Any, TextIO
+from typing import Any
 
 import typer
 
@@ -59,14 +59,7 @@ def _is_ours(problem: object) -> bool:
     return type(problem).__module__.startswith("ctrl_realize")
 
 
-def plain_warning(
-    message: Warning | str,
-    category: type[Warning],
-    filename: str,
-    lineno: int,
-    file: TextIO | None = None,
-    line: str | None = None,
-) -> None:
+def plain_warning(message: Warning | str, *_: Any, **__: Any) -> None:
     """Show a warning as one line on stderr; replaces `warnings.showwarning`."""
     complain(f"warning: {one_line(message)}")
 
