@@ -140,13 +140,6 @@ class MeasuredFRF(FRFAlgebra):
         self.frequency_hz = read_only(grid)
         self.coherence = _beside(coherence, values, order, "coherence")
         self.std = _beside(std, values, order, "std")
-        for what, most in (("coherence", 1 + 1e-9), ("std", np.inf)):
-            array = getattr(self, what)
-            if array is not None and (array.min() < 0 or array.max() > most):
-                raise DataError(
-                    f"{what} runs from {array.min():g} to {array.max():g}; expected values "
-                    + ("in 0...1" if what == "coherence" else ">= 0")
-                )
         self.repeats = None if repeats is None else real(repeats, "repeats", "number above 1")
         if self.repeats is not None and self.repeats <= 1:
             raise OptionError(f"repeats={repeats!r}; a scatter needs more than one")
@@ -308,4 +301,9 @@ def _beside(
     if array.shape != response.shape:
         raise DataError(f"{what} has shape {array.shape}, response has {response.shape}")
     check_size(array, what)
+    most, expected = (1 + 1e-9, "in 0...1") if what == "coherence" else (np.inf, ">= 0")
+    if array.min() < 0 or array.max() > most:
+        raise DataError(
+            f"{what} runs from {array.min():g} to {array.max():g}; expected values {expected}"
+        )
     return read_only(array[..., order])

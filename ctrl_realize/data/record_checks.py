@@ -64,15 +64,12 @@ def checked_reference(given: Any, output: FloatArray) -> FloatArray | None:
     """Return the set point of every output, NaN where it is not in force."""
     if given is None:
         return None
-    values = numbers(given, "reference")
-    if values.shape != output.shape:
+    if np.shape(given) != output.shape:
         raise DataError(
-            f"reference has shape {values.shape}; expected that of the output, {output.shape}: "
+            f"reference has shape {np.shape(given)}; expected that of the output, {output.shape}: "
             "the set point at every sample"
         )
-    check_finite(values, "reference", allow_nan=True)
-    check_size(values, "reference")
-    return read_only(values)
+    return read_only(checked_signal(given, "reference", output.shape[-1], allow_nan=True))
 
 
 def labelled(

@@ -178,15 +178,10 @@ def fit_frf(
 def _searchable(max_dead_time: float, omega: FloatArray) -> float:
     """Refuse a bound with too many candidates, or with dead times that are indistinguishable."""
     most, least = longest_search(omega), 1e-15 / float(omega[-1])
-    if max_dead_time > most:
+    if not least <= max_dead_time <= most:
         raise OptionError(
-            f"max_dead_time={max_dead_time:g} s is too long for these frequencies; expected "
-            f"at most {most:.3g} s"
-        )
-    if max_dead_time < least:
-        raise OptionError(
-            f"max_dead_time={max_dead_time:g} s is too short for these frequencies; expected "
-            f"at least {least:.3g} s, which is practically zero"
+            f"max_dead_time={max_dead_time:g} s is not for these frequencies; expected "
+            f"{least:.3g} s, which is practically zero, to {most:.3g} s"
         )
     return max_dead_time
 

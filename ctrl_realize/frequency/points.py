@@ -144,13 +144,11 @@ class MeasuredPoints:
 
     def only(self, kept: BoolArray) -> MeasuredPoints:
         """Select the marked points."""
-        return MeasuredPoints(
-            self.frequency_hz[kept],
-            self.response[kept],
-            None if self.coherence is None else self.coherence[kept],
-            None if self.std is None else self.std[kept],
-            self.repeats,
+        coherence, std = (
+            None if beside is None else beside[kept] for beside in (self.coherence, self.std)
         )
+        hz, response = self.frequency_hz[kept], self.response[kept]
+        return MeasuredPoints(hz, response, coherence, std, self.repeats)
 
 
 def measured_points(frf: Any) -> MeasuredPoints:
