@@ -15,18 +15,9 @@ from typer.models import ArgumentInfo
 
 from ..errors import MissingFileError, OptionError
 from .loading import loading
-from .options import GROUPS, Given, words_of
-
-_COLUMNS = ("time", "input", "output", "quality", "by", "frequency", "magnitude", "phase", "real",
-            "imag")  # fmt: skip
-
+from .options import COLUMNS, GROUPS, Given, words_of
 
 _NO_RESULT = ("folder", "jobs", "json")
-
-
-def typed_call(command: str, words: Sequence[str]) -> str:
-    """Return a command line that can be typed again."""
-    return shlex.join(["ctrl-realize", command, *words])
 
 
 def check_files(paths: Sequence[Path]) -> None:
@@ -67,7 +58,8 @@ def command(module: str, function: str) -> Callable[[Callable[..., None]], Calla
 
                 call = getattr(import_module(module, __package__), function)
             whole = [*words, *([] if folder is None else ["--output", str(folder)])]
-            command, typed = (typed_call(declared.__name__, one) for one in (words, whole))
+            program = ["ctrl-realize", declared.__name__]
+            command, typed = (shlex.join(program + one) for one in (words, whole))
             code: int = call(**values, run=Run(command, tuple(paths), typed, **written))
             return code
 
@@ -127,7 +119,7 @@ def given(**options: Any) -> Given:
             found[name.removeprefix("no_")] = False
         elif value == "none" and name in ("quality", "comment", "hold"):
             found[name] = None
-        elif name in _COLUMNS:
+        elif name in COLUMNS:
             columns = [selector(one) for one in (value if isinstance(value, list) else [value])]
             found[name] = columns[0] if len(columns) == 1 else columns
         elif name in ("start", "stop"):

@@ -11,7 +11,7 @@ from .._checks import one_of
 from ..data import MeasuredFRF
 from ..delayed import DelayedStateSpace, fit_of
 from ..errors import CtrlRealizeError, DataError, OptionError, UnsuitableSystemError
-from ..frequency import FRFComparison, compare_frf
+from ..frequency import compare_frf
 from ..identification.campaign.campaign import Campaign
 from ..identification.campaign.run import identify_campaign
 from ..identification.methods import identify as identify_record
@@ -148,14 +148,14 @@ class _Task:
     tuning: Tuning | None = None
     told: Told | None = None
 
-    def provenance(
-        self,
-        system: DelayedStateSpace,
-        files: Sequence[Path],
-        comparison: FRFComparison | None,
-        calls: list[tuple[str, str]],
+    def told_of(
+        self, system: DelayedStateSpace, sources: list[Source], calls: list[tuple[str, str]]
     ) -> Provenance:
-        """What the files say about a model, and its controller if one is wanted."""
+        """Tell of a model, compare and tune it if asked, and return what its files say."""
+        comparison = None if self.frf is None else compare_frf(system, self.frf)
+        say(fit_of(system, ModelFit).report())
+        if comparison is not None:
+            say(f"\n{comparison.report()}")
         tuned: dict[str, Any] = {}
         if self.tuning is not None:
             try:
@@ -166,6 +166,7 @@ class _Task:
                 complain(f"no controller: {one_line(error)}")
             terminal, (name, lines) = calls
             calls = [terminal, (name, f"{lines}\n{self.tuning.in_python()}")]
+        files = [source.file for source in sources]
         shown = self.settings.given, calls, self.run.report, tuned, self.frf_file
         return Provenance(files, self.frf, comparison, *shown)
 
@@ -191,17 +192,14 @@ def _one(
 
     It is 1 if the report was not written.
     """
-    settings, frf = task.settings, task.frf
-    records = [source.record() for source in sources]
-    options = {**settings.choices, **({} if frf is None or not settings.joint else {"frf": frf})}
+    settings, records = task.settings, [source.record() for source in sources]
+    frf = {"frf": task.frf} if settings.joint and task.frf is not None else {}
     with working("identifying"):
-        system = identify_record(records[0] if len(records) == 1 else records, **options)
-        comparison = None if frf is None else compare_frf(system, frf)
+        given = records[0] if len(records) == 1 else records
+        system = identify_record(given, **settings.choices, **frf)
     for source, record in zip(sources, records, strict=True):
         say(printable(f"{source.file}: {record!r}"))
-    _say_model(system, comparison)
-    files = [source.file for source in sources]
-    provenance = task.provenance(system, files, comparison, calls)
+    provenance = task.told_of(system, sources, calls)
     if task.told is not None:
         task.told.append({"system": system, "records": records, **provenance.tuned})
     if folder is None:
@@ -210,30 +208,19 @@ def _one(
     return _judged(system, task.required) if written else 1
 
 
-def _say_model(system: DelayedStateSpace, comparison: FRFComparison | None) -> None:
-    say(fit_of(system, ModelFit).report())
-    if comparison is not None:
-        say()
-        say(comparison.report())
-
-
 def _many(
     task: _Task, sources: list[Source], output: Path, calls: list[tuple[str, str]], jobs: int | None
 ) -> int:
-    settings, frf = task.settings, task.frf
     n_jobs = jobs if jobs is not None else -1 if len(sources) >= _MANY else 1
     with kept_rows(output) as store:
         campaign = identify_campaign(
             [source.content for source in sources],
-            n_jobs=n_jobs, store=store, **settings.choices,
+            n_jobs=n_jobs, store=store, **task.settings.choices,
         )  # fmt: skip
         _refuse_useless(campaign)
-        comparison = None if frf is None else compare_frf(campaign.system, frf)
         say(f"{campaign_table(campaign)}\n\n{campaign.report()}\n\nFinal model")
-        _say_model(campaign.system, comparison)
+        provenance = task.told_of(campaign.system, sources, calls)
         with appearing(output, task.run) as folder:
-            files = [source.file for source in sources]
-            provenance = task.provenance(campaign.system, files, comparison, calls)
             written = write_campaign_files(folder, campaign, provenance)
     say_written(output, ["model.json", "records.csv", "models/"], task.run.report and written)
     return 1 if campaign.failed or not written else _judged(campaign.system, task.required)

@@ -158,7 +158,9 @@ ARGUMENTS = frozenset(name.removeprefix("no_") for group in GROUPS.values() for 
 }
 """Arguments of Python that have an option."""
 
-_COLUMNS = ("time", "input", "output", "quality", "by")
+COLUMNS = ("time", "input", "output", "quality", "by", "frequency", "magnitude", "phase", "real",
+           "imag")  # fmt: skip
+"""Arguments that select columns, by name or number."""
 
 _CALLS = {row["python"]: row["option"] for row in facts("cli/advice.toml")["advice"]}
 """Advice for Python, and for the command line."""
@@ -238,5 +240,5 @@ def _word(name: str, value: object) -> str:
     if value is None:
         return "none"
     text = "tab" if value == "\t" else str(value)
-    named_by_number = name in _COLUMNS and isinstance(value, str) and text.isdecimal()
+    named_by_number = name in COLUMNS and isinstance(value, str) and text.isdecimal()
     return f"={text}" if named_by_number else text
