@@ -78,14 +78,6 @@ def read_head(path: Path, n_bytes: int) -> bytes:
         return file.read(n_bytes)
 
 
-def read_tail(path: Path, n_bytes: int) -> bytes:
-    """Last `n_bytes` of a file (of the whole file, if it is shorter)."""
-    with path.open("rb") as file:
-        # an even start keeps two-byte characters whole
-        file.seek(max(0, path.stat().st_size - n_bytes) // 2 * 2)
-        return file.read()
-
-
 @contextmanager
 def told_if_damaged(path: Path, kind: str) -> Iterator[None]:
     """Turn any error of a reader into one message: damaged files raise all kinds of them."""

@@ -154,16 +154,17 @@ def summary_of(fit: ModelFit | None) -> FitSummary | None:
     """Reduce any fit to plain numbers and text."""
     if fit is None or isinstance(fit, FitSummary):
         return fit
-    own = ("actuator", "plausible_models")
-    values = {key: _plain(getattr(fit, key)) for key in _KEPT if key not in own}
+    apart = ("actuator", "plausible_models")
+    values = {key: _plain(getattr(fit, key)) for key in _KEPT if key not in apart}
     for key in ("std_given_structure", "fit_percent"):  # of some fits
         values[key] = _plain(getattr(fit, key, None))
     values["time_unit"], values["method"] = fit._record_unit, fit._method
     values["clock"] = tuple(fit._of_clock())
     if fit.parameters:
         values["formula"] = fit.formula
-    if fit.actuator is not None:
-        values["actuator"] = _actuator_row(fit.actuator)
+    if (own := fit.actuator) is not None:  # its fields in order, without what records do not tell
+        told = (to_plain(own.model), own.actuator_at, own.parameters, own.starts, own.evidence)
+        values["actuator"] = _plain(told)
     if (drawn := fit.plausible_models) is not None:
         every = [
             (one.dead_time, one.poles.real, one.poles.imag, one.numerator) for one in drawn.models
@@ -180,11 +181,6 @@ def summary_of(fit: ModelFit | None) -> FitSummary | None:
         flags=fit.flags,
         choices=fit.choices,
     )
-
-
-def _actuator_row(fit: ActuatorFit) -> Plain:
-    """Return the fields of an actuator in their order, without what the records cannot tell."""
-    return _plain((to_plain(fit.model), fit.actuator_at, fit.parameters, fit.starts, fit.evidence))
 
 
 def summary_to_json(summary: FitSummary | None) -> dict[str, Any] | None:

@@ -205,7 +205,7 @@ def _parsed_dates(
     cells = [_PART.sub(".", str(cell).strip()) for cell in table.columns[index].cells]
     if time_format is None:
         cells = [cell.replace(",", ".") for cell in cells]
-    if _are_times_of_day(cells) and date is not None:
+    if date is not None and all(re.fullmatch(rf"({_CLOCK})( ?[AaPp][Mm])?", x) for x in cells[:3]):
         days = [str(cell).strip() for cell in table.columns[date].cells]
         cells = [f"{day} {cell}" for day, cell in zip(days, cells, strict=True)]
     try:
@@ -233,10 +233,6 @@ def _durations(cells: Sequence[str]) -> np.ndarray[Any, Any]:
 
     found = pd.to_timedelta(pd.Series(cells, dtype=str), errors="coerce")
     return np.asarray(found.to_numpy(dtype="timedelta64[ns]"))
-
-
-def _are_times_of_day(cells: list[str]) -> bool:
-    return all(re.fullmatch(rf"({_CLOCK})( ?[AaPp][Mm])?", cell) for cell in cells[:3])
 
 
 def _times_of_day(cells: list[str], unit: str, place: str) -> np.ndarray[Any, Any]:

@@ -60,21 +60,18 @@ def arrays_of(path: str, limit: float) -> Iterator[tuple[str, Any]]:
     """Yield name and values of every numeric array, including those in structs and cells."""
     with open(path, "rb") as file:
         head = file.read(10)
-    if head == b"MATLAB 7.3":
+    if head.startswith((b"MATLAB 7.3", b"\x89HDF")):
         import h5py
 
         with h5py.File(path, "r") as hdf5:
             reader = _HDF5(limit)
+            if head.startswith(b"\x89HDF"):
+                yield from _datasets(reader, "", hdf5, _MAX_DEPTH)
+                return
             for name in hdf5:
                 if not name.startswith("#"):
                     value = reader.member(hdf5, name)
                     yield from _inside_hdf5(reader, hdf5, name, value, _MAX_DEPTH)
-        return
-    if head.startswith(b"\x89HDF"):
-        import h5py
-
-        with h5py.File(path, "r") as hdf5:
-            yield from _datasets(_HDF5(limit), "", hdf5, _MAX_DEPTH)
         return
     import scipy.io
 

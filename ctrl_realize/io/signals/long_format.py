@@ -39,7 +39,8 @@ def long_table(
     if isinstance(time, str):
         clocks = [k for k, one in enumerate(table.columns) if one.name == time]
     names = {column.name for column in table.columns}
-    asked = {one for signal in signals if signal is not None for one in _each(signal)}
+    several = [[one] if isinstance(one, str | int | None) else one for one in signals]
+    asked = {column for each in several for column in each}
     if not len(tags) == len(values) == len(clocks) == 1 or asked & names:
         return None
     cells = np.array([str(cell).strip() for cell in table.columns[tags[0]].cells])
@@ -57,7 +58,3 @@ def tags_as_columns(table: Table, long: LongTable) -> Table:
     cells = table.columns[long.value].cells
     columns = [Column(tag, unit_of(tag), cells[rows]) for tag, rows in long.rows.items()]
     return Table(table.path, tuple(columns), decimal=table.decimal)
-
-
-def _each(signal: Selector) -> Sequence[str | int]:
-    return [signal] if isinstance(signal, str | int) else list(signal)

@@ -6,11 +6,9 @@ import io
 import re
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TextIO
+from typing import BinaryIO, TextIO
 
 import numpy as np
-
-from ..checks import read_head, read_tail
 
 _PAIR = re.compile(
     r"""(?<![\w.])([A-Za-z_]\w*)["']?\s*[:=]\s*"""
@@ -31,20 +29,23 @@ class TextSource:
     content: bytes | None = None
     row_name: str = "line"
 
+    def _bytes(self) -> BinaryIO:
+        return self.path.open("rb") if self.content is None else io.BytesIO(self.content)
+
     def head(self, n_bytes: int) -> bytes:
         """First bytes."""
-        return read_head(self.path, n_bytes) if self.content is None else self.content[:n_bytes]
+        with self._bytes() as raw:
+            return raw.read(n_bytes)
 
     def tail(self, n_bytes: int) -> bytes:
-        """Last bytes, from an even place on."""
-        if self.content is None:
-            return read_tail(self.path, n_bytes)
-        return self.content[max(0, len(self.content) - n_bytes) // 2 * 2 :]
+        """Last bytes, from an even place on, which keeps two-byte characters whole."""
+        with self._bytes() as raw:
+            raw.seek(max(0, raw.seek(0, io.SEEK_END) - n_bytes) // 2 * 2)
+            return raw.read()
 
     def open(self, encoding: str, newline: str | None = None) -> TextIO:
         """Open the text for reading; bytes that are no characters are replaced."""
-        raw = self.path.open("rb") if self.content is None else io.BytesIO(self.content)
-        return io.TextIOWrapper(raw, encoding=encoding, errors="replace", newline=newline)
+        return io.TextIOWrapper(self._bytes(), encoding=encoding, errors="replace", newline=newline)
 
 
 def keyed_as_table(source: TextSource) -> TextSource:
