@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable, Iterable, Sequence
 from html import escape
-from typing import Any, NamedTuple, Self
+from typing import TYPE_CHECKING, Any, NamedTuple, Self
 
 import numpy as np
 
@@ -81,9 +81,14 @@ class ShownSystem:
     _state_names: dict[str, int] | None = None
     _repr_format: str | None
 
-    def _made_by(self) -> tuple[Callable[..., Any], tuple[Any, ...], dict[str, Any]]:
-        """What makes an equal system, with its arguments."""
-        raise NotImplementedError
+    if TYPE_CHECKING:  # what a class adds
+
+        def _made_by(self) -> tuple[Callable[..., Any], tuple[Any, ...], dict[str, Any]]:
+            """What makes an equal system, with its arguments."""
+
+        def _line(self) -> str: ...
+
+        def _card(self) -> Card: ...
 
     def __reduce__(self) -> tuple[Any, ...]:
         states = None if self._state_names is None else list(self._state_names)
@@ -93,12 +98,6 @@ class ShownSystem:
         make, arguments = self.__reduce__()
         copy: Self = make(*arguments)
         return copy
-
-    def _line(self) -> str:
-        raise NotImplementedError
-
-    def _card(self) -> Card:
-        raise NotImplementedError
 
     def __repr__(self) -> str:
         return as_asked(self)

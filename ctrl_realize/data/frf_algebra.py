@@ -66,12 +66,10 @@ class FRFAlgebra(ct.FrequencyResponseData):  # type: ignore[misc]  # control is 
 
     def _other(self, other: Any) -> Operand | None:
         """Evaluate the other operand at the frequencies of this one; None if it is not a system."""
-        if isinstance(other, FRFAlgebra):
-            self._check_same_frequencies(other)
-            return other._operand()
         if isinstance(other, ct.FrequencyResponseData):
             self._check_same_frequencies(other)
-            return Operand(np.asarray(other.frdata))
+            measured = isinstance(other, FRFAlgebra)
+            return other._operand() if measured else Operand(np.asarray(other.frdata))
         if isinstance(other, (ct.StateSpace, ct.TransferFunction)):
             dt = sample_time_of(other)
             points = np.exp(1j * self.omega * dt) if dt else 1j * self.omega
@@ -156,8 +154,7 @@ class FRFAlgebra(ct.FrequencyResponseData):  # type: ignore[misc]  # control is 
         if two is None:
             return NotImplemented
         check_shapes(one, two, same=True)
-        # An exact path keeps noise and hold of the measured one.
-        hold = one.hold if not two.measured else common_hold(one, two, "a sum")
+        hold = common_hold(one, two, "a sum")
         values = one.values + sign * two.values
         return self._made("a sum", values, one.spread + two.spread, (one, two), hold)
 
@@ -178,13 +175,11 @@ class FRFAlgebra(ct.FrequencyResponseData):  # type: ignore[misc]  # control is 
 
     def _product(self, one: Operand, two: Operand) -> Any:
         check_shapes(one, two, same=False)
-        if one.measured and two.measured:
-            coherence, hold = None, one_hold(one, two)
-        else:
-            kept, exact = (one, two) if one.measured else (two, one)
+        hold, coherence = one_hold(one, two), None
+        for kept, exact in ((one, two), (two, one)):
             # A mixture of channels has another coherence; a gain of zero has none.
-            plain = exact.is_scalar and bool(np.all(exact.values))
-            coherence, hold = kept.coherence if plain else None, kept.hold
+            if not exact.measured and exact.is_scalar and np.all(exact.values):
+                coherence = kept.coherence
         spread = matmul(one.spread, power(two.values)) + matmul(power(one.values), two.spread)
         values = matmul(one.values, two.values)
         return self._made("a product", values, spread, (one, two), hold, coherence)
@@ -267,13 +262,12 @@ class FRFAlgebra(ct.FrequencyResponseData):  # type: ignore[misc]  # control is 
         # dT = left dH right + T dK T
         spread = matmul(matmul(power(last_axis(left)), one.spread), power(last_axis(right)))
         spread = spread + matmul(matmul(power(closed), two.spread), power(closed))
-        hold = one.hold if not two.measured else one_hold(one, two)
-        return self._made("a closed loop", closed, spread, (one, two), hold)
+        return self._made("a closed loop", closed, spread, (one, two), one_hold(one, two))
 
     def append(self, other: Any) -> Any:
         """Append another response; the cross terms are zero."""
         one, two = self._operand(), self._needed(other)
-        hold = one.hold if not two.measured else common_hold(one, two, "appended responses")
+        hold = common_hold(one, two, "appended responses")
         values = blocks(one.values, two.values, self.omega.size)
         spread = blocks(one.spread, two.spread, self.omega.size)
         return self._made("appended responses", values, spread, (one, two), hold)

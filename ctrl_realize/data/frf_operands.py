@@ -84,9 +84,10 @@ def warn_of_hold(what: str, hold: float) -> None:
 
 
 def common_hold(one: Operand, two: Operand, what: str) -> float | None:
-    """Hold of a sum: that of both operands."""
-    known = [side.hold for side in (one, two) if side.hold is not None]
-    if len(known) == 2 and same_time(*known):
+    """Hold of a sum: that of all measured operands; an exact path keeps it."""
+    holds = [side.hold for side in (one, two) if side.measured]
+    known = [hold for hold in holds if hold is not None]
+    if known and len(known) == len(holds) and same_time(known[0], known[-1]):
         return known[0]
     if known:
         warn_of_hold(what, known[0])

@@ -139,14 +139,11 @@ class ImpulseResponse(Drawable):
             )
         seconds = positive(dt, "dt", "sample time in s")
         sampling = one_of(sampling, "sampling", ("step-invariant", "impulse-invariant"))
-        fix = object.__setattr__
-        fix(self, "markov", read_only(values))
-        fix(self, "dt", seconds)
-        fix(self, "filter", filter)
-        fix(self, "noise", None if noise is None else read_only(finite(noise, "noise")))
-        fix(self, "sampling", sampling)
-        fix(self, "name", str(name))
-        fix(self, "step", step)
+        vars(self).update(
+            markov=read_only(values), dt=seconds, filter=filter, sampling=sampling,
+            noise=None if noise is None else read_only(finite(noise, "noise")),
+            name=str(name), step=step,
+        )  # fmt: skip
 
     @property
     def n_samples(self) -> int:

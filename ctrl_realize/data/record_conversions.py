@@ -35,14 +35,13 @@ class RecordConversions(Drawable):
     dt: float
     sample_time: float
 
-    def _arguments(self) -> dict[str, Any]:
-        raise NotImplementedError
+    if TYPE_CHECKING:
 
-    def __replace__(self, **changes: Any) -> Self:
-        raise NotImplementedError
+        def _arguments(self) -> dict[str, Any]: ...
 
-    def __init__(self, time: ArrayLike, input: ArrayLike, output: ArrayLike, **labels: Any) -> None:
-        raise NotImplementedError
+        def __replace__(self, **changes: Any) -> Self: ...
+
+        def __init__(self, time: Any, input: Any, output: Any, **labels: Any) -> None: ...
 
     @property
     def irregular(self) -> bool:

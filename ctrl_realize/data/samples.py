@@ -12,7 +12,7 @@ import numpy as np
 from ..errors import DataError, OptionError, TimeAxisError, warn_caller
 from ..numerics.arrays import FloatArray
 from ..numerics.signals.counters import counter_period
-from ..numerics.signals.sample_grid import regular_step, usual_step
+from ..numerics.signals.sample_grid import held, regular_step, usual_step
 from ..numerics.signals.time_axis import axis_fault
 from .record import Record
 
@@ -191,7 +191,4 @@ class Samples:
         """Input at the stamps of the output; it holds its value between its own."""
         if self.input_time is None:
             return self.input
-        last = np.searchsorted(self.input_time, self.time, side="right") - 1
-        held = np.array(self.input[..., np.maximum(last, 0)])
-        held[..., last < 0] = np.nan  # before its first sample it is unknown
-        return held
+        return held(self.input_time, self.input, self.time)

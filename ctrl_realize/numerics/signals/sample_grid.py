@@ -117,6 +117,6 @@ def filled(values: FloatArray) -> FloatArray:
 
 
 def held(stamps: FloatArray, values: np.ndarray[Any, Any], time: FloatArray) -> FloatArray:
-    """Last value at every time (M,), NaN before the first stamp."""
+    """Last value (..., N) at every time (M,), NaN before the first stamp."""
     last = np.searchsorted(stamps, time, side="right") - 1
-    return np.where(last < 0, np.nan, np.asarray(values, np.float64)[np.maximum(last, 0)])
+    return np.where(last < 0, np.nan, np.asarray(values, np.float64)[..., np.maximum(last, 0)])
