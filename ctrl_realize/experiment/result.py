@@ -179,20 +179,14 @@ class ExperimentPlan(PlannedInput):
         """
         import pandas as pd
 
+        columns = ["test", "choice", "std", "low", "high", "together", "better than one step",
+                   "output moves"]  # fmt: skip
         rows = [
-            {
-                "test": one.kind,
-                "choice": one.detail,
-                "std": one.std,
-                "low": one.others[0],
-                "high": one.others[1],
-                "together": one.together,
-                "better than one step": self.step.std / one.std,
-                "output moves": one.excursion,
-            }
+            (one.kind, one.detail, one.std, *one.others, one.together, self.step.std / one.std,
+             one.excursion)
             for one in self.candidates
-        ]
-        return pd.DataFrame(rows).set_index("test")
+        ]  # fmt: skip
+        return pd.DataFrame(rows, columns=columns).set_index("test")
 
     def _title(self) -> str:
         return f"Plan of a test for the {WORDS[self.want]}: {self.kind}"

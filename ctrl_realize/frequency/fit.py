@@ -179,8 +179,9 @@ def _searchable(max_dead_time: float, omega: FloatArray) -> float:
     """Refuse a bound with too many candidates, or with dead times that are indistinguishable."""
     most, least = longest_search(omega), 1e-15 / float(omega[-1])
     if not least <= max_dead_time <= most:
+        way = "long" if max_dead_time > most else "short"
         raise OptionError(
-            f"max_dead_time={max_dead_time:g} s is not for these frequencies; expected "
+            f"max_dead_time={max_dead_time:g} s is too {way} for these frequencies; expected "
             f"{least:.3g} s, which is practically zero, to {most:.3g} s"
         )
     return max_dead_time
