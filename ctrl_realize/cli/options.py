@@ -107,9 +107,7 @@ GROUPS: dict[str, dict[str, Any]] = {
         ],
     },
     "record": _RECORD,
-    "trend": {
-        name: option for name, option in _RECORD.items() if name not in ("missing", "rest")
-    },
+    "trend": options_of("io/records.py", "read_record", "name missing rest"),
     "response": {
         name: option for name, option in _FREQUENCY_RESPONSE.items() if name not in _RECORD
     },
