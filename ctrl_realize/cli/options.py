@@ -218,6 +218,8 @@ def words_of(keywords: Mapping[str, Any]) -> list[str]:
     >>> from ctrl_realize.cli.options import words_of
     >>> print(*words_of({"input": ["u", 2], "output": "3", "rest": (0.0, 20.3), "resample": True}))
     --input u --input 2 --output-column =3 --rest 0.0 20.3 --resample
+    >>> print(*words_of({"frequency": 0, "phase": "2"}))
+    --frequency 0 --phase =2
     """
     words: list[str] = []
     for name, value in keywords.items():

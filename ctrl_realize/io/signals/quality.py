@@ -102,6 +102,8 @@ class Rules:
 
     def _marked(self, table: Table, index: int) -> BoolArray:
         """Rows in which the quality of a column is bad."""
+        import pandas as pd
+
         out = np.zeros(table.columns[index].cells.size, dtype=bool)
         if not (qualities := self.columns(table)):
             return out
@@ -115,25 +117,19 @@ class Rules:
             cells = table.columns[column].cells
             if cells.size == out.size:
                 name = table.columns[column].name.lower()
-                bad = self._bad(cells, name)
+                place, kinds = pd.factorize(cells, use_na_sentinel=False)
+                bad = self._bad_kinds([str(kind).strip().casefold() for kind in kinds], name)
                 if bad is not None:
-                    out |= bad
-                elif len(set(cells.tolist())) > 1 and "status" not in name:
+                    out |= bad[place]
+                elif kinds.size > 1 and "status" not in name:
                     warn_caller(
                         f"{table.path}: the codes of {table.title(column)} are not known, such as "
                         f"{cells[0]}; good= tells the good ones, quality=None ignores them"
                     )
         return out
 
-    def _bad(self, cells: np.ndarray[Any, np.dtype[Any]], name: str) -> BoolArray | None:
-        """Which cells are bad; None if they say nothing."""
-        import pandas as pd
-
-        place, kinds = pd.factorize(cells, use_na_sentinel=False)
-        bad = self._bad_kinds([str(kind).strip().casefold() for kind in kinds], name)
-        return None if bad is None else np.asarray(bad[place])
-
     def _bad_kinds(self, words: list[str], name: str) -> BoolArray | None:
+        """Which words in a column are bad; None if they say nothing."""
         codes = np.array([_code(word) for word in words])
         if self.good:
             good = [word.casefold() for word in self.good]
