@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from functools import cached_property
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -51,23 +50,14 @@ class Reading(SimpleNamespace):
         ):
             raise OptionError(f"rest={self.rest!r}; expected input and output in the steady state")
         self.text = TextOptions.among(given)
-        _ = self.rules  # which are checked as well
+        self.clock = Clock(self.time_unit, self.time_format, self.time_zone)
+        kept = self.treatment != "refuse" and not self.resample
+        self.rules: Rules = rules_of(kept, self.na_values, self.quality, self.good)
 
     @property
     def label(self) -> str:
         """Name of the record."""
         return Path(self.path).stem if self.name is None else str(self.name)
-
-    @property
-    def clock(self) -> Clock:
-        """How to read time."""
-        return Clock(self.time_unit, self.time_format, self.time_zone)
-
-    @cached_property
-    def rules(self) -> Rules:
-        """What counts as a missing sample."""
-        kept = self.treatment != "refuse" and not self.resample
-        return rules_of(kept, self.na_values, self.quality, self.good)
 
     def table(self) -> Table:
         """Read the file."""

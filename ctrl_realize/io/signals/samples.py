@@ -12,7 +12,7 @@ import numpy as np
 from ...data.resampling import MIN_SAMPLES
 from ...data.samples import Samples
 from ...errors import DataError, OptionError
-from ...numerics.arrays import FloatArray
+from ...numerics.arrays import BoolArray, FloatArray
 from ...numerics.signals.sample_grid import filled, held
 from ..columns import check_lengths
 from ..tables import Table
@@ -20,9 +20,8 @@ from ..text.dates import in_utc
 from ..time_column import Clock, TimeAxis, time_axis
 from ..units import plain_unit
 from .long_format import LongTable
-from .names import Parts
+from .names import MODES, Parts, mode_word, strange_modes
 from .quality import Rows, Rules
-from .set_point import in_manual
 
 
 def wide_axis(table: Table, parts: Parts, clock: Clock) -> tuple[TimeAxis, Rows]:
@@ -59,7 +58,7 @@ def wide_samples(
         wanted = [filled(lenient.values(table, k, rows)) for k in parts.references]
         reference = _stacked(wanted)
         if parts.mode is not None:
-            reference[..., in_manual(table, parts.mode)[rows]] = np.nan
+            reference[..., _in_manual(table, parts.mode)[rows]] = np.nan
     return Samples(seconds, input, output, None, table.rows(rows, []).place, reference)
 
 
@@ -109,7 +108,7 @@ def long_samples(
         if parts.mode is not None:
             rows = long.rows[tags[parts.mode]]
             rows = rows[np.argsort(seconds[rows], kind="stable")]
-            manual = in_manual(table.rows(rows, [long.value]), long.value)
+            manual = _in_manual(table.rows(rows, [long.value]), long.value)
             reference[..., held(seconds[rows], manual, time) == 1] = np.nan
     return Samples(time, input, output, input_time, "sample {}".format, reference)
 
@@ -176,6 +175,27 @@ def labels_of(table: Table, parts: Parts, time_unit: str) -> dict[str, Any]:
             if plain_unit(unit):
                 units[name] = unit
     return labels | {"units": units}
+
+
+def _in_manual(table: Table, index: int) -> BoolArray:
+    """Rows in which a controller is in manual; a cell without a mode has the one before.
+
+    There a set point is not in force: NaN. Otherwise it holds its value until it is stored again.
+
+    Raises
+    ------
+    OptionError
+        A cell is no mode that is known.
+    """
+    if strange := strange_modes(table, index):
+        raise OptionError(
+            f"{table.at(index)} has the modes {', '.join(sorted(strange)[:5])}; "
+            f"expected {', '.join(MODES['manual'][:3])}, {', '.join(MODES['automatic'][:3])}, "
+            "cas, or 0 and 1"
+        )
+    kinds = dict.fromkeys(MODES["manual"], 1.0) | dict.fromkeys(MODES["automatic"], 0.0)
+    words = map(mode_word, table.columns[index].cells.tolist())
+    return np.asarray(filled(np.array([kinds.get(word, np.nan) for word in words])) == 1)
 
 
 def _stacked(rows: Sequence[FloatArray]) -> FloatArray:
