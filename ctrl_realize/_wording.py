@@ -117,7 +117,7 @@ def _pole_in_words(pole: complex) -> str:
     return f"{'lag' if pole.real < 0 else 'growing in'} {in_time(1 / size)}"
 
 
-def rate_in_time(per_second: float, digits: int = 3) -> str:
+def rate_in_time(per_second: float) -> str:
     """Write a slope per unit of time.
 
     Examples
@@ -128,7 +128,7 @@ def rate_in_time(per_second: float, digits: int = 3) -> str:
     '30 per min'
     """
     shown = _SHOWN.get()
-    return f"{per_second / UNITS[shown]:.{digits}g} per {shown}"
+    return f"{per_second / UNITS[shown]:.3g} per {shown}"
 
 
 def interval_in_time(low: float, high: float, word: str = "to") -> str:
@@ -236,8 +236,8 @@ def plainly(value: float, digits: int) -> str:
     return f"{value:.0f}" if 10**digits <= abs(value) < 1e6 else f"{value:.{digits}g}"
 
 
-def in_digits(value: float, digits: int = 4) -> str:
-    """Write a number; an empty text if it is not finite.
+def in_digits(value: float) -> str:
+    """Write a number with four digits; an empty text if it is not finite.
 
     Examples
     --------
@@ -245,11 +245,11 @@ def in_digits(value: float, digits: int = 4) -> str:
     >>> in_digits(16.00001), in_digits(float("nan"))
     ('16', '')
     """
-    return f"{value:.{digits}g}" if np.isfinite(value) else ""
+    return f"{value:.4g}" if np.isfinite(value) else ""
 
 
-def in_numbers(values: FloatArray, digits: int = 4, most: int = 8) -> str:
-    """Write a matrix in one line, rows separated by semicolons; long rows are shortened.
+def in_numbers(values: FloatArray) -> str:
+    """Write a matrix in one line, rows separated by semicolons; eight numbers of a row are shown.
 
     Examples
     --------
@@ -260,8 +260,8 @@ def in_numbers(values: FloatArray, digits: int = 4, most: int = 8) -> str:
     """
     rows = []
     for row in np.atleast_2d(values):
-        shown = ", ".join(f"{value:.{digits}g}" for value in row[:most])
-        rows.append(shown + (", …" if row.size > most else ""))
+        shown = ", ".join(f"{value:.4g}" for value in row[:8])
+        rows.append(shown + (", …" if row.size > 8 else ""))
     return "; ".join(rows)
 
 
