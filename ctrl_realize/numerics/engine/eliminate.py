@@ -35,7 +35,6 @@ from .local_terms import LocalTerms, solve_upper, triangle
 from .modal import RealModes, moved_amplitudes, partial_fractions
 from .poles import poles_from_parameters
 from .problem import Compressed, Eliminated, Evaluation, Family, Mapped, Problem, Structure
-from .responses import StepSequence
 
 
 def eliminate(problem: Problem, structure: Structure, parameters: FloatArray) -> Eliminated:
@@ -195,25 +194,21 @@ class _Models:
 
         Before the data of points of a frequency response there is the derivative of a direct term.
         """
-        problem, n, count = self._problem, self._free.shape[1], self._poles.shape[1]
-        q, moving = problem.regressors.shape[1], n if slopes else 0
-        turning = self._sines if slopes else None
-        width = q + 1 + count + moving + (turning is not None) + 1
+        problem, n = self._problem, self._free.shape[1]
+        static, mode, slope = problem.drive.modes(self._tau, self._poles)
+        parts = [static[:, :, None], self.modes.columns(mode)]
+        if slopes:
+            parts.append(self.modes.columns(slope[:, :, :n]))
+        if slopes and self._sines is not None:
+            parts.append(self._sines.direct_slope(self._tau)[:, :, None])
+        fixed = problem.weighted_regressors, problem.weighted_data[:, None]
+        q, width = fixed[0].shape[1], sum(part.shape[2] for part in parts)
         # A column is contiguous, as LAPACK has it.
-        space = np.empty((len(self._tau), width, problem.data.size))
-        space[:, :q] = problem.weighted_regressors.T
-        space[:, -1] = problem.weighted_data
-        inside = space[:, q:-1]
-        if not _step_columns(problem, self._tau, self.modes, inside):
-            static, mode, slope = problem.drive.modes(self._tau, self._poles)
-            parts = [static[:, :, None], self.modes.columns(mode)]
-            if slopes:
-                parts.append(self.modes.columns(slope[:, :, :n]))
-            if turning is not None:
-                parts.append(turning.direct_slope(self._tau)[:, :, None])
-            made = np.concatenate(parts, axis=2)
-            inside[:] = np.swapaxes(problem.weighted(made), 1, 2)
-        return np.swapaxes(space, 1, 2)
+        space = np.empty((len(self._tau), q + width + 1, problem.data.size)).swapaxes(1, 2)
+        space[:, :, :q], space[:, :, -1:] = fixed
+        np.concatenate(parts, axis=2, out=space[:, :, q:-1])
+        space[:, :, q:-1] = problem.weighted(space[:, :, q:-1])
+        return space
 
     def linear(self, columns: FloatArray, regressors: int = 0) -> FloatArray:
         """Responses (B, m, n - r + 1), regressors and data, from columns."""
@@ -293,50 +288,3 @@ def _within(
 def _orthogonal(columns: FloatArray, basis: FloatArray) -> FloatArray:
     """Project an orthonormal basis (B, m, k) out of columns (B, m, l)."""
     return np.asarray(columns - basis @ (np.swapaxes(basis, 1, 2) @ columns))
-
-
-def _step_columns(
-    problem: Problem, tau: FloatArray, models: RealModes, columns: FloatArray
-) -> bool:
-    """Weighted static part, modes, and derivatives of the first of them, to `columns` (B, k, m).
-
-    False where that is not possible: for other inputs than one step, coloured noise, missing
-    samples, and bins in which the step arrives.
-    """
-    drive = problem.drive
-    if not isinstance(drive, StepSequence) or problem.whitener is not None:
-        return False
-    elapsed = drive.since_the_step(tau)
-    if elapsed is None:
-        return False
-    count = models.poles.shape[1]
-    static, modes, slopes = columns[:, 0], columns[:, 1 : 1 + count], columns[:, 1 + count :]
-    moving = slopes.shape[1]
-    np.multiply(elapsed > 0, drive.sizes[0] * problem.root_weight, out=static)
-    # The mean of a mode over a bin is its first sample times a factor; that of t exp(p t) has the
-    # mean of the time besides.
-    rates = models.poles.real
-    factor, lag, kind = drive.means(rates)
-    np.multiply(rates[:, :, None], elapsed[:, None], out=modes)
-    np.exp(modes, out=modes)
-    modes *= factor.take(kind, axis=2)
-    modes *= static[:, None]
-    late = elapsed[:, None] + lag[:, :moving].take(kind, axis=2)
-    np.multiply(modes[:, :moving], late, out=slopes)
-    for pair, (i, j) in enumerate(zip(models.first, models.second, strict=True)):
-        # Cosine and sine instead of both of a pair; the slopes are a product of complex numbers.
-        rows = np.flatnonzero(models.turning[:, pair])
-        if not rows.size:
-            continue
-        when, rate = elapsed[rows], models.poles[rows, i, None]
-        factor, lag, kind = drive.means(rate)
-        factor, lag = np.log(factor[:, 0]), lag[:, 0]
-        decay = static[rows] * np.exp(rate.real * when + factor.real.take(kind, axis=1))
-        phase = rate.imag * when + factor.imag.take(kind, axis=1)
-        cosine, sine = decay * np.cos(phase), decay * np.sin(phase)
-        modes[rows, i], modes[rows, j] = cosine, sine
-        if i < moving:
-            length, turn = when + lag.real.take(kind, axis=1), lag.imag.take(kind, axis=1)
-            slopes[rows, i] = cosine * length - sine * turn
-            slopes[rows, j] = cosine * turn + sine * length
-    return True

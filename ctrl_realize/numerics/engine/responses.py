@@ -109,13 +109,14 @@ class StepSequence:
         here = self._arrived(since)
         held = self._carried(rates) if self.moves.size > 1 else None
         row = np.arange(tau.size)[:, None]
-        static, mode, slope = self._decayed(held, rates[:, None], since, row, here)
+        # The bins of a pole are contiguous, as factorisations have them.
+        static, mode, slope = self._decayed(held, rates[:, :, None], since, row, here)
         if self._kinds[0][-1] == 1:
-            return static, mode, slope
+            return static, mode.swapaxes(1, 2), slope.swapaxes(1, 2)
         mean, turn, kind = self.bin_means(rates)
-        mean = mean.take(kind, axis=1)
+        mean, turn = (part.swapaxes(1, 2).take(kind, axis=2) for part in (mean, turn))
         slope *= mean
-        slope += mode * turn.take(kind, axis=1)
+        slope += mode * turn
         mode *= mean
         late = here != self._arrived(since + self.lengths)
         if self.samples is not None:
@@ -132,32 +133,8 @@ class StepSequence:
             parts = self._decayed(held, rates[owner], when, owner, self._arrived(when))
             for values, samples in zip((static, mode, slope), parts, strict=True):
                 sums = np.add.reduceat(samples, ends - count, axis=0)
-                values[row, column] = sums / count.reshape(-1, *[1] * (sums.ndim - 1))
-        return static, mode, slope
-
-    def since_the_step(self, tau: FloatArray) -> FloatArray | None:
-        """Times (B, m) from the arrival of a single step to every bin, 0 before it.
-
-        None if there are several changes, samples are missing, or the step arrives within a bin.
-        """
-        if self.moves.size > 1 or self.samples is not None:
-            return None
-        arrival = self.moves[0] + tau
-        last = np.searchsorted(self.first, arrival + TOGETHER * self.dt, side="right") - 1
-        within = self.first[last] + self.lengths[last] > arrival + TOGETHER * self.dt
-        if (within & (last >= 0)).any():
-            return None
-        since: FloatArray = self.first - arrival[:, None]
-        return np.where(since > TOGETHER * self.dt, since, 0.0)
-
-    def means(self, rates: Any) -> tuple[Any, Any, IntArray]:
-        """Mean of exp(p t) over kinds of bins (B, J, k), the mean time, and the kind of each bin.
-
-        The time counts from the first sample of a bin, and has exp(p t) for its weight.
-        """
-        widths, kind = self._kinds
-        mean, turn = _geometric_mean(rates[:, :, None] * self.dt, widths)
-        return mean, self.dt * turn / mean, kind
+                values[row, ..., column] = sums / count.reshape(-1, *[1] * (sums.ndim - 1))
+        return static, mode.swapaxes(1, 2), slope.swapaxes(1, 2)
 
     @cached_property
     def _kinds(self) -> tuple[IntArray, IntArray]:
@@ -230,16 +207,20 @@ class StepSequence:
         row: IntArray,
         here: IntArray,
     ) -> Modes:
-        """H, E and T at delayed times, `here` changes after the first state of `_carried`."""
+        """H, E and T at delayed times, `here` changes after the first state of `_carried`.
+
+        For times (B, m) and rates (B, J, 1) E and T are (B, J, m), for times (K,) and rates (K, J)
+        they are (K, J).
+        """
         _, start, level = self._steps
-        elapsed = np.where(here > 0, when - start[here], 0.0)[..., None]
+        elapsed = np.where(here > 0, when - start[here], 0.0)[:, None]
         static, mode = level[here], np.exp(elapsed * rates)
         if held is None:
-            mode *= static[..., None]  # nothing has decayed before
+            mode *= static[:, None]  # nothing has decayed before
             return static, mode, elapsed * mode
-        total, stretch = held
-        slope = stretch[row, here] * mode
-        mode *= total[row, here]
+        total, stretch = (np.moveaxis(part[row, here], -1, 1) for part in held)
+        slope = stretch * mode
+        mode *= total
         slope += elapsed * mode
         return static, mode, slope
 
