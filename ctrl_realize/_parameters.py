@@ -55,7 +55,8 @@ class Parameter:
     std_given_structure : float
         Standard error if the structure of the model is that of the plant; NaN if it is not known.
     low, high : float
-        95 % interval; NaN if it is not known.
+        95 % interval; NaN if it is not known. The gain of a response that has not settled may have
+        one end alone; the other is infinite.
     all_structures : bool
         Whether the interval covers the choice of the structure, too.
     unit : str
@@ -69,7 +70,7 @@ class Parameter:
     >>> from ctrl_realize.results import Parameter
     >>> lag = Parameter("lag_1", 179.2, 0.5, 178.2, 180.2, unit="s", times=1)
     >>> lag.in_time_unit("min").text()
-    '2.987 +-0.009 min'
+    '2.987 +-0.008 min'
     """
 
     name: str
@@ -83,9 +84,10 @@ class Parameter:
 
     @property
     def std(self) -> float:
-        """Standard error: half of the 95 % interval over 1.96, `std_given_structure` without it."""
+        """Standard error, of an interval for all structures half of it over 1.96."""
         half = (self.high - self.low) / 2
-        return half / Z_95 if np.isfinite(half) else self.std_given_structure
+        wide = np.isfinite(half) and (self.all_structures or np.isnan(self.std_given_structure))
+        return half / Z_95 if wide else self.std_given_structure
 
     @property
     def label(self) -> str:
@@ -113,10 +115,12 @@ class Parameter:
 
     def interval_text(self) -> str:
         """Write the 95 % interval, rounded like the value; empty if it is not known."""
-        if not (np.isfinite(self.low) and np.isfinite(self.high)):
-            return ""
-        ends = numbers_alike((self.low, self.high), self.low, self.high)
-        return f"{' to '.join(ends)}{self.unit and ' ' + self.unit}"
+        unit = self.unit and " " + self.unit
+        if np.isfinite([self.low, self.high]).all():
+            return " to ".join(numbers_alike((self.low, self.high), self.low, self.high)) + unit
+        if np.isfinite(self.low):
+            return f"at least {self.low:.3g}{unit}"
+        return f"at most {self.high:.3g}{unit}" if np.isfinite(self.high) else ""
 
 
 def checked_time_unit(unit: str) -> str:

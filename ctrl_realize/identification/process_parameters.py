@@ -55,10 +55,10 @@ def with_intervals(
             value, std, span = gain
             unit = slope_unit(ratio, "s") if integrating and ratio else ratio
             times = -1 if integrating else 0
-            finite = bool(np.isfinite(span).all())
-            low, high = span if finite else (np.nan, np.nan)
+            known = not np.isinf(span).all()  # one end, at least
+            low, high = span if known else (np.nan, np.nan)
             parameters.append(
-                Parameter(name, value, std, low, high, finite and several, unit, times)
+                Parameter(name, value, std, low, high, known and several, unit, times)
             )
         elif name == "dead_time":
             std, (low, high) = dead_time
@@ -67,6 +67,7 @@ def with_intervals(
             ratio_of_times = name.rpartition("_")[0].endswith("damping")
             unit, times = ("", 0) if ratio_of_times else ("s", 1)
             low, high = ends or (value - Z_95 * std, value + Z_95 * std)
+            low = low if name.startswith(("lead", "zero")) else max(low, 0.0)
             parameters.append(Parameter(name, value, std, low, high, False, unit, times))
     return tuple(parameters)
 

@@ -51,6 +51,22 @@ def test_units_go_from_the_record_to_the_parameters():
     assert per_minute["value"] == pytest.approx(60 * per_second["value"])
 
 
+def test_intervals_of_a_record_that_ends_early_have_no_impossible_ends():
+    t = np.arange(102.0)  # 20 s and 17 s behind 12 s, until 47 % of the response
+    since = np.clip(t - 72, 0, None)
+    y = 1 - (20 * np.exp(-since / 20) - 17 * np.exp(-since / 17)) / 3
+    y += 0.01 * np.random.default_rng(1).standard_normal(t.size)
+    fit = cr.fit_output_error(cr.Record(t, (t >= 60) * 1.0, -3 * y), structures=[(2, 2)]).fit
+    gain, *_, time, damping = fit.parameters
+    assert (gain.low, gain.high) == fit.gain_interval
+    assert gain.low == -np.inf
+    assert -3 <= gain.high < 0
+    assert gain.interval_text() == f"at most {gain.high:.3g}"
+    for one, truth in ((time, np.sqrt(340)), (damping, 37 / np.sqrt(4 * 340))):
+        assert one.low == 0 < truth < one.high
+        assert one.std == one.std_given_structure
+
+
 def test_a_furnace_in_minutes_is_reported_and_drawn_in_minutes(tmp_path):
     t = 60.0 * np.arange(400)
     after = np.clip(t - 60 * 100 - 360, 0, None)
