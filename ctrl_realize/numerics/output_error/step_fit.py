@@ -6,8 +6,8 @@ The rule:
    plant, as chosen by the information criterion; a free response needs strong evidence, a drift
    very strong evidence. Neither is taken if the gain is then not determined.
 1. All structures are fitted to the whole record; the one with the lowest information criterion
-   is the model, and its residual is compared with the noise before the step. A residual that is not
-   much larger counts as noise, too, if it is white or no larger than that long after the step. If
+   is the model, and its residual is compared with the noise before the step. A larger residual counts
+   as noise, too, if it is white, or not much larger and no larger than that long after the step. If
    the residual is at noise level and the noise was coloured before the step already, all structures
    are fitted again with prewhitening.
 2. If the residual is at noise level, the dead time is that of the model, and its interval spans the
@@ -98,9 +98,10 @@ _LAGS = (Structure(1, 1), Structure(2, 2), Structure(3, 3))
 """Structures of the early models. Ablation: views (the likelihood always)."""
 
 _LOUDER = 4.0
-"""How much louder noise may be after the step than before it: slow noise shows little of itself in
-a short rest (AR(1) noise with a pole at 0.98 and 60 samples: four times less). Ablation: louder
-noise after the step."""
+"""How much louder slow noise may be after the step than before it: a short rest shows little of it
+(AR(1) noise with a pole at 0.98 and 60 samples: four times less). White noise may be louder by any
+factor: that of a gauge grows with the signal, and no misfit is white. Ablation: louder noise after
+the step."""
 _FAR_POORER = 2.0
 """Residual of models of up to three poles over that of up to five, from which on these are needed
 though none is at noise level. 1.0 to 1.7 on measured plants, 2.5 on one canal, 8.4 for an arm that
@@ -268,18 +269,18 @@ def _at_noise_level(data: StepData, fits: WindowFit) -> WindowFit | None:
 
 
 def _is_noise(data: StepData, fits: WindowFit, candidate: Candidate) -> bool:
-    """Whether the residual is at the noise level before the step, or at that long after it."""
+    """Whether the residual is white, at the noise level before the step, or at that long after."""
     rms, level = fits.misfit(candidate), ADEQUATE * data.colour
+    white = fits.correlation == 1.0 and candidate is fits.best
     noise = rms <= level or (
-        rms <= level * _LOUDER and _is_louder_noise(data, fits, candidate) and Rule.LOUDER.on
+        (white or (rms <= level * _LOUDER and _is_louder_noise(data, fits, candidate)))
+        and Rule.LOUDER.on
     )
     return Rule.LIKELIHOOD.on if noise else not Rule.VIEWS.on
 
 
 def _is_louder_noise(data: StepData, fits: WindowFit, candidate: Candidate) -> bool:
-    """Whether a residual is noise that the rest does not show: white, slow, or as large later."""
-    if fits.correlation == 1.0 and candidate is fits.best:
-        return True
+    """Whether a residual is slow noise that the rest does not show, or as large later."""
     error = fits.residual(candidate)
     if continues(error[: data.edge], error[data.edge :], ADEQUATE) and Rule.GOES_ON.on:
         return True

@@ -171,3 +171,17 @@ def test_the_errors_of_a_ramp_are_those_of_the_cramer_rao_bound():
     stated = {parameter.name: parameter.std for parameter in fit.parameters}
     assert stated["gain"] == pytest.approx(bound[0], rel=0.1)
     assert stated["lag_1"] == pytest.approx(bound[2], rel=0.1)
+
+
+def test_noise_that_grows_with_the_output_is_no_misfit():
+    """It was for all of twelve, the residual being more than four times the noise at rest."""
+    noisy = held = 0
+    for seed in range(12):
+        rng = np.random.default_rng(seed)
+        y = response(TIME, STEP, 2.0, 7.3, [20, 6])
+        y += (0.001 + 0.02 * y) * rng.standard_normal(TIME.size)
+        fit = cr.identify(cr.Record(TIME, STEP, y), structures=[(2, 2)]).fit
+        noisy += fit.at_noise_level
+        held += fit.interval[0] <= 7.3 <= fit.interval[1]
+    assert noisy >= 10  # white noise of unequal size is correlated by chance once in ten
+    assert held >= 10  # of twelve, nine or fewer are seen once in fifty
