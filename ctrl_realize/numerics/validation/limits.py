@@ -80,8 +80,11 @@ def at_limit(output: FloatArray) -> list[tuple[float, BoolArray]]:
         return []
     found = []
     for end in at:
-        samples = np.zeros(output.size, dtype=bool)
-        for first, last in _joined(np.flatnonzero(np.abs(values - end) <= nothing), _GAP):
+        samples, equal = np.zeros(output.size, dtype=bool), np.abs(values - end) <= nothing
+        runs = _joined(np.flatnonzero(equal), _GAP)
+        if runs == [(0, np.count_nonzero(equal) - 1)]:
+            continue  # a rest without noise, as of a coarse converter: it cuts none
+        for first, last in runs:
             samples[rows[first] : rows[last] + 1] = True
         found.append((end, samples))
     return found

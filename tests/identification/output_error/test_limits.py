@@ -92,6 +92,18 @@ def test_an_output_that_rests_at_its_limit_is_told_and_fitted_as_it_is():
     assert fit.measured.size == TIME.size
 
 
+@pytest.mark.parametrize("below", [0.0, 0.2])
+def test_a_rest_without_noise_may_have_other_reasons_than_a_limit(below):
+    """Padded, or below the range of the sensor: it was a limit for both, and the dead time good."""
+    u = np.where(TIME < 6, 0.0, 1.0)
+    y = clipped(u, 9.0, "behind") - below
+    y = np.where(TIME < 8, 0.0, y) if below == 0 else np.maximum(y, 0.0)
+    fit = fitted(u, y, structures=FEW)
+    assert "output_at_limit" not in codes(fit)
+    assert "stuck_output" in codes(fit)
+    assert fit.verdicts[0].level != "good"
+
+
 def test_a_limit_that_leaves_no_response_is_told():
     u = np.where(TIME < 6, 0.0, 1.0)
     fit = fitted(u, clipped(u, 0.012, "behind"), structures=[(1, 1)])
