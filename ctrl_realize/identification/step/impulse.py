@@ -11,6 +11,7 @@ from ...data import FilterSpec, ImpulseResponse, StepResponse
 from ...errors import OptionError
 from ...numerics.arrays import FloatArray
 from ...numerics.signals.filters import central_difference, low_pass, settling_samples
+from ...numerics.signals.noise import quantisation_step, rest_noise
 from ...numerics.signals.onset import rise_time
 
 BANDWIDTH_TIMES_RISE = 0.35
@@ -19,6 +20,11 @@ BANDWIDTH_TIMES_RISE = 0.35
 CUTOFF_OVER_BANDWIDTH = 13.0
 """Automatic cut-off: below 8 the filter distorts the response, above 15 it passes too much
 noise."""
+
+_QUIET = 1e-5
+"""Noise over the range of a step response, up to which no filter is better: a zero-phase one begins
+before the response. Of ten delays of a scan without noise 10 are right, with the filter 0; the
+intervals of 10 hold without it, of 7 with it, up to 1e-5; of 6 and 7 at 1e-4, of 1 and 9 at 1e-3."""
 
 
 def impulse_from_step(
@@ -36,8 +42,8 @@ def impulse_from_step(
     step : StepResponse
     cutoff_hz : float, "auto" or None, optional
         Cut-off of the Butterworth low-pass in Hz; the paper's is 50 Hz. ``"auto"``: 13 times the
-        bandwidth of the step response (no filter if that is beyond 0.45 of the sample rate); None:
-        no filter.
+        bandwidth of the step response (no filter if that is beyond 0.45 of the sample rate, or if
+        the noise is less than 1e-5 of the response); None: no filter.
     filter_order : int, optional
         The paper's is 5.
     zero_phase : bool, optional
@@ -116,7 +122,9 @@ def _cutoff(step: StepResponse, cutoff_hz: float | str | None) -> float | None:
         cutoff_hz = one_of(cutoff_hz, "cutoff_hz", ("auto",))
         rise = rise_time(step.output, step.dt)
         cutoff = CUTOFF_OVER_BANDWIDTH * BANDWIDTH_TIMES_RISE / rise
-        return cutoff if cutoff < 0.45 * rate else None
+        noise = rest_noise(step.pre_step, step.output, quantisation_step(step.output))[0]
+        quiet = noise <= _QUIET * float(np.ptp(step.output))
+        return None if quiet or cutoff >= 0.45 * rate else cutoff
     cutoff = positive(cutoff_hz, "cutoff_hz", "cut-off in Hz")
     if cutoff >= rate / 2:
         raise OptionError(

@@ -1,5 +1,6 @@
 """From a measured step to an impulse response."""
 
+import control as ct
 import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
@@ -129,3 +130,17 @@ def test_measured_records_have_one_step_where_it_is(shared_data):
         edge = cr.detect_step(cr.read_record(shared_data / name))
         assert (edge.index, len(edge.edges)) == (index, 1)
         assert_allclose(edge.amplitude, amplitude, atol=0.01)
+
+
+def test_without_noise_no_filter_moves_the_delay_of_a_scan():
+    """The filter began before the response: the scan was up to 11 samples early, at order 5."""
+    k = np.arange(600)
+    u = np.where(k < 100, 0.0, 1.0)
+    plant = cr.delayed_ss(ct.tf([1], [20 * 37, 57, 1]), dead_time=12, dt=1)
+    y = np.ravel(plant.simulate(u))
+    system = cr.identify(cr.Record(1.0 * k, u, y), method="scan")
+    assert system.delay == 12
+    assert system.fit.order == 2
+    # at rest a coarse converter has no noise either, and its steps have to be filtered
+    rounded = cr.unit_step(cr.Record(1.0 * k, u, np.round(y / 0.02) * 0.02))
+    assert cr.impulse_from_step(rounded).filter is not None
