@@ -6,10 +6,10 @@ The rule:
    plant, as chosen by the information criterion; a free response needs strong evidence, a drift
    very strong evidence. Neither is taken if the gain is then not determined.
 1. All structures are fitted to the whole record; the one with the lowest information criterion
-   is the model, and its residual is compared with the noise before the step. A larger residual counts
-   as noise, too, if it is white, or not much larger and no larger than that long after the step. If
-   the residual is at noise level and the noise was coloured before the step already, all structures
-   are fitted again with prewhitening.
+   is the model, and its residual is compared with the noise before the step. A larger residual
+   counts as noise, too, if it is white, or not much larger and no larger than that long after the
+   step. If the residual is at noise level and the noise was coloured before the step already, all
+   structures are fitted again with prewhitening.
 2. If the residual is at noise level, the dead time is that of the model, and its interval spans the
    95 % profile-likelihood intervals of all structures that the data cannot rule out, including
    chains of four to eight nearly equal lags, diffusion and axial dispersion. If dispersion fits

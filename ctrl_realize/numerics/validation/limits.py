@@ -82,7 +82,7 @@ def at_limit(output: FloatArray) -> list[tuple[float, BoolArray]]:
     for end in at:
         samples, equal = np.zeros(output.size, dtype=bool), np.abs(values - end) <= nothing
         runs = _joined(np.flatnonzero(equal), _GAP)
-        if runs == [(0, np.count_nonzero(equal) - 1)]:
+        if runs == [(0, int(np.count_nonzero(equal)) - 1)]:
             continue  # a rest without noise, as of a coarse converter: it cuts none
         for first, last in runs:
             samples[rows[first] : rows[last] + 1] = True
