@@ -44,6 +44,12 @@ def without_gaps(values: FloatArray) -> FloatArray:
     return np.interp(index, index[~missing], values[~missing])
 
 
+def runs(true: BoolArray) -> tuple[IntArray, IntArray]:
+    """First positions of runs of True, and the positions after them."""
+    ends = np.flatnonzero(np.diff(np.concatenate([[False], true, [False]]).astype(np.int8)))
+    return ends[::2], ends[1::2]
+
+
 def later(values: FloatArray, samples: int) -> FloatArray:
     """Delay signals (..., N) that were zero before their first sample."""
     if samples == 0:

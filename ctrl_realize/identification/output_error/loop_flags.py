@@ -10,7 +10,7 @@ from scipy.special import ndtr
 from ..._flags import Flag, flagged
 from ..._wording import chosen, in_time, interval_in_time
 from ...data import Record
-from ...numerics.arrays import BoolArray, FloatArray
+from ...numerics.arrays import BoolArray, FloatArray, runs
 from ...numerics.constants import Z_95
 from ...numerics.engine.plausible_models import PlausibleModel
 from ...numerics.loops.relay import switched_by_relay
@@ -71,8 +71,7 @@ def loop_choices(record: Record) -> Iterator[str]:
 
 def _spans(record: Record, where: BoolArray) -> str:
     """Longest stretches of some samples in words, the first three; short ones are left out."""
-    edges = np.flatnonzero(np.diff(np.r_[False, where, False])).reshape(-1, 2)
-    longest = [(a, b - 1) for a, b in edges if b - a >= _STRETCH][:3]
+    longest = [(a, b - 1) for a, b in zip(*runs(where), strict=True) if b - a >= _STRETCH][:3]
     time = record.time
     return ", ".join(interval_in_time(float(time[a]), float(time[b])) for a, b in longest)
 

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from ..._flags import Flag, flagged
-from ...numerics.arrays import FloatArray
+from ...numerics.arrays import FloatArray, runs
 
 FLAT = 1.05
 """IAE relative to the smallest, up to which delays count as equally good."""
@@ -38,9 +38,7 @@ def flat_set(iae: FloatArray, delay: int, rounding: float) -> tuple[int, int]:
 
 def local_minima(iae: FloatArray, delay: int, rounding: float) -> int:
     """Count the separate minima of the curve within 5 % of the smallest IAE."""
-    level = FLAT * iae[delay] + rounding
-    inside = np.concatenate([[False], iae <= level, [False]])
-    return int(np.count_nonzero(inside[1:] & ~inside[:-1]))
+    return len(runs(iae <= FLAT * iae[delay] + rounding)[0])
 
 
 def curve_flags(iae: FloatArray, delay: int, rounding: float) -> Iterator[Flag]:

@@ -19,7 +19,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..arrays import FloatArray
+from ..arrays import FloatArray, runs
 from ..constants import SMALLEST, VERY_STRONG
 from ..engine.problem import Problem, Structure
 from ..engine.structures import (
@@ -209,10 +209,8 @@ def _residual(problem: Problem, found: Sequence[Candidate]) -> FloatArray:
 
 def _spikes(residual: FloatArray, limit: float) -> FloatArray:
     """What is beyond a limit (M,), where it is few samples in a row."""
-    beyond = np.abs(residual) > limit
-    edges = np.flatnonzero(np.diff(beyond.astype(np.int64), prepend=0, append=0))
     found = np.zeros(residual.size)
-    for first, end in edges.reshape(-1, 2).tolist():
+    for first, end in zip(*runs(np.abs(residual) > limit), strict=True):
         if end - first <= _SPIKE:
             found[first:end] = residual[first:end] - np.clip(residual[first:end], -limit, limit)
     return found

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import median_filter
 
-from ..arrays import FloatArray
+from ..arrays import FloatArray, runs
 
 
 def running_median(values: FloatArray, length: int) -> FloatArray:
@@ -41,8 +41,7 @@ def widest_run(good: NDArray[np.bool_], frequency: FloatArray) -> NDArray[np.boo
     >>> print(widest_run(np.array([1, 1, 1, 0, 1, 1], bool), f))
     [ True  True  True False False False]
     """
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], good.astype(int), [0]])))
-    starts, stops = edges[::2], edges[1::2]
+    starts, stops = runs(good)
     # Frequency zero has no octaves below the first positive one.
     lowest = frequency[frequency > 0].min() if np.any(frequency > 0) else 1.0
     octaves = np.log2(np.maximum(frequency, lowest))

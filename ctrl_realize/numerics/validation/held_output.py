@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..arrays import BoolArray, FloatArray, IntArray
+from ..arrays import BoolArray, FloatArray, IntArray, runs
 from ..signals.noise import rounding_error
 
 _FAST = 0.2
@@ -110,7 +110,7 @@ def _static(output: FloatArray, inputs: FloatArray, at: IntArray, rounding: floa
 
 def longest_hold(output: FloatArray, fitted: FloatArray) -> int:
     """Longest time in samples for which an output is constant while the model moves."""
-    starts, ends = _runs(_held(output, fitted)[0])
+    starts, ends = runs(_held(output, fitted)[0])
     return int((ends - starts).max(initial=0))
 
 
@@ -124,7 +124,7 @@ def _held(output: FloatArray, fitted: FloatArray) -> tuple[BoolArray, BoolArray]
     moving = (moves >= _FAST * moves.max(initial=0.0)) & (moves > 0)
     held = _repeats(output) & moving
     way = np.concatenate([[0.0], np.cumsum(moves)])
-    starts, ends = _runs(held)
+    starts, ends = runs(held)
     rounded = way[ends] - way[starts] <= _converter_step(output)
     for start, end in zip(starts[rounded], ends[rounded], strict=True):
         held[start:end] = False
@@ -143,12 +143,6 @@ def _converter_step(output: FloatArray) -> float:
     return step if alike.mean() > _MOST else 0.0
 
 
-def _runs(true: BoolArray) -> tuple[IntArray, IntArray]:
-    """First positions of runs of True, and the positions after them."""
-    ends = np.flatnonzero(np.diff(np.concatenate([[False], true, [False]]).astype(np.int8)))
-    return ends[::2], ends[1::2]
-
-
 def stuck_samples(output: FloatArray, fitted: FloatArray) -> tuple[int, int]:
     """First and last sample of the longest run of equal values that noise does not explain.
 
@@ -157,7 +151,7 @@ def stuck_samples(output: FloatArray, fitted: FloatArray) -> tuple[int, int]:
     the model moves.
     """
     same = _repeats(output)
-    starts, ends = _runs(same)
+    starts, ends = runs(same)
     if not starts.size:
         return 0, 0
     longest = int(np.argmax(ends - starts))
