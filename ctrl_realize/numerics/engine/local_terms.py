@@ -26,7 +26,7 @@ References
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import cached_property
 from itertools import pairwise
 from typing import Any, NamedTuple
 
@@ -275,12 +275,4 @@ def solve_upper(r: FloatArray, right: FloatArray) -> FloatArray:
 
 def triangle(columns: FloatArray) -> FloatArray:
     """Triangular factor (B, k, k) of columns (B, m, k) with m >= k; fewer rows if m < k."""
-    # What LAPACK leaves, without the reflections below; `mode="r"` takes as long again for that.
-    left = np.swapaxes(np.linalg.qr(columns, mode="raw")[0], 1, 2)
-    rows = min(left.shape[1:])
-    return np.asarray(left[:, :rows] * _upper(rows, left.shape[2]))
-
-
-@lru_cache(maxsize=64)
-def _upper(rows: int, columns: int) -> FloatArray:
-    return np.triu(np.ones((rows, columns)))
+    return np.asarray(np.linalg.qr(columns, mode="r"))
