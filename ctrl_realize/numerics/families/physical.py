@@ -99,27 +99,16 @@ def fitted_parameters(
         slope = np.polyval(np.polyder(numerator[::-1]), zeros)
         powers = zeros[:, None] ** np.arange(numerator.size)
         zero_slopes[:, theta.size :] = -powers / np.where(slope == 0, np.inf, slope)[:, None]
-    gain = float(numerator[0] / np.prod(-poles[kept]).real)
-    of_gain = -gain * np.sum(pole_slopes[kept] / poles[kept, None], axis=0).real
+    found = process_parameters(poles, numerator, float(theta[0]), length)
+    of_gain = -found[0].value * np.sum(pole_slopes[kept] / poles[kept, None], axis=0).real
     of_gain[theta.size] += 1.0 / np.prod(-poles[kept]).real
-    rows: list[tuple[str, float, FloatArray]] = [
-        ("gain", gain, of_gain),
-        ("dead_time", float(theta[0]), np.eye(size)[0]),
-    ]
-    for roots, slopes, names in (
-        (poles[kept], pole_slopes[kept], ("lag", "pair")),
-        (zeros, zero_slopes, ("lead", "zero")),
-    ):
-        rows += [
-            (name, value, (factor * slopes[index]).real)
-            for name, value, index, factor in _factors(roots, *names)
-        ]
+    gradients = [of_gain, np.eye(size)[0]]
+    for roots, slopes in ((poles[kept], pole_slopes[kept]), (zeros, zero_slopes)):
+        factors = _factors(roots, "real", "pair")
+        gradients += [(factor * slopes[index]).real for _, _, index, factor in factors]
     errors = local_errors(problem, candidate, numerator, length)
-    std = errors.std(np.stack([gradient for _, _, gradient in rows]), variance)
-    return tuple(
-        ProcessParameter(name, value, float(error))
-        for (name, value, _), error in zip(rows, std, strict=True)
-    )
+    std = errors.std(np.stack(gradients), variance).tolist()
+    return tuple(one._replace(std=error) for one, error in zip(found, std, strict=True))
 
 
 def _factors(roots: ComplexArray, real: str, pair: str) -> list[tuple[str, float, int, complex]]:
