@@ -17,7 +17,7 @@ import numpy as np
 from ..arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from .poles import poles_from_parameters
 from .problem import KnownFactor
-from .responses import HeldInput
+from .responses import HeldInput, StepSequence
 
 
 class RealModes:
@@ -77,9 +77,8 @@ def respond(
     drive: HeldInput, known: KnownFactor, numerator: FloatArray, parameters: FloatArray
 ) -> FloatArray:
     """Response (m,) of one model, numerator (n - r + 1,), parameters (1 + n,)."""
-    parts = [
-        responses(piece, known, numerator[None], parameters[None])[0] for piece in drive.pieces()
-    ]
+    pieces = drive.pieces() if isinstance(drive, StepSequence) else [drive]
+    parts = [responses(piece, known, numerator[None], parameters[None])[0] for piece in pieces]
     return np.concatenate(parts) if len(parts) > 1 else parts[0]
 
 

@@ -24,7 +24,6 @@ References
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, Protocol, TypeAlias
@@ -44,13 +43,6 @@ _DISTANT = 20.0  # widths of a bin from an arrival, from which on two samples st
 
 class HeldInput(Protocol):
     """An input that is constant between its changes."""
-
-    def pieces(self) -> Sequence[HeldInput]:
-        """Inputs whose concatenated responses are the response to this one.
-
-        The complete input, as for a recursion, which needs all of it.
-        """
-        return [self]
 
     def modes(self, tau: FloatArray, poles: ComplexArray) -> Modes:
         """Evaluate H, E and T for dead times (B,) and poles (B, J)."""
@@ -92,7 +84,7 @@ class StepSequence:
     samples: FloatArray | None = None
 
     def pieces(self) -> list[StepSequence]:
-        """Divide the bins into short sequences, to limit the memory."""
+        """Short sequences whose concatenated responses are the response to this one: memory."""
         stops = range(PIECE, self.first.size, PIECE)
         parts = zip(np.split(self.first, stops), np.split(self.width, stops), strict=True)
         pieces = [replace(self, first=first, width=width) for first, width in parts]

@@ -43,10 +43,6 @@ class Sines:
 
     omega: FloatArray
 
-    def pieces(self) -> list[Sines]:
-        """All points."""
-        return [self]
-
     def modes(self, tau: FloatArray, poles: ComplexArray) -> tuple[FloatArray, Any, Any]:
         """Evaluate H, E and T of every row; see `engine.responses`."""
         s = 1j * self.omega
@@ -82,10 +78,6 @@ class HeldSines:
 
     omega: FloatArray
     step: float
-
-    def pieces(self) -> list[HeldSines]:
-        """All points."""
-        return [self]
 
     def modes(self, tau: FloatArray, poles: ComplexArray) -> tuple[FloatArray, Any, Any]:
         """Evaluate H, E and T of every row; see `engine.responses`."""
