@@ -276,16 +276,18 @@ def _fall_back(
         (size, size), matvec=lambda v: stack(v.reshape(1, -1))[0].copy(), dtype=np.float64
     )
     # ARPACK restarts Lanczos. One pair more than wanted: users are warned when there is no gap.
-    values, vectors = eigsh(operator, k=count + 1, which="LM", v0=start)
-    order = np.argsort(-np.abs(values), kind="stable")
-    leading = order[:count]
-    following = float(abs(values[order[count]]))
-    result.put(d, values[leading], np.ascontiguousarray(vectors[:, leading].T), following)
+    result.put(d, *_leading(*eigsh(operator, k=count + 1, which="LM", v0=start), count))
 
 
 def _dense(h: FloatArray, size: int, count: int) -> tuple[FloatArray, FloatArray, float]:
     """Solve one matrix in full."""
-    values, vectors = np.linalg.eigh(hankel_matrix(h, size, size))
+    return _leading(*np.linalg.eigh(hankel_matrix(h, size, size)), count)
+
+
+def _leading(
+    values: FloatArray, vectors: FloatArray, count: int
+) -> tuple[FloatArray, FloatArray, float]:
+    """Eigenvalues of the largest magnitudes, their vectors as rows, and the next magnitude."""
     order = np.argsort(-np.abs(values), kind="stable")
-    following = float(abs(values[order[count]])) if count < size else 0.0
+    following = float(abs(values[order[count]])) if count < values.size else 0.0
     return values[order[:count]], np.ascontiguousarray(vectors[:, order[:count]].T), following
