@@ -59,14 +59,12 @@ class NoiseModel(Result):
     @property
     def sigma(self) -> float:
         """Standard deviation of the noise itself, in the unit of the output."""
-        response = lfilter([1.0], self._denominator, np.eye(1, self._memory)[0])
-        return self.std * float(np.linalg.norm(response))
+        return self.std * float(np.linalg.norm(self._response))
 
     @property
     def correlation_time(self) -> float:
         """Samples that count as one for means over many: 1 for white noise."""
-        response = lfilter([1.0], self._denominator, np.eye(self._memory)[0])
-        return float(np.sum(response) ** 2 / np.sum(response**2))
+        return float(np.sum(self._response) ** 2 / np.sum(self._response**2))
 
     def predict(self, residual: ArrayLike) -> FloatArray:
         """Predict every sample of a residual (N,) from those before it, one step ahead.
@@ -86,6 +84,11 @@ class NoiseModel(Result):
     @property
     def _denominator(self) -> FloatArray:
         return np.concatenate([[1.0], -self.coefficients])
+
+    @property
+    def _response(self) -> FloatArray:
+        """Noise after an innovation of 1."""
+        return np.asarray(lfilter([1.0], self._denominator, np.eye(1, self._memory)[0]))
 
     @property
     def _memory(self) -> int:

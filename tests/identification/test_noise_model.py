@@ -87,3 +87,8 @@ def test_a_plant_is_disturbed_by_the_noise_of_a_fit(fit):
     assert cr.bench.relay_test(noisy, rng=1).n_samples > 100
     with pytest.raises(cr.errors.OptionError, match=r"sample time of 0.5 s, the plant 1 s"):
         cr.bench.tank().disturbed_by(fit.noise_model)
+
+
+def test_the_correlation_time_of_very_slow_noise_takes_no_memory():
+    noise = cr.identification.NoiseModel(np.array([0.9999]), 0.1, 1.0)
+    assert noise.correlation_time == pytest.approx((1 + 0.9999) / (1 - 0.9999), rel=1e-6)  # AR(1)
