@@ -36,8 +36,10 @@ def shown_unit(unit: str) -> str:
 
 
 @contextmanager
-def times_in(unit: str) -> Iterator[None]:
+def times_in(unit: str | None) -> Iterator[None]:
     """Write times in a unit, such as that of a record, in the block; s is s, ms or µs by size.
+
+    None leaves the unit of the block around it.
 
     Examples
     --------
@@ -46,7 +48,7 @@ def times_in(unit: str) -> Iterator[None]:
     ...     in_time(2700.0), in_time(3.0)
     ('45 min', '0.05 min')
     """
-    token = _SHOWN.set(unit)
+    token = _SHOWN.set(unit or _SHOWN.get())
     try:
         yield
     finally:

@@ -115,10 +115,12 @@ class Result(Drawable):
 
     def report(self) -> str:
         """Return the result as plain text, choices and flags included."""
-        return self._card().text()
+        with times_in(getattr(self, "time_unit", None)):
+            return self._card().text()
 
     def _repr_html_(self) -> str:
-        return self._card().html()
+        with times_in(getattr(self, "time_unit", None)):
+            return self._card().html()
 
 
 class ModelFit(Result):
@@ -350,11 +352,7 @@ class ModelFit(Result):
         """
         unit = self.time_unit if time_unit is None else checked_time_unit(time_unit)
         with times_in(unit):
-            return super().report()
-
-    def _repr_html_(self) -> str:
-        with times_in(self.time_unit):
-            return super()._repr_html_()
+            return self._card().text()
 
     @property
     def formula(self) -> str:

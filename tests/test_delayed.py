@@ -52,6 +52,43 @@ def test_a_fit_survives_copies_and_names_but_not_algebra():
     assert (2 * S).fit is None
 
 
+CONNECTED = {
+    "channel": lambda m: m[0, 0],
+    "number": lambda m: 2 * m,
+    "sign": lambda m: -m,
+    "power": lambda m: m**2,
+    "product": lambda m: m * CONTROLLER,
+    "later factor": lambda m: cr.DelaySystem(CONTROLLER) * m,
+    "sum": lambda m: valve(3) + m,
+    "loop": lambda m: ct.feedback(m * CONTROLLER),
+    "channel of a loop": lambda m: ct.feedback(m * CONTROLLER)[0, 0],
+    "around another": lambda m: cr.DelaySystem(CONTROLLER).feedback(m),
+    "appended": lambda m: valve(3).append(m),
+    "around a delay": lambda m: cr.DelayedStateSpace(m, 2),
+    "continuous": lambda m: cr.design.to_continuous(m).system,
+    "sampled": lambda m: cr.design.to_discrete(cr.design.to_continuous(m), dt=2 * TS),
+    "sampled loop": lambda m: cr.design.to_continuous(m).system.to_discrete(TS),
+    "reduced": lambda m: cr.design.reduce(m + 0.1 * m**2, 2),
+    "by names": lambda m: cr.interconnect(
+        [m, ct.summing_junction(["r", "-y"], "u")], inputs="r", outputs="y"
+    ),
+}
+
+
+@pytest.mark.parametrize("connected", CONNECTED.values(), ids=CONNECTED)
+def test_what_is_made_of_a_model_in_minutes_is_in_minutes(connected, tmp_path):
+    made = connected(valve(2, inputs="u", outputs="y", time_unit="min"))
+    cr.save_model(tmp_path / "made.json", made)
+    again = pickle.loads(pickle.dumps(made)), made.copy("b"), cr.load_model(tmp_path / "made.json")
+    assert [each.time_unit for each in (made, *again)] == ["min"] * 4
+
+
+def test_a_model_has_the_unit_of_its_fit():
+    fit = FitSummary("Fit", "found here", (), values=(("time_unit", "h"),))
+    assert (valve(2).time_unit, valve(2).replace(fit=fit).time_unit) == ("s", "h")
+    assert (2 * valve(2).replace(fit=fit)).time_unit == "h"
+
+
 def test_a_fit_that_is_none_is_refused():
     with pytest.raises(OptionError, match="fit is a dict; expected None or"):
         valve(2).replace(fit={"found": "here"})

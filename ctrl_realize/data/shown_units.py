@@ -39,13 +39,26 @@ def shown_time_unit(given: Any) -> str:
     return "s"
 
 
+def unit_among(*given: Any) -> str:
+    """Unit of time of the first that has another one than the second.
+
+    Examples
+    --------
+    >>> import ctrl_realize as cr
+    >>> from ctrl_realize.data.shown_units import unit_among
+    >>> record = cr.Record([0, 60, 120], [0, 1, 1], [0, 0, 1], units={"time": "min"})
+    >>> unit_among(0.5, record), unit_among()
+    ('min', 's')
+    """
+    return next((unit for unit in map(shown_time_unit, given) if unit != "s"), "s")
+
+
 def in_shown_units(function: Callable[P, T]) -> Callable[P, T]:
     """Write times in the unit of the first argument that has one while a function runs."""
 
     @functools.wraps(function)
     def writing(*args: P.args, **kwargs: P.kwargs) -> T:
-        units = map(shown_time_unit, (*args, *kwargs.values()))
-        with times_in(next((unit for unit in units if unit != "s"), "s")):
+        with times_in(unit_among(*args, *kwargs.values())):
             return function(*args, **kwargs)
 
     return writing

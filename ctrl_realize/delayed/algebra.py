@@ -22,7 +22,8 @@ class DelayedAlgebra(CoreAndDelays, DelayOperators):
         return delayed_ends(form, self.input_delays, self.output_delays)
 
     def _around(self, core: ct.StateSpace, **changes: Any) -> Self:
-        settings = {"output_delay": self.output_delays, **signals_of(self), **changes}
+        settings = {**signals_of(self), "time_unit": self.time_unit, **changes}
+        settings.setdefault("output_delay", self.output_delays)
         states = self._core_states()
         if len(states) == core.nstates:  # python-control numbers the states again
             core = named(core, core.input_labels, core.output_labels, states)

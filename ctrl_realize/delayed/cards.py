@@ -7,6 +7,7 @@ import numpy as np
 
 from .._shown import Card, ShownSystem, as_code
 from .._wording import in_time
+from ..data.shown_units import in_shown_units
 from ..numerics.arrays import ComplexArray
 from .parts import CoreAndDelays
 
@@ -46,6 +47,7 @@ class DelayedCards(ShownSystem, CoreAndDelays):
         lines = [self._line(), "", "core:", *matrix_lines(self._core), f"times {self._shift()}"]
         return "\n".join(lines)
 
+    @in_shown_units
     def _card(self) -> Card:
         name = "" if self._generic_name_check() else f" {self.name}"
         signals = f"{', '.join(self.input_labels)} → {', '.join(self.output_labels)}"

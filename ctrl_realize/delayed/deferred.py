@@ -8,6 +8,8 @@ from typing import Any
 import control as ct
 import numpy as np
 
+from .._parameters import checked_time_unit
+from ..data.shown_units import shown_time_unit
 from ..errors import DelayRangeError
 from ..numerics.arrays import FloatArray, Matrices
 from ..numerics.internal_delays.form import DelayForm
@@ -35,6 +37,7 @@ class DeferredMatrices(ct.StateSpace, ABC):  # type: ignore[misc]  # control is 
     def _begin(self, states: list[str] | int, nstates: int, dt: float | None, **names: Any) -> None:
         """Set up the system without matrices; `states` are those without the delay line."""
         self._locked = False
+        self._time_unit = checked_time_unit(names.pop("time_unit", "s"))
         # Not StateSpace.__init__, which needs the matrices.
         ct.NonlinearIOSystem.__init__(
             self, self._next_state, self._output, states=states, dt=dt, **names
@@ -44,6 +47,12 @@ class DeferredMatrices(ct.StateSpace, ABC):  # type: ignore[misc]  # control is 
         self._registers = nstates - (states if isinstance(states, int) else len(states))
         self._state_names = None
         self._augmented = None
+
+    @property
+    def time_unit(self) -> str:
+        """Unit in which plots and cards write times: as given, otherwise that of the fit, or s."""
+        fitted = shown_time_unit(getattr(self, "fit", None))
+        return fitted if self._time_unit == "s" else self._time_unit
 
     @abstractmethod
     def _form(self) -> DelayForm:

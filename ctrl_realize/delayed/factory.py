@@ -29,6 +29,7 @@ def delayed_ss(
     name: str | None = None,
     inputs: str | Sequence[str] | None = None,
     outputs: str | Sequence[str] | None = None,
+    time_unit: str = "s",
 ) -> DelayedStateSpace:
     """Add a dead time to a system.
 
@@ -45,7 +46,7 @@ def delayed_ss(
         same order with feedthrough and the delay d + 1.
     dt : float, optional
         Sample time in s for a continuous core.
-    output_delay, fit, name, inputs, outputs
+    output_delay, fit, name, inputs, outputs, time_unit
         As for `DelayedStateSpace`.
 
     Returns
@@ -91,7 +92,7 @@ def delayed_ss(
     system = core if isinstance(core, ct.StateSpace) else ct.ss(core)
     made = partial(
         DelayedStateSpace, output_delay=output_delay, fit=fit, name=name, inputs=inputs,
-        outputs=outputs,
+        outputs=outputs, time_unit=time_unit,
     )  # fmt: skip
     dead_time = None if dead_time is None else real(dead_time, "dead_time", "dead time in s, >= 0")
     if dead_time is not None and dead_time < 0:

@@ -9,6 +9,7 @@ from typing import Any
 import control as ct
 import numpy as np
 
+from ..data.shown_units import unit_among
 from ..errors import UnsuitableSystemError
 from ..numerics.internal_delays import form as forms
 from .inside.system import DelaySystem
@@ -64,7 +65,8 @@ def interconnect(systems: Sequence[Any], *args: Any, **settings: Any) -> Any:
     loop = forms.through(loop, of_outputs + of_inputs @ gain, into)
     total = forms.parallel(loop, forms.static(of_inputs @ into))
     labels = wired.input_labels, wired.output_labels
-    return DelaySystem._joined(total, dt, *labels, _state_names(systems), name=wired.name)
+    settings = {"dt": dt, "time_unit": unit_among(*systems), "name": wired.name}
+    return DelaySystem._joined(total, *labels, _state_names(systems), **settings)
 
 
 def _state_names(systems: Sequence[Any]) -> list[str]:

@@ -9,6 +9,7 @@ from typing import Any
 import control as ct
 import numpy as np
 
+from ..data.shown_units import unit_among
 from ..errors import DelayRangeError, OptionError, UnsuitableSystemError
 from ..numerics.internal_delays import form as forms
 from ..numerics.internal_delays.form import DelayForm
@@ -119,6 +120,11 @@ def common_dt(first: Any, second: Any) -> float | None:
             "(sys.to_discrete(dt), design.to_discrete)"
         )
     return float(bases[0])
+
+
+def time_base(first: Any, second: Any = None) -> dict[str, Any]:
+    """Sample time of a connection, and the unit in which its times are written."""
+    return {"dt": common_dt(first, second), "time_unit": unit_among(first, second)}
 
 
 def core_states(system: Any, form: DelayForm) -> list[str]:

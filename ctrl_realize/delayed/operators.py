@@ -17,7 +17,6 @@ from .deferred import DeferredMatrices
 from .operands import (
     Numbers,
     check_divisor,
-    common_dt,
     core_states,
     everywhere,
     form_of,
@@ -28,6 +27,7 @@ from .operands import (
     plain,
     product,
     shapes,
+    time_base,
 )
 from .parts import signals_of
 
@@ -52,15 +52,16 @@ class DelayOperators(DeferredMatrices):
     def _joined(
         cls,
         form: DelayForm,
-        dt: float | None,
         inputs: Sequence[str] | None = None,
         outputs: Sequence[str] | None = None,
         states: Sequence[str] | None = None,
+        *,
+        dt: float | None,
         **names: Any,
     ) -> Any:
         """Make the system of a form, with the fewest delays; only unique names are kept.
 
-        `states` are names for those of the core.
+        `states` are names for those of the core, `names` are settings of the system.
         """
         with solvable("its delays of 0 s"):
             form = merged(form)
@@ -88,7 +89,7 @@ class DelayOperators(DeferredMatrices):
     def _scaled(self, factor: float) -> Any:
         form, labels = self._form(), (self.input_labels, self.output_labels)
         scaled = forms.through(form, np.eye(form.outputs), factor * np.eye(form.inputs))
-        return self._joined(scaled, self.dt, *labels, core_states(self, form))
+        return self._joined(scaled, *labels, core_states(self, form), **time_base(self))
 
     def __neg__(self) -> Any:
         return self._scaled(-1.0)
@@ -106,8 +107,8 @@ class DelayOperators(DeferredMatrices):
         if (mine.outputs, mine.inputs) != (theirs.outputs, theirs.inputs):
             raise OptionError(f"systems {shapes(mine, theirs)} cannot be added")
         total = forms.parallel(mine, theirs)
-        dt = common_dt(self, other)
-        return self._joined(total, dt, self.input_labels, self.output_labels)
+        base = time_base(self, other)
+        return self._joined(total, self.input_labels, self.output_labels, **base)
 
     def __radd__(self, other: Any) -> Any:
         return self + other
@@ -137,7 +138,8 @@ class DelayOperators(DeferredMatrices):
         inputs = labels_of(before, "input_labels", self.input_labels)
         outputs = labels_of(after, "output_labels", self.output_labels)
         states = core_states(before, first) + core_states(after, second)
-        return self._joined(product(second, first), common_dt(self, other), inputs, outputs, states)
+        total = product(second, first)
+        return self._joined(total, inputs, outputs, states, **time_base(self, other))
 
     def __truediv__(self, other: Any) -> Any:
         """Series with the inverse of `other`, if that is proper."""
@@ -154,7 +156,7 @@ class DelayOperators(DeferredMatrices):
             form = forms.inverse(self._form())
         except np.linalg.LinAlgError:
             raise UnsuitableSystemError(improper_inverse(self.name)) from None
-        return self._joined(form, self.dt, self.output_labels, self.input_labels)
+        return self._joined(form, self.output_labels, self.input_labels, **time_base(self))
 
     def feedback(self, other: Any = 1, sign: float = -1) -> Any:
         """Close the loop with `other` in the feedback path; see `control.feedback`.
@@ -177,7 +179,8 @@ class DelayOperators(DeferredMatrices):
             )
         with solvable("the direct terms of both"):
             form = forms.feedback(forward, back, float(sign))
-        return self._joined(form, common_dt(self, other), self.input_labels, self.output_labels)
+        base = time_base(self, other)
+        return self._joined(form, self.input_labels, self.output_labels, **base)
 
     def append(self, other: Any) -> Any:
         """Append `other`; see `control.append`."""
@@ -185,7 +188,7 @@ class DelayOperators(DeferredMatrices):
         inputs = [*self.input_labels, *getattr(other, "input_labels", ["u"])]
         outputs = [*self.output_labels, *getattr(other, "output_labels", ["y"])]
         both = forms.append(self._form(), other_form)
-        return self._joined(both, common_dt(self, other), inputs, outputs)
+        return self._joined(both, inputs, outputs, **time_base(self, other))
 
     def lft(self, other: Any, nu: int = -1, ny: int = -1) -> Any:
         """Close `other` between the last outputs and inputs; see `control.StateSpace.lft`."""
@@ -201,7 +204,7 @@ class DelayOperators(DeferredMatrices):
         columns = [*range(m - nu), *range(m + ny, both.inputs)]
         with solvable("the direct terms of both"):
             form = forms.wired(both, gain, rows, columns)
-        return self._joined(form, common_dt(self, other))
+        return self._joined(form, **time_base(self, other))
 
 
 class BesideDelays(ct.StateSpace):  # type: ignore[misc]  # control is untyped

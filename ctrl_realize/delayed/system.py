@@ -57,6 +57,9 @@ class DelayedStateSpace(
         Names, as for `control.ss`. Default for signals: those of `core`, or ``u`` and ``y``. A dot,
         which python-control reserves for ``system.signal``, becomes an underscore: ``FIC101.OP`` of
         a record is ``FIC101_OP`` of its model.
+    time_unit : {"s", "ms", "min", "h", "day"}, optional
+        In which plots and cards write times; default: that of the fit. Products, sums, loops and
+        channels keep it.
 
     Attributes
     ----------
@@ -125,6 +128,7 @@ class DelayedStateSpace(
         name: str | None = None,
         inputs: str | Sequence[str] | None = None,
         outputs: str | Sequence[str] | None = None,
+        time_unit: str = "s",
     ) -> None:
         check_core(core)
         before = parse_delays(delay, core.ninputs, "delay", "input")
@@ -132,6 +136,7 @@ class DelayedStateSpace(
         if isinstance(core, DelayedStateSpace):
             before = tuple(a + b for a, b in zip(before, core.input_delays, strict=True))
             behind = tuple(a + b for a, b in zip(behind, core.output_delays, strict=True))
+            time_unit = core.time_unit if time_unit == "s" else time_unit
             core = core.delay_free
         if core.issiso():
             before, behind = (before[0] + behind[0],), (0,)
@@ -148,9 +153,8 @@ class DelayedStateSpace(
         output_names = signal_names(outputs, core.output_labels, "y")
         states = core.nstates + sum(before) + sum(behind)
         called = None if name is None else system_name(name)
-        self._begin(
-            core.nstates, states, core.dt, inputs=input_names, outputs=output_names, name=called
-        )
+        names = {"name": called, "inputs": input_names, "outputs": output_names}
+        self._begin(core.nstates, states, core.dt, time_unit=time_unit, **names)
         self._core = named(
             core, input_names, output_names, core.state_labels, name=f"{self.name}_core"
         )
@@ -173,7 +177,8 @@ class DelayedStateSpace(
 
     def _settings(self) -> dict[str, Any]:
         delays = {"delay": self.input_delays, "output_delay": self.output_delays}
-        return {**delays, "fit": self.fit, "name": self.name, **signals_of(self)}
+        own = {"fit": self.fit, "name": self.name, "time_unit": self._time_unit}
+        return {**delays, **own, **signals_of(self)}
 
     def _made_by(self) -> tuple[Any, ...]:
         return with_core, (type(self), *parts_of(self.delay_free)), self._settings()

@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 
 from .._shown import Card, ShownSystem
 from .._wording import in_time
+from ..data.shown_units import in_shown_units
 from ..delayed.operators import DelayOperators
 from ..numerics.arrays import ComplexArray, FloatArray, read_only
 from ..numerics.internal_delays.form import DelayForm
@@ -151,6 +152,7 @@ class DelayLineController(ShownSystem, DelayOperators):
             f"{self.line_length} samples, dt = {self.dt:.6g} s>"
         )
 
+    @in_shown_units
     def _card(self) -> Card:
         largest = float(np.abs(self.inner_poles).max(initial=0.0))
         line = f"{self.line_length} samples = {in_time(self.line_length * self.dt, 4)}"

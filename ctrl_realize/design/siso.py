@@ -8,6 +8,7 @@ import control as ct
 import numpy as np
 
 from .._checks import band
+from ..data.shown_units import unit_among
 from ..delayed import DelayedStateSpace, DelaySystem
 from ..delayed.operands import check_proper
 from ..delayed.parts import check_entries, check_single
@@ -44,7 +45,8 @@ def delayed_system(system: Any, purpose: str, *, siso: bool = True) -> DelayedSt
             f"{purpose} needs a discrete system with a sample time; {system.name!r} has "
             f"dt={system.dt!r}. Sample it with design.to_discrete(system, dead_time, dt)"
         )
-    return DelayedStateSpace(proper_ss(system, purpose), 0, name=system.name)
+    names = {"name": system.name, "time_unit": unit_among(system)}
+    return DelayedStateSpace(proper_ss(system, purpose), 0, **names)
 
 
 def is_continuous(system: Any) -> bool:

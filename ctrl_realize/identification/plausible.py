@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import control as ct
 import numpy as np
@@ -47,7 +48,7 @@ class PlausibleModels(Result):
     dt : float
         In s.
     time_unit : str
-        Of plots: min, h or day of the record, otherwise s.
+        Of plots and cards: min, h or day of the record, otherwise s.
 
     Examples
     --------
@@ -70,11 +71,10 @@ class PlausibleModels(Result):
     @cached_property
     def systems(self) -> tuple[DelayedStateSpace, ...]:
         """The models behind a hold, for simulation and design."""
+        base: dict[str, Any] = {"dt": self.dt, "time_unit": self.time_unit}
         return tuple(
-            delayed_ss(
-                continuous_core(one.numerator, one.poles), dead_time=one.dead_time, dt=self.dt
-            )
-            for one in self.models
+            delayed_ss(continuous_core(m.numerator, m.poles), dead_time=m.dead_time, **base)
+            for m in self.models
         )
 
     def frequency_response(self, omega: ArrayLike) -> ComplexArray:

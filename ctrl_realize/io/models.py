@@ -202,6 +202,7 @@ def _model_content(model: Model) -> dict[str, Any]:
         "name": model.name,
         **signals_of(model),
         **({"states": states} if named else {}),
+        **({"time_unit": model.time_unit} if model.time_unit != "s" else {}),
         "order": core.nstates,
         "dt": None if core.dt is None else float(core.dt),
         **delays,
@@ -218,6 +219,8 @@ def _model_from(content: Mapping[str, Any]) -> Model:
     if any("." in one for one in (name, *inputs, *outputs)):
         raise FileFormatError("a name contains a dot, which is not allowed in names of models")
     names: dict[str, Any] = {"name": name, "inputs": inputs, "outputs": outputs}
+    if "time_unit" in model:
+        names["time_unit"] = field(model, "time_unit", str)
     inside = "internal_delays" in model
     if inside and model.get("dt", 0.0) is None:  # a gain of any time base
         core = _core(model, None, len(inputs), len(outputs))

@@ -1,5 +1,7 @@
 """Margins against brute force, closed forms and closed loops."""
 
+import re
+
 import control as ct
 import numpy as np
 import pytest
@@ -334,3 +336,35 @@ def test_a_resonance_far_above_the_other_gain_is_counted(dead_time, stable):
     assert ct.feedback(plant).is_stable() is stable
     assert cr.design.margins(plant).stable is stable
     assert cr.design.margins(core, dead_time=dead_time).stable is stable
+
+
+def test_the_delay_margin_of_a_model_in_minutes_is_in_minutes():
+    # samples of one minute: as many minutes as samples
+    plant = cr.delayed_ss(ct.tf([2.0], [1200.0, 1]), dead_time=300.0, dt=60.0, time_unit="min")
+    pid = cr.design.pid(plant)
+    apart, at_once = cr.design.margins(plant, pid), cr.design.margins(plant * pid)
+    said = f"{apart.delay_margin_samples:.4g} min = {apart.delay_margin_samples:.4g} samples"
+    cards = [apart.report(), at_once.report(), pid.check.margins.report(), apart._repr_html_()]
+    assert [said in card for card in cards] == [True] * 4
+    hz = np.geomspace(1e-5, 5e-3, 200)
+    frf = cr.MeasuredFRF(plant(np.exp(2j * np.pi * hz * 60.0)), hz)
+    assert " min" in cr.design.margins(frf, pid).report()
+
+
+def test_cards_of_a_loop_in_minutes_have_no_seconds():
+    plant = cr.delayed_ss(ct.tf([2.0], [1200.0, 1]), dead_time=300.0, dt=60.0, time_unit="min")
+    pid = cr.design.pid(plant)
+    predictor = cr.design.smith_predictor(plant, pid)
+    found = [
+        cr.design.delay_robustness(plant, pid, (240.0, 360.0)),
+        cr.design.predictor_lqr(plant, 1.0, 1.0),
+        cr.design.to_continuous(plant),
+        cr.design.ultimate(plant),
+        predictor.check,
+        predictor,
+    ]
+    for card in found:
+        assert " min" in card.report(), card
+        assert not re.search(r"[1-9]\d* s\b", card.report()), card
+    for card in (plant, ct.feedback(plant * pid), predictor):
+        assert "5 min" in card._repr_html_(), card

@@ -175,6 +175,7 @@ def test_times_of_a_record_in_minutes_are_in_minutes_on_plots_of_what_comes_of_i
         system.fit.plausible_models.plot(),
         cr.load_model(tmp_path / "model.json").fit.plausible_models.plot(),
         cr.experiment.plan(system).using("one step").plot(),
+        (system[0, 0] * pid).plot(),
         cr.design.delay_robustness(system, pid).plot(),
     ]
     for each in drawn:

@@ -6,6 +6,7 @@ import control as ct
 
 from ..._shown import Card, ShownSystem, as_code
 from ..._wording import in_time
+from ...data.shown_units import in_shown_units
 from ..cards import matrix_lines
 from ..deferred import DeferredMatrices
 
@@ -46,6 +47,7 @@ class InsideCards(ShownSystem, DeferredMatrices):
         head = [self._line(), "", "core, the delays' inputs and outputs last:"]
         return "\n".join([*head, *matrix_lines(self._core)])
 
+    @in_shown_units
     def _card(self) -> Card:
         name = "" if self._generic_name_check() else f" {self.name}"
         signals = f"{', '.join(self.input_labels)} → {', '.join(self.output_labels)}"

@@ -112,8 +112,9 @@ class InsideConversions(DelayOperators):
             raise UnsuitableSystemError(f"{self.name!r} is already discrete")
         step = positive(dt, "dt", "sample time in s")
         names = self.input_labels, self.output_labels
+        base: dict[str, Any] = {"dt": step, "time_unit": self.time_unit}
         if (paths := paths_apart(self._form())) is not None:
-            return self._joined(_paths_sampled(*paths, step), step, *names)
+            return self._joined(_paths_sampled(*paths, step), *names, **base)
         before, behind, rest = ends_apart(self._form())
         rest = _held_apart(rest)
         ends = before, behind, rest.delays
@@ -124,7 +125,7 @@ class InsideConversions(DelayOperators):
         held = np.asarray(~driven.any(axis=1))
         core = _held(rest, step, held)
         form = forms.delayed_ends(replace(core, delays=tuple(map(float, inner))), entry, exit_)
-        made = self._joined(form, step, *names)
+        made = self._joined(form, *names, **base)
         if not held.all():
             self._state_error(made, step)
         return made
@@ -168,7 +169,8 @@ class InsideConversions(DelayOperators):
         whole = [[int(tau) for tau in end] for end in (before, behind)]
         found, entry, exit_ = continuous_ends(matrices_of(core), float(self.dt), *whole)
         made = forms.through(forms.delayed_ends(DelayForm(*found), entry, exit_), left, right)
-        return self._joined(made, 0, self.input_labels, self.output_labels)
+        base: dict[str, Any] = {"dt": 0.0, "time_unit": self.time_unit}
+        return self._joined(made, self.input_labels, self.output_labels, **base)
 
     def sample(
         self, Ts: float, method: str = "zoh", *, name: str | None = None, **settings: Any

@@ -18,7 +18,7 @@ from ...numerics.arrays import Matrices
 from ...numerics.internal_delays.form import DelayForm, through
 from ...numerics.internal_delays.merging import ends_apart
 from ...numerics.internal_delays.response import Response
-from ..operands import plain
+from ..operands import plain, time_base
 from ..operators import INSIDE, DelayOperators
 from ..parts import matrices_of, named, parts_of, signal_names, signals_of, stand_in, with_core
 from .cards import InsideCards
@@ -45,6 +45,8 @@ class DelaySystem(InsideResponses, InsideConversions, InsideCards, DelayOperator
         closed at once.
     name, inputs, outputs : optional
         Names of the system, of its m inputs and of its p outputs, as for `control.ss`.
+    time_unit : {"s", "ms", "min", "h", "day"}, optional
+        In which plots and cards write times.
 
     Attributes
     ----------
@@ -105,6 +107,7 @@ class DelaySystem(InsideResponses, InsideConversions, InsideCards, DelayOperator
         name: str | None = None,
         inputs: str | Sequence[str] | None = None,
         outputs: str | Sequence[str] | None = None,
+        time_unit: str = "s",
     ) -> None:
         delays = tuple(real(d, "internal_delays", "delays >= 0") for d in internal_delays)
         dt = check_core(core, delays)
@@ -119,7 +122,8 @@ class DelaySystem(InsideResponses, InsideConversions, InsideCards, DelayOperator
             q = len(delays)
         states = core.nstates + (int(sum(delays)) if dt else 0)
         called = None if name is None else system_name(name)
-        self._begin(core.nstates, states, dt, inputs=input_names, outputs=output_names, name=called)
+        names = {"inputs": input_names, "outputs": output_names, "name": called}
+        self._begin(core.nstates, states, dt, time_unit=time_unit, **names)
         into = [*input_names, *(f"w[{i}]" for i in range(q))]
         out = [*output_names, *(f"z[{i}]" for i in range(q))]
         self._core = named(core, into, out, core.state_labels, name=f"{self.name}_core")
@@ -146,7 +150,8 @@ class DelaySystem(InsideResponses, InsideConversions, InsideCards, DelayOperator
             In samples, or s in continuous time.
         """
         before, behind, rest = ends_apart(self._form())
-        made = DelaySystem(plain(rest, self.dt), rest.delays, **signals_of(self))
+        names = {**signals_of(self), "time_unit": self.time_unit}
+        made = DelaySystem(plain(rest, self.dt), rest.delays, **names)
         return made, before[0] + behind[0]
 
     def _make_matrices(self) -> Matrices:
@@ -176,16 +181,15 @@ class DelaySystem(InsideResponses, InsideConversions, InsideCards, DelayOperator
         left = np.eye(self.noutputs)[[self.output_index[name] for name in chosen.output_labels]]
         right = np.eye(self.ninputs)[:, [self.input_index[name] for name in chosen.input_labels]]
         form = through(self._form(), left, right)
-        made: Self = self._joined(
-            form, self.dt, chosen.input_labels, chosen.output_labels, name=f"{self.name}$indexed"
-        )
+        base = {"name": f"{self.name}$indexed", **time_base(self)}
+        made: Self = self._joined(form, chosen.input_labels, chosen.output_labels, **base)
         return made
 
     def minreal(self, tol: float = 0.0) -> Any:
         """Return the system itself: its structure already has the fewest delays."""
-        return self._joined(self._form(), self.dt, self.input_labels, self.output_labels)
+        return self._joined(self._form(), self.input_labels, self.output_labels, **time_base(self))
 
     def _made_by(self) -> tuple[Any, ...]:
-        names = {"name": self.name, **signals_of(self)}
+        names = {"name": self.name, **signals_of(self), "time_unit": self.time_unit}
         settings = {"internal_delays": self.internal_delays, **names}
         return with_core, (type(self), *parts_of(self._core)), settings

@@ -18,6 +18,7 @@ import control as ct
 import numpy as np
 
 from ..._checks import sample_time_of
+from ...data.shown_units import unit_among
 from ...delayed.parts import check_entries
 from ...errors import UnsuitableSystemError
 from ...numerics.arrays import ComplexArray, FloatArray
@@ -36,11 +37,14 @@ class Loop:
         Sample time in s; 0 for a continuous loop.
     dead_time : float
         Delay in s of a continuous loop, separate from its factors.
+    time_unit : str
+        In which results write times.
     """
 
     factors: tuple[Factor, ...]
     dt: float
     dead_time: float = 0.0
+    time_unit: str = "s"
 
     def variable(self, omega: FloatArray) -> ComplexArray:
         """Compute w = exp(j omega dt) - 1, or j omega for a continuous loop."""
@@ -174,7 +178,8 @@ def open_loop(plant: Any, controller: Any = None, dead_time: float = 0.0) -> Loo
             "sample the continuous one first (design.to_discrete, or .discretised(dt) of a PID)"
         )
     dt = bases.pop() if bases else 0.0
-    return Loop(tuple(factor(system, dt) for system in systems), dt, dead_time)
+    factors = tuple(factor(system, dt) for system in systems)
+    return Loop(factors, dt, dead_time, unit_among(*systems))
 
 
 def _time_base(system: Any) -> float | None:

@@ -14,6 +14,7 @@ import numpy as np
 
 from ..._flags import Flag, flagged
 from ..._wording import in_time, interval_in_time
+from ...data.shown_units import in_shown_units
 from ...delayed import DelayedStateSpace
 from ...errors import ModelWarning, UnsuitableSystemError, warn_caller
 from ...identification.plausible import PlausibleModels
@@ -95,6 +96,11 @@ class LoopCheck(Result):
     by_models: bool = False
 
     @property
+    def time_unit(self) -> str:
+        """Unit in which cards write times."""
+        return self.margins.time_unit
+
+    @property
     def worst(self) -> Corner | None:
         """Corner of the intervals with the largest Ms; None if there is no interval."""
         return max(self.corners, key=lambda corner: corner.ms, default=None)
@@ -140,6 +146,7 @@ class LoopCheck(Result):
         return f"<LoopCheck {word} on the design model{inside}>"
 
 
+@in_shown_units
 def loop_check(plant: Any, controller: Any, dead_time: float = 0.0) -> LoopCheck:
     """Check the closed loop with the model, and over its interval of dead times if it has one.
 
@@ -240,15 +247,9 @@ def _left_open(made: LoopCheck) -> tuple[Flag, ...]:
     """
     models = made.by_models
     if not models and made.robustness is not None and not made.robustness.stable:
-        low, high = made.robustness.dead_time_interval
-        inside = flagged(
-            "unstable_within_interval",
-            low=low,
-            high=high,
-            stable_from=made.robustness.stable_from,
-            stable_to=made.robustness.stable_to,
-        )
-        return (inside,)
+        interval = interval_in_time(*made.robustness.dead_time_interval)
+        stable = interval_in_time(made.robustness.stable_from, made.robustness.stable_to)
+        return (flagged("unstable_within_interval", interval=interval, stable=stable),)
     worst = made.worst
     if worst is None or worst.ms <= MOST_SENSITIVE * (1 + ROUNDED):
         return ()

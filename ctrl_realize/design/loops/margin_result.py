@@ -54,6 +54,8 @@ class Margins(Result):
     flags : tuple of Flag
     response : tuple of ndarray
         (omega, L) along the count, for plots.
+    time_unit : str
+        In which cards write the delay margin: min, h or day of the plant, otherwise s.
 
     Examples
     --------
@@ -81,6 +83,7 @@ class Margins(Result):
     response: tuple[FloatArray, ComplexArray]
     intervals: dict[str, tuple[float, float]] = field(default_factory=dict)
     flags: tuple[Flag, ...] = ()
+    time_unit: str = "s"
 
     @property
     def delay_margin_samples(self) -> float:

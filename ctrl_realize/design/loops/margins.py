@@ -11,6 +11,7 @@ import numpy as np
 
 from ..._checks import not_negative
 from ..._flags import Flag, flagged
+from ...data.shown_units import unit_among
 from ...errors import OptionError
 from ...numerics.arrays import ComplexArray, FloatArray, locked, read_only
 from ...numerics.loops.crossings import (
@@ -109,7 +110,8 @@ def margins(
                 "dead_time is for continuous systems; for data, multiply them by exp(-j "
                 "omega tau) instead"
             )
-        return _from_data(data_loop(loop, controller, unstable_poles, integrators))
+        found = _from_data(data_loop(loop, controller, unstable_poles, integrators))
+        return replace(found, time_unit=unit_among(loop, controller))
     if unstable_poles or integrators is not None:
         raise OptionError(
             "unstable_poles and integrators are for measured responses; for systems they are "
@@ -134,7 +136,8 @@ def loop_margins(loop: Loop) -> Margins:
     plain = _collect(loop, omega, values, phases, closest, *count, loop.dt)
     # So close to -1 the count is not reliable.
     stable = plain.stable and plain.modulus_margin > MARGINAL
-    return replace(plain, stable=stable, delay_margin=plain.delay_margin if stable else np.nan)
+    room = plain.delay_margin if stable else np.nan
+    return replace(plain, stable=stable, delay_margin=room, time_unit=loop.time_unit)
 
 
 def distance_if_stable(loop: Loop) -> float:

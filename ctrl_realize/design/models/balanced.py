@@ -203,9 +203,8 @@ def reduce(system: Any, order: int) -> DelayedStateSpace:
     )
     delays, names = (plant.input_delays, plant.output_delays), signals_of(plant)
     name = f"{plant.name}_reduced"
-    return DelayedStateSpace(
-        reduced, delays[0], output_delay=delays[1], fit=fit, name=name, **names
-    )
+    settings = {"fit": fit, "name": name, "time_unit": plant.time_unit, **names}
+    return DelayedStateSpace(reduced, delays[0], output_delay=delays[1], **settings)
 
 
 def _parts(core: ct.StateSpace) -> tuple[Part, Part]:

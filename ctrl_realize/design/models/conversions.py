@@ -71,6 +71,8 @@ class ContinuousModel(Result):
         In s; not necessarily whole samples.
     dt : float
         Sample time in s of the discrete system.
+    time_unit : str
+        In which cards write times: min, h or day of the discrete system, otherwise s.
 
     Examples
     --------
@@ -88,6 +90,7 @@ class ContinuousModel(Result):
     input_delays: tuple[float, ...]
     output_delays: tuple[float, ...]
     dt: float
+    time_unit: str = "s"
 
     @property
     def dead_time(self) -> Any:
@@ -102,8 +105,8 @@ class ContinuousModel(Result):
         # python-control's systems cannot be pickled.
         core = self.core
         names = {"name": core.name, **signals_of(core)}
-        ends = self.input_delays, self.output_delays
-        return _rebuild_model, ((core.A, core.B, core.C, core.D), names, *ends, self.dt)
+        rest = self.input_delays, self.output_delays, self.dt, self.time_unit
+        return _rebuild_model, ((core.A, core.B, core.C, core.D), names, *rest)
 
     @property
     def system(self) -> DelaySystem:
@@ -111,7 +114,8 @@ class ContinuousModel(Result):
         core = self.core
         form = DelayForm(core.A, core.B, core.C, core.D)
         form = delayed_ends(form, self.input_delays, self.output_delays)
-        return DelaySystem(plain(form, 0), form.delays, name=core.name, **signals_of(core))
+        names = {"name": core.name, **signals_of(core), "time_unit": self.time_unit}
+        return DelaySystem(plain(form, 0), form.delays, **names)
 
     def pade(self, order: int = 5) -> ct.StateSpace:
         """Continuous system with each dead time as a Pade approximant, see `pade_ss`."""
@@ -198,7 +202,7 @@ def to_continuous(system: DelayedStateSpace) -> ContinuousModel:
     matrices, before, behind = continuous_ends((core.A, core.B, core.C, core.D), dt, *ends)
     names = {"name": f"{plant.name}_continuous", **signals_of(plant)}
     continuous = ct.StateSpace(*matrices, 0, remove_useless_states=False, **names)
-    return ContinuousModel(continuous, before, behind, dt)
+    return ContinuousModel(continuous, before, behind, dt, plant.time_unit)
 
 
 def to_discrete(
@@ -215,7 +219,7 @@ def to_discrete(
     dt : float, optional
         Sample time in s; default: that of a `ContinuousModel`.
     **names
-        ``name``, ``inputs``, ``outputs``.
+        ``name``, ``inputs``, ``outputs``, ``time_unit``.
 
     Returns
     -------
@@ -246,6 +250,7 @@ def to_discrete(
                 "another sample time, or dead_time= and dt= to replace both"
             )
         dt = core.dt if dt is None else dt
+        names = {"time_unit": core.time_unit, **names}
         several = dead_time is None and not isinstance(core.dead_time, float)
         dead_time = core.dead_time if dead_time is None and not several else dead_time
         core = core.system if several else core.core

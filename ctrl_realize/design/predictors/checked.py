@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from typing import Any, Self
 
 from ..._shown import Card
+from ...data.shown_units import in_shown_units
 from ...delayed import DelayedStateSpace
 from ..delay_line import DelayLineController
 from ..loops.delay_robustness_result import DelayRobustness
@@ -42,6 +43,11 @@ class CheckedController(DelayLineController):
         return made
 
     @property
+    def time_unit(self) -> str:
+        """Unit in which cards write times, that of the model."""
+        return self.model.time_unit
+
+    @property
     def robustness(self) -> DelayRobustness | None:
         """Loop at the ends of the identified interval of the dead time; None without one."""
         return None if self.check is None else self.check.robustness
@@ -50,6 +56,7 @@ class CheckedController(DelayLineController):
         make, arguments, settings = super()._made_by()
         return make, arguments, settings | {"design": self._design}
 
+    @in_shown_units
     def _card(self) -> Card:
         card = super()._card()
         if self.check is None:

@@ -15,7 +15,7 @@ import control as ct
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..._wording import in_numbers
+from ..._wording import in_numbers, in_time
 from ...delayed import DelayedStateSpace
 from ...errors import DelayRangeError, OptionError, UnsuitableSystemError
 from ...numerics.arrays import ComplexArray, FloatArray, locked, read_only
@@ -83,15 +83,20 @@ class PredictorLQR(Result):
     dt: float
     check: LoopCheck | None = None
 
+    @property
+    def time_unit(self) -> str:
+        """Unit in which cards write times."""
+        return "s" if self.check is None else self.check.time_unit
+
     _heading = "LQR through the dead time"
 
     def _rows(self) -> list[tuple[str, str]]:
         largest = float(np.abs(self.poles).max(initial=0.0))
         delays = (self.delay,) if isinstance(self.delay, int) else self.delay
         samples = ", ".join(str(d) for d in delays)
-        seconds = ", ".join(f"{d * self.dt:.4g}" for d in delays)
+        times = ", ".join(in_time(d * self.dt, 4) for d in delays)
         return [
-            ("delay", f"{samples} samples ({seconds} s)"),
+            ("delay", f"{samples} samples ({times})"),
             ("gain on the core", in_numbers(self.core_gain)),
             ("slowest closed-loop pole", f"|z| = {largest:.4g}"),
             *(self.check._rows() if self.check is not None else []),
@@ -235,7 +240,7 @@ def _state_loop(
     controller = DelayLineController(
         *nothing, np.zeros((0, d)), -line, dt, name="lqr", pulses=(A, B, -found.core_gain)
     )
-    return DelayedStateSpace(seen, d, fit=plant.fit), controller
+    return DelayedStateSpace(seen, d, fit=plant.fit, time_unit=plant.time_unit), controller
 
 
 def _check_forgetting_time(states: int, delays: tuple[int, ...]) -> None:

@@ -83,6 +83,6 @@ def total_time(system: Any, plant: DelayedStateSpace) -> float:
 
 def gain_and_time_units(plant: DelayedStateSpace) -> tuple[str, str]:
     """Units of a controller gain and of shown times, from the first record of a fitted plant."""
-    if plant.fit is None:
-        return "", "s"
-    return gain_unit(plant.fit.input_unit, plant.fit.output_unit), plant.fit.time_unit
+    fit = plant.fit
+    gain = "" if fit is None else gain_unit(fit.input_unit, fit.output_unit)
+    return gain, plant.time_unit

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ..._wording import in_time, interval_in_time, times_in
+from ..._wording import in_time, interval_in_time
 from ...delayed import DelayedStateSpace, DelaySystem, delay
 from ...errors import UnsuitableSystemError
 from ...identification.plausible import continuous_core
@@ -66,16 +66,15 @@ class UltimateGain(Result):
     _heading = "Ultimate gain and period"
 
     def _rows(self) -> list[tuple[str, str]]:
-        with times_in(self.time_unit):
-            rows = [
-                ("control", self._held()),
-                ("gain", f"{self.gain:.4g} {self.gain_unit}".rstrip()),
-                ("period", in_time(self.period, 4)),
-            ]
-            if self.gain_interval is not None and self.period_interval is not None:
-                low, high = self.gain_interval
-                rows.insert(2, ("95 % interval", f"{low:.4g} to {high:.4g}"))
-                rows.append(("95 % interval", interval_in_time(*self.period_interval)))
+        rows = [
+            ("control", self._held()),
+            ("gain", f"{self.gain:.4g} {self.gain_unit}".rstrip()),
+            ("period", in_time(self.period, 4)),
+        ]
+        if self.gain_interval is not None and self.period_interval is not None:
+            low, high = self.gain_interval
+            rows.insert(2, ("95 % interval", f"{low:.4g} to {high:.4g}"))
+            rows.append(("95 % interval", interval_in_time(*self.period_interval)))
         return rows
 
     def __repr__(self) -> str:
