@@ -143,9 +143,9 @@ def gain_plot(
             lines += axes.plot(shown, np.interp(shown, points, values), label="schedule", **line)
         else:
             lines.append(axes.axhline(gains.reference, label="model", **line))
-        axes.set(
-            xlabel=f"{gains.scheduled_over} [unit of the input]", ylabel="gain [output / input]"
-        )
+        of_input, ratio = gains.input_unit or "unit of the input", gains.gain_unit
+        axes.set_xlabel(f"{gains.scheduled_over} [{plain(of_input)}]")
+        axes.set_ylabel(f"gain [{plain(ratio or 'output / input')}]")
         return style.finished([axes], [lines], loc="best")
 
 

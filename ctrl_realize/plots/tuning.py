@@ -10,6 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 from matplotlib.ticker import LogLocator, MaxNLocator
 
+from .._wording import time_unit
 from ..design.models.balanced import BalancedReduction
 from ..design.models.process_model import ProcessModel
 from ..design.tuning.table import PIDComparison
@@ -46,9 +47,10 @@ def pid_comparison_plot(
     ('sensitivity peak Ms', 'integrated absolute load error [output s / input]')
     """
     kinds = sorted({c.kind for c in result.controllers})
+    factor, time = time_unit(1.0)
     rows = zip(result.controllers, result.margins, result.performance, strict=True)
     points = [
-        (c.kind, min(m.ms, RINGING), p.load_error, _rule_label(c.rule, m.ms))
+        (c.kind, min(m.ms, RINGING), factor * p.load_error, _rule_label(c.rule, m.ms))
         for c, m, p in rows
         if m.stable and np.isfinite(p.load_error)
     ]
@@ -59,7 +61,8 @@ def pid_comparison_plot(
             of_kind = [(x, y) for name, x, y, _ in points if name == kind]
             if of_kind:
                 lines += axes.plot(*zip(*of_kind, strict=True), "o", color=colour, label=kind)
-        unit = _load_error_unit(result.controllers[0].gain_unit if result.controllers else "")
+        gain = result.controllers[0].gain_unit if result.controllers else ""
+        unit = _load_error_unit(gain, time)
         axes.set(xlabel="sensitivity peak Ms", ylabel=f"integrated absolute load error [{unit}]")
         axes.margins(x=0.05)
         axes.set_yscale("log")
@@ -74,11 +77,11 @@ def pid_comparison_plot(
         return style.finished([axes], [lines], loc="upper center")
 
 
-def _load_error_unit(gain_unit: str) -> str:
-    """Output times s per input, from the unit of a controller's gain (input per output)."""
+def _load_error_unit(gain_unit: str, time: str) -> str:
+    """Output times `time` per input, from the unit of a controller's gain (input per output)."""
     parts = re.fullmatch(r"(\([^)]*\)|[^/(]*)/(.+)", gain_unit)
     below, above = parts.groups() if parts else ("1", "output")
-    return plain(f"{above} s / {'input' if below == '1' else below}")
+    return plain(f"{above} {time} / {'input' if below == '1' else below}")
 
 
 def _rule_label(rule: str, peak: float) -> str:

@@ -89,6 +89,16 @@ def test_the_load_error_is_in_the_unit_of_the_output_times_seconds_per_input(uni
     plt.close(drawn.figure)
 
 
+def test_the_load_error_of_a_plant_in_minutes_is_in_minutes():
+    plant = cr.delayed_ss(ct.tf([2.0], [1200.0, 1]), dead_time=300.0, dt=60.0, time_unit="min")
+    found = cr.design.compare_pid(plant, ["simc"], ["PI"])
+    (axes,) = found.plot().figure.axes
+    assert axes.get_ylabel() == "integrated absolute load error [output min / input]"
+    (point,) = axes.lines[0].get_ydata()
+    assert point == pytest.approx(found.performance[0].load_error / 60)
+    plt.close(axes.figure)
+
+
 def test_the_loop_is_drawn_with_its_actuator_limits_and_noise(valve):
     plant = valve(37)
     pid = cr.design.pid(plant, "simc", "PI")

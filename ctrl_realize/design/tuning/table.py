@@ -7,7 +7,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from ..._checks import one_of
-from ..._wording import in_time, times_in
+from ..._wording import in_time
+from ...data.shown_units import unit_among
 from ...errors import OptionError
 from ...numerics.blas_threads import single_threaded
 from ...results import Flag, Result
@@ -60,6 +61,11 @@ class PIDComparison(Result):
     def margins(self) -> tuple[Margins, ...]:
         """Margins of the loops."""
         return tuple(c.check.margins for c in self.controllers if c.check is not None)
+
+    @property
+    def time_unit(self) -> str:
+        """Unit in which cards and plots write times, that of the plant."""
+        return unit_among(*self.controllers)
 
     def table(self) -> pd.DataFrame:
         """One row for each controller; times in s, phase margin in degrees."""
@@ -128,8 +134,7 @@ class PIDComparison(Result):
     def _rows(self) -> list[tuple[str, str]]:
         rows = []
         for c, m, p in zip(self.controllers, self.margins, self.performance, strict=True):
-            with times_in(c.time_unit):
-                load, setpoint = in_time(p.load_error), in_time(p.setpoint_error)
+            load, setpoint = in_time(p.load_error), in_time(p.setpoint_error)
             told = (
                 f"Ms {m.ms:.3g}, phase {m.phase_margin:.3g} deg, IAE load {load}, "
                 f"set-point {setpoint}, overshoot {100 * p.overshoot:.3g} %"

@@ -24,6 +24,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..._flags import flagged
+from ..._parameters import gain_unit, slope_unit
 from ..._wording import chosen
 from ...data import Record
 from ...numerics.arrays import FloatArray
@@ -135,6 +136,7 @@ def _gains(
     alike = np.ptp(points) <= ONE_POINT * np.ptp(inputs)
     if alike:
         points = np.abs(np.diff(inputs)[:, 0])
+    ratio = gain_unit(result.output_unit, result.input_unit)
     return RecordGains(
         names=found.names,
         scheduled_over="step height" if alike else "input level",
@@ -149,4 +151,6 @@ def _gains(
         chi_square=test[0],
         p_value=test[1],
         outlying=found.outlying,
+        input_unit=result.input_unit,
+        gain_unit=slope_unit(ratio, "s") if result.integrators else ratio,
     )

@@ -61,6 +61,8 @@ class RecordGains(Result):
     outlying : tuple of str
         Records whose dead time or time constants do not agree with those of the others, or that do
         not respond to the input. They are not in the fit.
+    input_unit, gain_unit : str
+        Of the operating points, and of the gains; empty if they are not known.
 
     References
     ----------
@@ -99,6 +101,8 @@ class RecordGains(Result):
     chi_square: float
     p_value: float
     outlying: tuple[str, ...] = ()
+    input_unit: str = ""
+    gain_unit: str = ""
 
     def __post_init__(self) -> None:
         for values in vars(self).values():

@@ -185,6 +185,29 @@ def test_table_plot_and_pickle_of_the_gains():
         gains.gains[0] = 2.0
 
 
+def test_the_gains_are_drawn_with_the_units_of_the_records():
+    units = {"u": "%", "y": "m3/h"}
+    records = [cr.Record(r.time, r.input, r.output, units=units) for r in at_three_levels(n=300)]
+    axes = own(records).fit.gains.plot().figure.axes[0]
+    assert (axes.get_xlabel(), axes.get_ylabel()) == ("input level [%]", "gain [(m3/h)/%]")
+    axes = fitted().fit.gains.plot().figure.axes[0]
+    assert axes.get_xlabel() == "input level [unit of the input]"
+    assert axes.get_ylabel() == "gain [output / input]"
+
+
+def test_the_gain_of_an_integrating_plant_is_drawn_per_second():
+    records = []
+    for seed, slope in enumerate((0.05, 0.02)):
+        u = np.where(DT * np.arange(400) < 1.0, 0.0, 1.0 + seed)
+        y = cr.delayed_ss(ct.tf([slope], [1, 0]), dead_time=0.35, dt=DT).simulate(u)
+        y += 1e-3 * np.random.default_rng(seed).standard_normal(u.size)
+        units = {"u": "%", "y": "m"}
+        records.append(cr.Record(DT * np.arange(400), u, y, units=units))
+    gains = cr.fit_output_error(records, structures="IPDT", gains="own").fit.gains
+    assert_allclose(gains.gains, (0.05, 0.02), rtol=0.05)
+    assert gains.plot().figure.axes[0].get_ylabel() == "gain [m/(% s)]"
+
+
 def test_other_options_are_refused():
     with pytest.raises(OptionError, match="gains"):
         cr.fit_output_error(at_three_levels(), gains="mean")
