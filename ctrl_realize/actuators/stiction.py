@@ -2,31 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
-from typing import ClassVar, NamedTuple
+from typing import ClassVar
 
 from .._checks import not_negative, positive, within
-from ..numerics.actuators.friction import (
-    Stem,
-    StemState,
-    choudhury,
-    choudhury_at_rest,
-    choudhury_step,
-    kano,
-    kano_step,
-    stem_at_rest,
-)
+from ..numerics.actuators.friction import StemState, kano, stem_at_rest, stem_step
 from ..numerics.arrays import FloatArray
 from .base import Actuator, State
-
-
-class _Model(NamedTuple):
-    """One sample, the state at rest, and the positions of a whole command."""
-
-    step: Callable[[Stem, float, float, float], Stem]
-    at_rest: Callable[[float, float, float, float], StemState]
-    simulated: Callable[[FloatArray, float, float, float], FloatArray]
 
 
 @dataclass(frozen=True)
@@ -39,7 +21,7 @@ class _StickAndJump(Actuator):
 
     _states: ClassVar[tuple[str, ...]] = StemState._fields
     _author: ClassVar[str]
-    _model: ClassVar[_Model]
+    _sided: ClassVar[bool]
 
     def __post_init__(self) -> None:
         positive(self.S, "S", "width of dead band plus stick band")
@@ -50,16 +32,18 @@ class _StickAndJump(Actuator):
         return f"stiction ({self._author}): S = {self.S:g}, J = {self.J:g}"
 
     def _rest(self, command: float) -> State:
-        return tuple(map(float, self._model.at_rest(command, self.S, self.J, self.start)))
+        return tuple(
+            map(float, stem_at_rest(command, self.S, self.J, self.start, sided=self._sided))
+        )
 
     def _advance(self, state: State, command: float, dt: float) -> tuple[State, float]:
         last, position, way, rest, moving, paused, slope = state
         stem = last, position, way, rest, moving > 0.5, paused > 0.5, slope
-        after = self._model.step(stem, command, self.S, self.J)
+        after = stem_step(stem, command, self.S, self.J, self._sided)
         return tuple(map(float, after)), after[1]
 
     def _simulated(self, command: FloatArray, dt: float) -> FloatArray:
-        return self._model.simulated(command, self.S, self.J, self.start)
+        return kano(command, self.S, self.J, self.start, sided=self._sided)
 
 
 @dataclass(frozen=True)
@@ -104,7 +88,7 @@ class Stiction(_StickAndJump):
     """
 
     _author = "Choudhury"
-    _model = _Model(choudhury_step, choudhury_at_rest, choudhury)
+    _sided = False
 
 
 @dataclass(frozen=True)
@@ -142,4 +126,4 @@ class KanoStiction(_StickAndJump):
     """
 
     _author = "Kano"
-    _model = _Model(kano_step, stem_at_rest, kano)
+    _sided = True

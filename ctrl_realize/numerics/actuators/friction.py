@@ -27,7 +27,7 @@ References
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import NamedTuple, TypeAlias
 
 import numpy as np
@@ -75,51 +75,58 @@ class StemState(NamedTuple):
     slope: float = 0.0
 
 
-def stem_at_rest(command: float, stick: float, jump: float, start: float = 0.0) -> StemState:
+def stem_at_rest(
+    command: float, stick: float, jump: float, start: float = 0.0, *, sided: bool = True
+) -> StemState:
     """State of a stem at rest that last moved up (`start` 1), down (-1), or is relaxed (0).
 
     `stick` is S, `jump` is J. A relaxed stem is at the command, and needs (S + J) / 2 in either
     direction. Between 1 and -1 the state is that of a stem that last moved up, and whose command
     has returned by ``(1 - start) / 2`` of S - J since.
+
+    `sided` is for Kano's model. Choudhury's does not know on which side of the friction a stem at
+    rest is: its first move, in either direction, needs J from a stop after a move up, and S
+    otherwise.
     """
     position = command - start * (stick - jump) / 2
+    if not sided:
+        return StemState(command, position, 1.0, command, paused=start == 1.0)
     # A stem that moved up stopped where the command was (S - J) / 2 above it.
     return StemState(command, position, 1.0, position + (stick - jump) / 2)
 
 
-def kano_step(state: Stem, command: float, stick: float, jump: float) -> Stem:
-    """Advance Kano's model by one sample."""
+def stem_step(state: Stem, command: float, stick: float, jump: float, sided: bool) -> Stem:
+    """Advance Kano's model, which is `sided`, or Choudhury's by one sample.
+
+    They differ in when the change from rest only has to exceed J: where it goes on in the
+    direction of the last move, or where the command has paused.
+    """
     last, position, direction, rest, moving, paused, slope = state
     change = command - last
     if moving and change * slope <= 0:
         moving, paused, rest = False, change == 0, last
     if not moving:
-        away = direction * (command - rest)
-        if away < -stick:
-            moving, direction = True, -direction
-        elif away > jump:
-            moving = True
+        away = command - rest
+        free = direction * away > 0 if sided else paused
+        if abs(away) > (jump if free else stick):
+            moving, direction = True, 1.0 if away > 0 else -1.0
     if moving:
         position = command - direction * (stick - jump) / 2
     # not a StemState: for every sample, its names take longer than all the rest
     return command, position, direction, rest, moving, paused, change
 
 
-def kano(position: FloatArray, stick: float, jump: float, start: float = 0.0) -> FloatArray:
-    """Stem positions (N,) for commands `position` by Kano's model; `start` as `stem_at_rest`."""
-    state = stem_at_rest(float(position[0]), stick, jump, start)
-    return _followed(kano_step, state, position, stick, jump)
-
-
-def _followed(
-    step: Callable[[Stem, float, float, float], Stem],
-    state: Stem,
-    position: FloatArray,
-    *parameters: float,
+def kano(
+    position: FloatArray, stick: float, jump: float, start: float = 0.0, *, sided: bool = True
 ) -> FloatArray:
+    """Stem positions (N,) for commands `position` by Kano's model, or Choudhury's if not `sided`.
+
+    `start` as `stem_at_rest`.
+    """
+    state: Stem = stem_at_rest(float(position[0]), stick, jump, start, sided=sided)
     out = []
     for command in position.tolist():
-        state = step(state, command, *parameters)
+        state = stem_step(state, command, stick, jump, sided)
         out.append(state[1])
     return np.array(out)
 
@@ -186,32 +193,3 @@ def _runs(
     run = np.searchsorted(turns, first, side="right") - 1
     rising = np.append(change[turns] > 0, False)[run]
     return first, rising, np.diff(run, append=turns.size) > 0
-
-
-def choudhury_step(state: Stem, command: float, stick: float, jump: float) -> Stem:
-    """Advance Choudhury's model by one sample."""
-    last, position, direction, rest, moving, paused, slope = state
-    change = command - last
-    if moving and change * slope <= 0:
-        moving, paused, rest = False, change == 0, last
-    if not moving and abs(command - rest) > (jump if paused else stick):
-        moving, direction = True, float(np.sign(command - rest))
-    if moving:
-        position = command - direction * (stick - jump) / 2
-    return command, position, direction, rest, moving, paused, change
-
-
-def choudhury_at_rest(command: float, stick: float, jump: float, start: float = 0.0) -> StemState:
-    """State of a stem at rest in Choudhury's model; `start` as for `stem_at_rest`.
-
-    The model does not know on which side of the friction a stem at rest is: its first move, in
-    either direction, needs J from a stop after a move up, and S otherwise.
-    """
-    state = stem_at_rest(command, stick, jump, start)
-    return state._replace(rest=command, paused=start == 1.0)
-
-
-def choudhury(position: FloatArray, stick: float, jump: float, start: float = 0.0) -> FloatArray:
-    """Stem positions (N,) for commands `position` by Choudhury's model; `start` as `kano`."""
-    state = choudhury_at_rest(float(position[0]), stick, jump, start)
-    return _followed(choudhury_step, state, position, stick, jump)
