@@ -201,10 +201,7 @@ class Valve:
         <Record 'prbs': 3840 samples of 0.00078125 s, 1 input, 1 output>
         """
         held = held_input(current, "current", (0.0, _MOST_MA), "mA")
-        time = self.dt * np.arange(held.size, dtype=np.float64)
-        generator = np.random.default_rng(rng)
-        moved = self._motion.of_held(held, self.dt, self._dead_time(generator))
-        return recorded(self, time, held, moved + self._rest, generator, name)
+        return self._of_held(held, self.dt, np.random.default_rng(rng), name)
 
     def static_test(
         self, rng: Seed = None, *, levels: int = 11, cycles: int = 3, ramp: float | None = 120.0
@@ -256,11 +253,7 @@ class Valve:
             climb = np.linspace(*paper.SETUP.current_range, n_ramp)
             parts = [np.full(each, up[0]), climb, np.full(each, up[-1]), climb[::-1]]
             held = np.concatenate([held, *parts, np.full(each, up[0])])
-        generator = np.random.default_rng(rng)
-        moved = self._motion.of_held(held, dt, self._dead_time(generator))
-        time = dt * np.arange(held.size, dtype=np.float64)
-        level = moved + self._rest
-        return recorded(self, time, held, level, generator, "valve_static", spikes=False)
+        return self._of_held(held, dt, np.random.default_rng(rng), "valve_static", spikes=False)
 
     def stepped_sine(
         self,
@@ -338,10 +331,14 @@ class Valve:
             )
         return dt * np.arange(_SINE_SAMPLES, dtype=np.float64)
 
-    @property
-    def _rest(self) -> float:
-        """Displacement in mm that a current of zero would give."""
-        return _REST_MM - self.truth.gain * paper.SETUP.current_range[0]
+    def _of_held(
+        self, held: FloatArray, dt: float, rng: np.random.Generator, name: str, **options: bool
+    ) -> Record:
+        """Record the response to a current that is held over each sample."""
+        time = dt * np.arange(held.size, dtype=np.float64)
+        rest = _REST_MM - self.truth.gain * paper.SETUP.current_range[0]  # at zero current
+        moved = self._motion.of_held(held, dt, self._dead_time(rng))
+        return recorded(self, time, held, moved + rest, rng, name, **options)
 
     def _dead_time(self, generator: np.random.Generator) -> float:
         """Draw the dead time of one record."""

@@ -77,17 +77,20 @@ def context() -> Iterator[None]:
         mpl.rcParams.update(before)
 
 
-def axes_for(
+@contextmanager
+def canvas(
     ax: AxesLike,
     rows: int = 1,
     *,
+    title: str | None = None,
+    default_title: str = "",
     size: tuple[float, float] = (8.0, 4.6),
     heights: Sequence[float] | None = None,
     columns: int = 1,
     sharex: bool = True,
     beside: bool = False,
-) -> list[Axes]:
-    """Return the axes to draw in: the given ones, or new ones.
+) -> Iterator[list[Axes]]:
+    """Provide the axes to draw in, in the toolbox's style; a new figure gets its title at the end.
 
     Parameters
     ----------
@@ -95,6 +98,10 @@ def axes_for(
         None makes a new figure with pyplot, as python-control does; in a Figure, axes are created.
     rows, columns : int
         Number of axes needed.
+    title : str, optional
+        Title given by the caller; an empty one for none.
+    default_title : str
+        Default title.
     size : tuple of float
         Size of a new figure in inches.
     heights : sequence of float, optional
@@ -109,43 +116,23 @@ def axes_for(
     OptionError
         A wrong number of axes for the plot.
     """
-    needed = rows * columns
-    if ax is None or isinstance(ax, FigureBase):
-        figure = plt.figure(figsize=size, layout="constrained") if ax is None else ax
-        if beside:
-            grid = figure.add_gridspec(rows - 1, 2)
-            places = [*(grid[row, 0] for row in range(rows - 1)), grid[:, 1]]
-            return [figure.add_subplot(place) for place in places]
-        shared: Any = "col" if sharex else False
-        return list(
-            figure.subplots(rows, columns, squeeze=False, sharex=shared, height_ratios=heights).flat
-        )
-    given = list(np.ravel(np.asarray(ax, dtype=object)))
-    if len(given) != needed or not all(isinstance(axes, Axes) for axes in given):
-        raise OptionError(
-            f"ax holds {len(given)} object(s); this plot needs {needed} matplotlib Axes (or a "
-            "Figure, or None)"
-        )
-    return given
-
-
-@contextmanager
-def canvas(
-    ax: AxesLike, rows: int = 1, *, title: str | None = None, default_title: str = "", **layout: Any
-) -> Iterator[list[Axes]]:
-    """Provide the axes to draw in, in the toolbox's style; a new figure gets its title at the end.
-
-    Parameters
-    ----------
-    ax, rows, **layout
-        As for `axes_for`.
-    title : str, optional
-        Title given by the caller; an empty one for none.
-    default_title : str
-        Default title.
-    """
     with context():
-        axes = axes_for(ax, rows, **layout)
+        if ax is not None and not isinstance(ax, FigureBase):
+            axes = list(np.ravel(np.asarray(ax, dtype=object)))
+            if len(axes) != rows * columns or not all(isinstance(one, Axes) for one in axes):
+                raise OptionError(
+                    f"ax holds {len(axes)} object(s); this plot needs {rows * columns} matplotlib "
+                    "Axes (or a Figure, or None)"
+                )
+        else:
+            figure = plt.figure(figsize=size, layout="constrained") if ax is None else ax
+            if beside:
+                grid = figure.add_gridspec(rows - 1, 2)
+                places = [*(grid[row, 0] for row in range(rows - 1)), grid[:, 1]]
+                axes = [figure.add_subplot(place) for place in places]
+            else:
+                shape: Any = {"sharex": "col" if sharex else False, "height_ratios": heights}
+                axes = list(figure.subplots(rows, columns, squeeze=False, **shape).flat)
         yield axes
         text = default_title if title is None else title
         if text and ax is None:

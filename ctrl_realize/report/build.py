@@ -23,7 +23,7 @@ from ..frequency.comparison import FRFComparison
 from ..identification.campaign.campaign import Campaign
 from ..results import ModelFit
 from .controller import controller_of
-from .page import Controller, Page, Table, pairs, write_page
+from .page import Controller, Table, pairs, write_page
 from .provenance import versions
 from .sketches import (
     Sketch,
@@ -297,7 +297,8 @@ def write_report(
     below = [*data, *settings_tables(settings), pairs("Versions", versions(), folded=True)]
     if figures is not None:
         save_sketches(figures, sketches)
-    page = Page(
+    return write_page(
+        path,
         title=title,
         subtitle=subtitle,
         verdict=verdict,
@@ -309,4 +310,3 @@ def write_report(
         parameters=parameter_table(fit) if fit is not None and fit.parameters else None,
         controller=controller,
     )
-    return write_page(path, page)

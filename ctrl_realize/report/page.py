@@ -7,18 +7,18 @@ import functools
 import hashlib
 import os
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
 from typing import Any
 
-from jinja2 import DictLoader, Environment, StrictUndefined, Template
+from jinja2 import Environment, StrictUndefined, Template
 from markupsafe import Markup
 
 from .._facts import facts
 from ..io.atomic import write_text
 from .sketches import Sketch
-from .verdict import Level, Verdict
+from .verdict import Level
 
 # control characters, and those that change the direction of writing, may occur in file names
 _CONTROLS = (*range(9), 11, 12, *range(14, 32), *range(127, 160))
@@ -116,55 +116,6 @@ class Controller:
     figure: Sketch
 
 
-@dataclass(frozen=True)
-class Page:
-    """Content of a report.
-
-    Attributes
-    ----------
-    title, subtitle : str
-    verdict : Verdict
-        Verdict at the top, from `verdict_of`.
-    version : str
-        Version of the package, for the footer.
-    figures : sequence of Sketch
-    tables : sequence of Table
-    calls : sequence of (name, text)
-        Commands that reproduce the result.
-    simulated : bool
-        Whether the data are simulated, which is stated at the top.
-    parameters : Table or None
-        Parameters of the model, above the figures.
-    controller : Controller or None
-        A controller for the model, below its parameters.
-
-    Examples
-    --------
-    >>> import ctrl_realize as cr
-    >>> from ctrl_realize import report
-    >>> from ctrl_realize.report.page import Page, pairs
-    >>> system = cr.identify(cr.bench.valve().step_record(16, rng=5), method="scan")
-    >>> bench = pairs("Bench", [("shaker", "4.2 kg")])
-    >>> verdict = report.verdict_of(system)
-    >>> page = Page(
-    ...     "Valve 7", "before the overhaul", verdict, cr.__version__, tables=[bench]
-    ... )
-    >>> print(page.title, "-", page.verdict.headline[:17])
-    Valve 7 - Dead time 34.4 ms
-    """
-
-    title: str
-    subtitle: str
-    verdict: Verdict
-    version: str
-    figures: Sequence[Sketch] = ()
-    tables: Sequence[Table] = ()
-    calls: Sequence[tuple[str, str]] = field(default=())
-    simulated: bool = False
-    parameters: Table | None = None
-    controller: Controller | None = None
-
-
 def pairs(
     title: str, rows: Sequence[tuple[str, str]], *, mono: bool = False, folded: bool = False
 ) -> Table:
@@ -208,36 +159,41 @@ def headed(key: str, rows: Iterable[Row], **words: Any) -> Table:
     return Table(told["title"], filled, shown, note=note, folded=told.get("folded", False))
 
 
-def render(page: Page) -> str:
-    """Convert a page to HTML; all text is escaped, and control characters are removed."""
-    template, css, js = _template()
-    # The page allows only this script, whatever the data contain.
-    digest = base64.b64encode(hashlib.sha256(js.encode("utf-8")).digest()).decode("ascii")
-    text = template.render(page=page, css=Markup(css), js=Markup(js), js_digest=digest)
-    return text.translate(_UNSEEN) + "\n"
-
-
 @functools.cache
-def _template() -> tuple[Template, str, str]:
+def _template() -> Template:
     """Return the page's template, compiled once, with style and script."""
     folder = resources.files("ctrl_realize.report") / "templates"
     html, css, js = (
         (folder / name).read_text(encoding="utf-8")
         for name in ("report.html.j2", "report.css", "report.js")
     )
-    environment = Environment(
-        loader=DictLoader({"report": html}), autoescape=True, undefined=StrictUndefined
-    )
-    return environment.get_template("report"), css, js
+    # The page allows only this script, whatever the data contain.
+    digest = base64.b64encode(hashlib.sha256(js.encode("utf-8")).digest()).decode("ascii")
+    environment = Environment(autoescape=True, undefined=StrictUndefined)
+    parts = {"css": Markup(css), "js": Markup(js), "js_digest": digest}
+    return environment.from_string(html, globals=parts)
 
 
-def write_page(path: str | os.PathLike[str], page: Page) -> Path:
-    """Write a page to a file, atomically.
+def write_page(path: str | os.PathLike[str], **content: Any) -> Path:
+    """Write a page to a file, atomically; all text is escaped, control characters are removed.
 
     Parameters
     ----------
     path : path-like
-    page : Page
+    title, subtitle, version : str
+        The version of the package is for the footer.
+    verdict : Verdict
+        Verdict at the top, from `verdict_of`.
+    figures : sequence of Sketch
+    tables : sequence of Table
+    calls : sequence of (name, text)
+        Commands that reproduce the result.
+    simulated : bool
+        Whether the data are simulated, which is stated at the top.
+    parameters : Table or None
+        Parameters of the model, above the figures.
+    controller : Controller or None
+        A controller for the model, below its parameters.
 
     Returns
     -------
@@ -254,18 +210,19 @@ def write_page(path: str | os.PathLike[str], page: Page) -> Path:
     >>> from pathlib import Path
     >>> import ctrl_realize as cr
     >>> from ctrl_realize import report
-    >>> from ctrl_realize.report.page import Page, pairs, write_page
+    >>> from ctrl_realize.report.page import pairs, write_page
     >>> system = cr.identify(cr.bench.valve().step_record(16, rng=5), method="scan")
-    >>> bench = pairs("Bench", [("shaker", "4.2 kg")])
-    >>> verdict = report.verdict_of(system)
-    >>> page = Page(
-    ...     "Valve 7", "before the overhaul", verdict, cr.__version__, tables=[bench]
-    ... )
+    >>> content = {
+    ...     "title": "Valve 7", "subtitle": "before the overhaul", "version": cr.__version__,
+    ...     "verdict": report.verdict_of(system), "simulated": False, "parameters": None,
+    ...     "tables": [pairs("Bench", [("shaker", "4.2 kg")])], "figures": (), "calls": (),
+    ...     "controller": None,
+    ... }
     >>> with tempfile.TemporaryDirectory() as folder:
-    ...     html = write_page(Path(folder) / "valve.html", page).read_text()
+    ...     html = write_page(Path(folder) / "valve.html", **content).read_text()
     >>> print(html[html.index("<h1"):html.index("</h1>") + 5])
     <h1>Valve 7</h1>
     """
     target = Path(path)
-    write_text(target, render(page))
+    write_text(target, _template().render(page=content).translate(_UNSEEN) + "\n")
     return target
