@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 
 from .._wording import time_unit
 from ..numerics.arrays import FloatArray
-from ..report.svg import envelope, path_of
+from ..report.svg import thinned
 
 JSON: TypeAlias = dict[str, Any]
 POINTS = 900
@@ -41,7 +41,7 @@ def layer(kind: str, look: str, name: str = "", **shape: ArrayLike) -> JSON:
 def line(x: FloatArray, y: FloatArray, look: str, name: str = "") -> JSON:
     """Line through points; of many, the envelope."""
     if x.size > POINTS:
-        x, y = envelope(x, y, POINTS) if (np.diff(x) >= 0).all() else path_of(x, y)
+        x, y = thinned(x, y, POINTS)
     return layer("line", look, name, x=x, y=y)
 
 

@@ -167,8 +167,7 @@ def _by_amplitude(
 ) -> list[Line2D]:
     lines: list[Line2D] = []
     for position, rows in enumerate(groups.values()):
-        spread = 0.6 * (np.arange(len(rows)) / max(len(rows) - 1, 1) - 0.5)
-        at = position + (spread if len(rows) > 1 else np.zeros(1))
+        at = position + 0.6 * (np.arange(len(rows)) / max(len(rows) - 1, 1) - 0.5 * (len(rows) > 1))
         low, high = np.array([row.interval for row in rows]).T / dt
         axes.vlines(at, low, high, color=looks["color"], linewidth=1.2, alpha=0.45)
         lines += axes.plot(at, [row.delay for row in rows], **looks)

@@ -113,8 +113,6 @@ def _phase(response: ComplexArray, omega: FloatArray, delay: float, good: BoolAr
 
     Noise has no phase that could be unwrapped, and must not turn that of points beyond it.
     """
-    if good.all():
-        return unwrap_with_dead_time(omega, response, delay)
     known = unwrap_with_dead_time(omega[good], response[good], delay)
     near = np.interp(omega, omega[good], known + omega[good] * delay) - omega * delay
     angle = np.angle(response)

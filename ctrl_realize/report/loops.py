@@ -13,7 +13,7 @@ from .._checks import check_type
 from .._wording import in_time
 from ..valves.loops.result import LoopDiagnosis
 from .build import About, write_report
-from .page import Row, Table, headed
+from .page import Table, headed
 from .sketches import Sketch, sketch
 from .verdict import JUDGEMENTS, Level, Verdict
 
@@ -97,5 +97,5 @@ def _method_table(diagnosis: LoopDiagnosis) -> Table:
     for one in diagnosis.methods:
         known = [f"{each:.3g}" for each in (one.index, one.second_index) if np.isfinite(each)]
         said = f"{one.verdict}: {one.note}" if one.note else one.verdict
-        rows.append(Row((one.name, one.signal, ", ".join(known), one.limit, said, one.source)))
+        rows.append((one.name, one.signal, ", ".join(known), one.limit, said, one.source))
     return headed("loop_methods", rows)

@@ -6,7 +6,7 @@ import base64
 import functools
 import hashlib
 import os
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
@@ -145,16 +145,21 @@ def pairs(
     return Table(title, tuple(Row(tuple(row)) for row in rows), columns, folded=folded)
 
 
-def headed(key: str, rows: Iterable[Row], **words: Any) -> Table:
+def headed(
+    key: str, rows: Sequence[Sequence[str]], kinds: Sequence[str] | None = None, **words: Any
+) -> Table:
     """Make a table with the title, the columns and the note of a row of `tables.toml`.
 
-    Columns without a single value are left out.
+    Columns without a single value are left out; `kinds` are those of each `Row`.
     """
-    told, every = _TABLES[key], tuple(rows)
+    told = _TABLES[key]
     columns = [Column(name.format(**words), kind) for name, kind in told["columns"].items()]
-    kept = [k for k in range(len(columns)) if any(row.cells[k] for row in every)]
+    kept = [k for k in range(len(columns)) if any(row[k] for row in rows)]
     note = told.get("note", "").format(**words)
-    filled = tuple(Row(tuple(row.cells[k] for k in kept), row.kind) for row in every)
+    filled = tuple(
+        Row(tuple(row[k] for k in kept), kind)
+        for row, kind in zip(rows, kinds or [""] * len(rows), strict=True)
+    )
     shown = tuple(columns[k] for k in kept)
     return Table(told["title"], filled, shown, note=note, folded=told.get("folded", False))
 

@@ -193,7 +193,8 @@ def campaign_sketches(campaign: Campaign, *, truth: float | None = None) -> list
     tall = min(max(0.27 * count + 1.6, 3.4), 8.0) if count <= 24 else 4.2
     sketches = [sketch("delays", plots.campaign_plot, campaign, truth=truth, size=(6.2, tall))]
     system = campaign.system
-    steps = _steps_of(campaign) if _from_a_step(system.fit) else []
+    drawn = _records_of(campaign, MOST_DRAWN) if _from_a_step(system.fit) else []
+    steps = [step for step in map(_step_of, drawn) if step is not None]
     if steps:
         sketches.append(sketch("onset.campaign", plots.onset_plot, steps, system))
         sketches.append(sketch("step.campaign", plots.step_plot, steps, system))
@@ -220,12 +221,6 @@ def _step_of(record: Record) -> StepResponse | None:
         return unit_step(record)
     except (NoStepError, DataError):
         return None
-
-
-def _steps_of(campaign: Campaign) -> list[StepResponse]:
-    """Return the step responses of a campaign's records, up to a limit."""
-    steps = [_step_of(record) for record in _records_of(campaign, MOST_DRAWN)]
-    return [step for step in steps if step is not None]
 
 
 def _records_of(campaign: Campaign, most: int) -> list[Record]:

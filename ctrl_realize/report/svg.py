@@ -59,12 +59,17 @@ def thin_lines(figure: Figure, points: int = POINTS) -> None:
     for axes in figure.axes:
         logarithmic = axes.get_xscale() == "log"
         for line in axes.get_lines():
-            x = np.asarray(line.get_xdata(), dtype=np.float64)
-            y = np.asarray(line.get_ydata(), dtype=np.float64)
-            if x.size > points and (np.diff(x) >= 0).all():
-                line.set_data(*envelope(x, y, points, logarithmic=logarithmic))
-            elif x.size > points:
-                line.set_data(*path_of(x, y))
+            x, y = (np.asarray(one, dtype=np.float64) for one in line.get_data())
+            if x.size > points:
+                line.set_data(*thinned(x, y, points, logarithmic=logarithmic))
+
+
+def thinned(
+    x: FloatArray, y: FloatArray, points: int, *, logarithmic: bool = False
+) -> tuple[FloatArray, FloatArray]:
+    """Points of a long line that look the same: its envelope, or those of its path."""
+    rising = (np.diff(x) >= 0).all()
+    return envelope(x, y, points, logarithmic=logarithmic) if rising else path_of(x, y)
 
 
 def path_of(x: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:

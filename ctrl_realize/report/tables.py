@@ -25,7 +25,7 @@ from ..identification.campaign.campaign import Campaign
 from ..identification.campaign.rows import CampaignRow
 from ..results import ModelFit
 from .facts import FACTS
-from .page import Row, Table, headed, pairs
+from .page import Table, headed, pairs
 from .provenance import file_sha256, record_sha256
 
 Paths = Sequence[str | os.PathLike[str]]
@@ -57,7 +57,7 @@ def parameter_table(fit: ModelFit) -> Table:
     return headed("parameters", rows)
 
 
-def _parameter_row(one: Parameter, where: str = "") -> Row:
+def _parameter_row(one: Parameter, where: str = "") -> tuple[str, ...]:
     """Row of a parameter, of an actuator if it is told where that acts."""
     known = bool(np.isfinite([one.low, one.high]).all())
     if one.times == 1:
@@ -75,7 +75,7 @@ def _parameter_row(one: Parameter, where: str = "") -> Row:
     if where:
         holds, interval = "this actuator", interval or "one end is not told"
     label = f"{one.label} (actuator, {where})" if where else one.label
-    return Row((label, value, error, interval, holds if interval else ""))
+    return label, value, error, interval, holds if interval else ""
 
 
 def comparison_tables(comparison: FRFComparison | None) -> list[Table]:
@@ -114,12 +114,11 @@ def data_table(records: Sequence[Record], files: Paths) -> Table:
         known = {os.fspath(file): record for file, record in zip(files, records, strict=False)}
         for file in files:
             record = known.get(os.fspath(file))
-            rows.append(Row((Path(file).name, *_extent(record), file_sha256(file))))
+            rows.append((Path(file).name, *_extent(record), file_sha256(file)))
         sums = "the files"
     else:
         rows = [
-            Row((record.name or "record", *_extent(record), record_sha256(record)))
-            for record in records
+            (record.name or "record", *_extent(record), record_sha256(record)) for record in records
         ]
         sums = "time, input, output and set point as little-endian float64"
     return headed("data", rows, sums=sums)
@@ -141,15 +140,16 @@ def campaign_table(campaign: Campaign) -> Table:
     rows = []
     for row in campaign.rows:
         if row.error is not None:
-            cells = [row.name, in_digits(row.amplitude), "", "", "", "", "", row.error]
-            rows.append(Row(tuple(cells), "failed"))
+            rows.append([row.name, in_digits(row.amplitude), "", "", "", "", "", row.error])
             continue
         low, dead_time, high = _dead_time_cells(row, scale)
         cells = [row.name, in_digits(row.amplitude), f"{row.delay:.4g}", dead_time]
         cells += [f"{low} to {high}", str(row.order), f"{row.residual:.3g}"]
         cells.append(", ".join([*(flag.code for flag in row.flags), *row.warnings]))
-        rows.append(Row(tuple(cells), "best" if row.name == best else ""))
-    return headed("campaign", rows, unit=unit)
+        rows.append(cells)
+    kinds = ["failed" if row.error is not None else "best" if row.name == best else ""
+             for row in campaign.rows]  # fmt: skip
+    return headed("campaign", rows, kinds, unit=unit)
 
 
 def _dead_time_cells(row: CampaignRow, scale: float) -> list[str]:
@@ -166,5 +166,5 @@ def amplitude_table(campaign: Campaign) -> Table:
     rows = []
     for amplitude, line in campaign.by_amplitude().iterrows():
         found = (in_digits(float(line[name])) for name in ("delay", "std", "gain", "gain_std"))
-        rows.append(Row((in_digits(float(str(amplitude))), str(int(line["records"])), *found)))
+        rows.append((in_digits(float(str(amplitude))), str(int(line["records"])), *found))
     return headed("amplitudes", rows)

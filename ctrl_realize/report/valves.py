@@ -6,16 +6,16 @@ import os
 from pathlib import Path
 from typing import Any, Unpack
 
-import numpy as np
 
 from .. import plots
 from .._checks import check_type
+from .._wording import in_digits
 from ..valves.definitions import DEFINITIONS
 from ..valves.metrics import words_of
 from ..valves.result import ValveReport
 from ..valves.words import in_words, limit_in_words
 from .build import About, write_report
-from .page import Row, Table, headed, pairs
+from .page import Table, headed, pairs
 from .sketches import Sketch, sketch
 from .verdict import JUDGEMENTS, Verdict
 
@@ -110,27 +110,25 @@ def _sketches(result: ValveReport) -> list[Sketch]:
 
 
 def _metric_table(result: ValveReport) -> Table:
-    rows = []
+    rows, kinds = [], []
     for one in result.metrics:
         value, interval = in_words(one.interval, one.definition.unit)
         limit = limit_in_words(one) if one.limit != (None, None) else ""
-        cells = (one.definition.name, value, interval.strip("()"), one.where, limit, one.judgement)
-        kind = {"met": "best", "not met": "failed"}.get(one.judgement, "")
-        rows.append(Row(cells, kind))
-    return headed("metrics", rows)
+        name = one.definition.name
+        rows.append((name, value, interval.strip("()"), one.where, limit, one.judgement))
+        kinds.append({"met": "best", "not met": "failed"}.get(one.judgement, ""))
+    return headed("metrics", rows, kinds)
 
 
 def _size_table(result: ValveReport) -> Table:
-    rows = tuple(
-        Row(
-            (
-                words_of(group), str(group.count), f"{group.moved}, {group.settled}",
-                *(_cell(group.estimates[name], DEFINITIONS[name].unit) for name in _SHOWN),
-                _cell(group.fitted_dead_time, "s"),
-            )
+    rows = [
+        (
+            words_of(group), str(group.count), f"{group.moved}, {group.settled}",
+            *(_cell(group.estimates[name], DEFINITIONS[name].unit) for name in _SHOWN),
+            _cell(group.fitted_dead_time, "s"),
         )
         for group in result.groups
-    )  # fmt: skip
+    ]  # fmt: skip
     return headed("sizes", rows, **DEFINITIONS)
 
 
@@ -144,23 +142,17 @@ def _missing_tables(result: ValveReport) -> list[Table]:
 
 
 def _step_table(result: ValveReport) -> Table:
-    rows = tuple(
-        Row(
-            (
-                result.records[one.record].name or str(one.record + 1), f"{one.time:.5g}",
-                f"{one.before:.4g} to {one.after:.4g}", "yes" if one.moved else "no",
-                "yes" if one.settled else "no",
-                *(f"{one.values[name]:.4g}" if np.isfinite(one.values[name]) else ""
-                  for name in _SHOWN),
-            )
+    rows = [
+        (
+            result.records[one.record].name or str(one.record + 1), f"{one.time:.5g}",
+            f"{one.before:.4g} to {one.after:.4g}", "yes" if one.moved else "no",
+            "yes" if one.settled else "no", *(in_digits(one.values[name]) for name in _SHOWN),
         )
         for one in result.steps
-    )  # fmt: skip
+    ]  # fmt: skip
     return headed("steps", rows, **DEFINITIONS)
 
 
 def _definition_table() -> Table:
-    rows = tuple(
-        Row((one.name, one.sentence, one.source, one.needs)) for one in DEFINITIONS.values()
-    )
+    rows = [(one.name, one.sentence, one.source, one.needs) for one in DEFINITIONS.values()]
     return headed("definitions", rows)

@@ -124,20 +124,16 @@ def valve_report(
     )
     groups = grouped(steps, given, fit=fit)
     curve, statics = _statics(given, parts, steps, ranges)
-    metrics = collected(groups, statics)
     flags = [*flags_of(steps, groups, parts, ranges)]
     if fit and any(flag.code == "no_valve_test" for flag in flags):
         model = _fit_of_operation(given)
-        flags += [model[1]] if model else []
-        metrics = tuple(
-            one if not model or one.key != "fitted_dead_time"
-            else type(one)(one.key, one.definition, model[0], "all records, not by steps")
-            for one in metrics
-        )  # fmt: skip
+        if model is not None:
+            statics["fitted_dead_time"] = model[0], "all records, not by steps"
+            flags.append(model[1])
     return ValveReport(
-        metrics=judged(metrics, groups, limits), groups=groups, steps=steps, parts=parts,
-        curve=curve,
-        ranges=ranges, records=given, choices=tuple(choices), flags=tuple(flags),
+        metrics=judged(collected(groups, statics), groups, limits), groups=groups, steps=steps,
+        parts=parts, curve=curve, ranges=ranges, records=given, choices=tuple(choices),
+        flags=tuple(flags),
     )  # fmt: skip
 
 
@@ -217,9 +213,7 @@ def _statics(
     # a ramp before levels, the longer before the shorter
     known = [one for one in curves if one is not None]
     curve = max(known, key=lambda one: (one.origin == "ramp", np.ptp(one.command)), default=None)
-    band, resolution, backlash = (
-        joined([one for one in own if one.is_known]) for own in zip(*found, strict=True)
-    )
+    band, resolution, backlash = (joined(own) for own in zip(*found, strict=True))
     lag_known = bool(np.isfinite(delay))
     # An unknown lag widens the loop at every command alike, as a dead band does.
     hysteresis, linearity, width = hysteresis_and_linearity(

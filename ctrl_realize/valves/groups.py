@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..data import Record
+from ..delayed import fit_of
 from ..errors import CtrlRealizeError, DataWarning
 from ..identification.methods import identify
 from ..identification.output_error.result import OutputErrorFit
@@ -116,17 +117,17 @@ def grouped(
 def _group(steps: list[StepMetrics], records: Sequence[Record], fit: bool) -> SizeAndDirection:
     moved = [one for one in steps if one.moved]
     common = any(one.common for one in steps)
-    estimates = {
-        name: mean_of([(one.values[name], one.errors[name]) for one in moved], common)
-        for name in STEP_METRICS
-    }
-    gains = [(one.values["gain"], one.errors["gain"]) for one in steps]
+
+    def mean(name: str, own: Sequence[StepMetrics]) -> Interval:
+        return mean_of([(one.values[name], one.errors[name]) for one in own], common)
+
+    means = {name: mean(name, moved) for name in STEP_METRICS}
     estimates = {
         name: replace(one, low=max(one.low, 0.0)) if one.is_known else one
-        for name, one in estimates.items()
+        for name, one in means.items()
     }
-    estimates["gain"] = mean_of(gains, common)
-    estimates["gain_scatter"] = scatter_of([gain for gain, _ in gains])
+    estimates["gain"] = mean("gain", steps)
+    estimates["gain_scatter"] = scatter_of([one.values["gain"] for one in steps])
     return SizeAndDirection(
         size=float(np.mean([abs(one.size) for one in steps])),
         direction=steps[0].direction,
@@ -200,12 +201,11 @@ def linear_fit(
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", DataWarning)
             if len(records) == 1:
-                fit = identify(records[0], structures=structures).fit
+                model = identify(records[0], structures=structures)
             else:
-                fit = identify(records, structures=structures, gains="own").fit
+                model = identify(records, structures=structures, gains="own")
+            fit = fit_of(model, OutputErrorFit)
     except CtrlRealizeError:
-        return None
-    if not isinstance(fit, OutputErrorFit):
         return None
     return fit, Interval(fit.dead_time, *fit.interval, len(records))
 

@@ -73,7 +73,7 @@ def collected(
     """Metrics of a report: of those that depend on the step, the worst size and direction."""
     steps = [one for one in groups if not one.stroke] or list(groups)
     followed = [one for one in steps if one.moved == one.count] or steps
-    found = dict(statics)
+    found = {}
     without = "; without full strokes" if len(steps) < len(groups) else ""
     for key in _TIMES:
         # a response to a step that is lost in the dead band is a part of one
@@ -95,7 +95,7 @@ def collected(
         strokes = [(one.estimates["t98"], words_of(one)) for one in own if one.stroke]
         found[f"stroke_time_{way}"] = _largest(strokes)
     return tuple(
-        Metric(key, definition, *found.get(key, (Interval(), "")))
+        Metric(key, definition, *(found | statics).get(key, (Interval(), "")))
         for key, definition in DEFINITIONS.items()
     )
 
@@ -154,16 +154,12 @@ def judged(
 ) -> tuple[Metric, ...]:
     """Compare metrics with limits; limits by size add a metric for each size and direction."""
     given = limits or {}
-    out, by_size = [], []
+    sized = {key: limit for key, limit in given.items() if isinstance(limit, Mapping)}
+    plain = given.keys() - sized.keys()
+    found = [_with_limit(one, given[one.key]) if one.key in plain else one for one in metrics]
     for one in metrics:
-        if one.key not in given:
-            out.append(one)
-        elif isinstance(given[one.key], Mapping):
-            out.append(one)
-            by_size += _of_sizes(one, groups, given[one.key])
-        else:
-            out.append(_with_limit(one, given[one.key]))
-    return (*out, *by_size)
+        found += _of_sizes(one, groups, sized.get(one.key, {}))
+    return tuple(found)
 
 
 def _with_limit(one: Metric, given: Any) -> Metric:

@@ -75,24 +75,22 @@ def dead_band_and_resolution(
     steps: Sequence[StepMetrics], parts: Sequence[TestPart], ranges: Ranges
 ) -> tuple[Interval, Interval, Interval]:
     """Dead band, resolution and backlash from the staircases of one record, in % of the span."""
-    bands, resolutions, backlashes = [], [], []
+    found = []
     stairs = [part for part in parts if part.kind == "staircase"]
     # Coarse stairs tell less, and of a stem that sticks only the play.
     finest = min((abs(part.edges[0].amplitude) for part in stairs), default=0.0)
     for part in stairs:
         own = [step for step in steps if step.command_edge in part.edges]
         coarse = abs(part.edges[0].amplitude) > _COARSER * finest
-        if coarse or max(abs(one.size) for one in own) > _LARGEST_STAIR:
-            continue
-        band, resolution, backlash = _of_staircase(own, ranges)
-        bands += [band] if band.is_known else []
-        resolutions += [resolution] if np.isfinite(resolution.high) else []
-        backlashes += [backlash] if backlash.is_known else []
+        if not coarse and max(abs(one.size) for one in own) <= _LARGEST_STAIR:
+            found.append(_of_staircase(own, ranges))
+    bands, resolutions, backlashes = zip(*found, strict=True) if found else ((), (), ())
     return joined(bands), joined(resolutions), joined(backlashes)
 
 
-def joined(found: Sequence[Interval]) -> Interval:
-    """Of several estimates the intersection of the intervals, or the range if there is none."""
+def joined(estimates: Sequence[Interval]) -> Interval:
+    """Of the known estimates the intersection of the intervals, or the range if there is none."""
+    found = [one for one in estimates if one.is_known]
     if not found:
         return Interval()
     count = sum(one.count for one in found)

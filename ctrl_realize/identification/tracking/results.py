@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from ..._wording import in_time
-from ...numerics.arrays import BoolArray, FloatArray, locked, read_only
+from ...numerics.arrays import BoolArray, FloatArray, locked
 from ...results import Flag, IntervalKind, ModelFit, Result
 
 
@@ -200,17 +200,9 @@ class TrackHistory(Result):
 
 def track_of(points: Sequence[TrackPoint], dt: float) -> TrackHistory:
     """Collect single estimates in the arrays of a history."""
-
-    def along(values: Iterable[float]) -> FloatArray:
-        return read_only(np.array(list(values)))
-
-    return TrackHistory(
-        time=along(point.time for point in points),
-        dead_time=along(point.dead_time for point in points),
-        low=along(point.interval[0] for point in points),
-        high=along(point.interval[1] for point in points),
-        gain_ratio=along(point.gain_ratio for point in points),
-        resolved=locked(np.array([point.resolved for point in points])),
-        lost=locked(np.array([point.lost for point in points])),
-        dt=dt,
+    names = ("time", "dead_time", "gain_ratio", "resolved", "lost")
+    found = {name: locked(np.array([getattr(one, name) for one in points])) for name in names}
+    low, high = (
+        locked(np.array(ends)) for ends in zip(*(one.interval for one in points), strict=True)
     )
+    return TrackHistory(low=low, high=high, dt=dt, **found)

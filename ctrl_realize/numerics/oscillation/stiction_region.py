@@ -68,24 +68,19 @@ class Region:
         center, fresh = self.best, {(0, 0)}
         while fresh and len(known) < _MOST_CELLS:
             wanted = {(i + di, j + dj) for i, j in fresh for di, dj in _NEIGHBOURS} - known.keys()
-            places = [
-                each
-                for each in sorted(wanted)
-                if 0
-                <= center.jump + self.cell[1] * each[1]
-                <= center.stick + self.cell[0] * each[0]
-            ]
-            if not places:
+            table = np.array(sorted(wanted), dtype=np.int64).reshape(-1, 2)
+            sticks = center.stick + self.cell[0] * table[:, 0]
+            jumps = center.jump + self.cell[1] * table[:, 1]
+            inside = (jumps >= 0) & (jumps <= sticks)
+            if not inside.any():
                 break
-            table = np.array(places, dtype=np.float64)
-            trials = self._tried(
-                center.stick + self.cell[0] * table[:, 0], center.jump + self.cell[1] * table[:, 1]
-            )
-            known.update(zip(places, trials, strict=True))
-            self.best = min(self.best, *trials)
-            fresh = {
-                place for place, one in zip(places, trials, strict=True) if self._is_inside(one)
+            trials = self._tried(sticks[inside], jumps[inside])
+            tried = {
+                (i, j): one for (i, j), one in zip(table[inside].tolist(), trials, strict=True)
             }
+            known |= tried
+            self.best = min(self.best, *trials)
+            fresh = {place for place, one in tried.items() if self._is_inside(one)}
         return [one for one in known.values() if self._is_inside(one)]
 
     def _is_inside(self, trial: Trial) -> bool:

@@ -118,9 +118,6 @@ def _without_short_gaps(good: np.ndarray) -> np.ndarray:
 
 def _longest_part(good: np.ndarray) -> tuple[int, int]:
     """First and last index of the longest run of true values."""
-    edges = np.flatnonzero(np.diff(np.r_[False, good, False].astype(int)))
-    if not edges.size:
-        return 0, 0
-    starts, stops = edges[::2], edges[1::2]
-    k = int(np.argmax(stops - starts))
-    return int(starts[k]), int(stops[k])
+    runs = np.flatnonzero(np.diff(np.r_[False, good, False])).reshape(-1, 2).tolist()
+    first, last = max(runs, key=lambda run: run[1] - run[0], default=(0, 0))
+    return first, last

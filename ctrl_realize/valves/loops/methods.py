@@ -89,20 +89,15 @@ def oscillation_methods(cycles: Cycles | None, signal: str) -> list[LoopMethod]:
     )
     most = f"from {_IAE_ALIKE:g}; none up to {_IAE_NOT_ALIKE:g}"
     words: tuple[MethodVerdict, MethodVerdict] = ("oscillation", "no oscillation")
+    regular, decays = regularity > _ACF_REGULAR, decay > _ACF_DECAY
     return [
-        _method(
-            "acf_zeros", signal, f"above {_ACF_REGULAR:g}", (regularity,), note,
-            _verdict(regularity > _ACF_REGULAR, regularity <= _ACF_REGULAR, words),
-        ),
-        _method(
-            "acf_decay", signal, f"above {_ACF_DECAY:g}", (decay,), note,
-            _verdict(decay > _ACF_DECAY, decay <= _ACF_DECAY, words),
-        ),
-        _method(
-            "iae", signal, most, (alike,), note,
-            _verdict(alike >= _IAE_ALIKE, alike <= _IAE_NOT_ALIKE, words),
-        ),
-    ]  # fmt: skip
+        _method(key, signal, limit, (index,), note, _verdict(yes, no, words))
+        for key, limit, index, yes, no in (
+            ("acf_zeros", f"above {_ACF_REGULAR:g}", regularity, regular, not regular),
+            ("acf_decay", f"above {_ACF_DECAY:g}", decay, decays, not decays),
+            ("iae", most, alike, alike >= _IAE_ALIKE, alike <= _IAE_NOT_ALIKE),
+        )
+    ]
 
 
 def horch(found: CrossCorrelation | None, process: LoopProcess, note: str) -> LoopMethod:
