@@ -11,7 +11,7 @@ from contextlib import AbstractContextManager, suppress
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from .._wording import times_in
 from ..data import Record
@@ -23,6 +23,8 @@ from . import loops, model_view, models, outputs, records, saving
 from .data_view import Row, data_view
 from .drawing import JSON
 from .state import State, changed, empty
+
+T = TypeVar("T")
 
 _KEPT, _MOST_UNDONE = 48, 200
 _REFUSED = (CtrlRealizeError, ArithmeticError, ValueError, KeyError)
@@ -255,21 +257,18 @@ class Session:
             raise found
         return found
 
-    def _now(self, *given: Any) -> Any:
-        return self._get(task_of(*given), at_once=True)
+    def _now(self, what: str, given: Any, call: Callable[..., T], *arguments: Any) -> T:
+        found: T = self._get(task_of(what, given, call, *arguments), at_once=True)
+        return found
 
     def _raw(self, index: int) -> tuple[Record, list[str]]:
         row = self.state["records"][index]
         given = [row[key] for key in ("file", "options", "given", "name")]
-        found: tuple[Record, list[str]] = self._now(
-            "reading", given, records.read, self.files[row["file"]], row
-        )
-        return found
+        return self._now("reading", given, records.read, self.files[row["file"]], row)
 
     def _record(self, index: int) -> Record:
         raw, row = self._raw(index)[0], self.state["records"][index]
-        found: Record = self._now("changing", row, records.edited, raw, row)
-        return found
+        return self._now("changing", row, records.edited, raw, row)
 
     def _records(self) -> list[Record]:
         used = [k for k, row in enumerate(self.state["records"]) if row["used"]]

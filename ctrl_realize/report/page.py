@@ -146,7 +146,7 @@ def pairs(
 
 
 def headed(
-    key: str, rows: Sequence[Sequence[str]], kinds: Sequence[str] | None = None, **words: Any
+    key: str, rows: Sequence[Sequence[str]], kinds: Sequence[str] | None = None, /, **words: Any
 ) -> Table:
     """Make a table with the title, the columns and the note of a row of `tables.toml`.
 

@@ -6,7 +6,6 @@ import os
 from pathlib import Path
 from typing import Any, Unpack
 
-
 from .. import plots
 from .._checks import check_type
 from .._wording import in_digits

@@ -72,9 +72,8 @@ class SizeAndDirection:
         Steps; of them, those at which the output moved; of those, how many settled.
     estimates : mapping of str to Interval
         The metrics of `StepMetrics.values`, over the steps that moved; ``"gain"`` is over all
-        steps, ``"gain_scatter"`` is its standard deviation between steps.
-    fitted_dead_time : Interval
-        Dead time in s by `identify` on these steps together; unknown without a fit.
+        steps, ``"gain_scatter"`` is its standard deviation between steps, ``"fitted_dead_time"``
+        that of `identify` on these steps together.
 
     Examples
     --------
@@ -92,7 +91,11 @@ class SizeAndDirection:
     moved: int
     settled: int
     estimates: dict[str, Interval]
-    fitted_dead_time: Interval
+
+    @property
+    def fitted_dead_time(self) -> Interval:
+        """Dead time in s by `identify` on these steps together; unknown without a fit."""
+        return self.estimates["fitted_dead_time"]
 
 
 def grouped(
@@ -128,6 +131,7 @@ def _group(steps: list[StepMetrics], records: Sequence[Record], fit: bool) -> Si
     }
     estimates["gain"] = mean("gain", steps)
     estimates["gain_scatter"] = scatter_of([one.values["gain"] for one in steps])
+    estimates["fitted_dead_time"] = _fitted_dead_time(moved, records) if fit else Interval()
     return SizeAndDirection(
         size=float(np.mean([abs(one.size) for one in steps])),
         direction=steps[0].direction,
@@ -136,7 +140,6 @@ def _group(steps: list[StepMetrics], records: Sequence[Record], fit: bool) -> Si
         moved=len(moved),
         settled=sum(one.settled for one in moved),
         estimates=estimates,
-        fitted_dead_time=_fitted_dead_time(moved, records) if fit else Interval(),
     )
 
 

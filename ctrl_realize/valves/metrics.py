@@ -75,13 +75,10 @@ def collected(
     followed = [one for one in steps if one.moved == one.count] or steps
     found = {}
     without = "; without full strokes" if len(steps) < len(groups) else ""
-    for key in _TIMES:
+    for key in (*_TIMES, "fitted_dead_time"):
         # a response to a step that is lost in the dead band is a part of one
-        own = steps if key == "dead_time" else followed
+        own = steps if "dead_time" in key else followed
         found[key] = _largest([(one.estimates[key], words_of(one) + without) for one in own])
-    found["fitted_dead_time"] = _largest(
-        [(one.fitted_dead_time, words_of(one) + without) for one in steps]
-    )
     gains = [(one.estimates["gain"], words_of(one)) for one in groups if one.moved]
     if gains:
         # that farthest from one
@@ -94,8 +91,9 @@ def collected(
         found[f"slew_rate_{way}"] = _rate(own)
         strokes = [(one.estimates["t98"], words_of(one)) for one in own if one.stroke]
         found[f"stroke_time_{way}"] = _largest(strokes)
+    found |= dict(statics)
     return tuple(
-        Metric(key, definition, *(found | statics).get(key, (Interval(), "")))
+        Metric(key, definition, *found.get(key, (Interval(), "")))
         for key, definition in DEFINITIONS.items()
     )
 
@@ -177,11 +175,7 @@ def _of_sizes(
         wanted = float(size)
         own = [group for group in groups if abs(group.size - wanted) <= 0.15 * wanted]
         for group in own:
-            interval = (
-                group.fitted_dead_time if one.key == "fitted_dead_time"
-                else group.estimates[one.key]
-            )  # fmt: skip
-            metric = Metric(one.key, one.definition, interval, words_of(group))
+            metric = Metric(one.key, one.definition, group.estimates[one.key], words_of(group))
             found.append(_with_limit(metric, limit))
         if not own:
             metric = Metric(one.key, one.definition, Interval(), f"{wanted:g} %: no such step")

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import groupby
+from operator import itemgetter
 
 import numpy as np
 
@@ -11,7 +13,6 @@ from .._wording import in_time
 from ..data import Record
 from ..data.given import as_record
 from ..errors import NoStepError, OptionError
-from ..numerics.arrays import FloatArray
 from .parts import range_of, split_test
 from .plan import ValveTestPlan
 from .steps import Ranges, measured_steps
@@ -148,28 +149,24 @@ def _assembled(
     levels: list[tuple[str, float, float]], ramp: float, small: float, dt: float,
     ends: tuple[float, float], late: float, t98: float, assumed: bool,
 ) -> ValveTestPlan:  # fmt: skip
-    pieces: list[FloatArray] = []
-    sections: list[tuple[str, float, float]] = []
-    start = 0
-    for name, level, seconds in levels:
-        count = max(int(np.ceil(seconds / dt)), 8)
-        pieces.append(np.full(count, level))
-        if sections and sections[-1][0] == name:
-            sections[-1] = (name, sections[-1][1], start + count)
-        else:
-            sections.append((name, start, start + count))
-        start += count
-    at = levels[-1][1]
-    along = int(np.ceil(ramp / dt))
-    rest = max(int(np.ceil(small / dt)), 8)
-    way = [np.linspace(at, 0.0, int(along * at / 100), endpoint=False)] if at else []
-    way += [
-        np.full(rest, 0.0), np.linspace(0, 100, along, endpoint=False), np.full(rest, 100.0),
-        np.linspace(100, 0, along, endpoint=False), np.full(rest, 0.0),
+    def samples(seconds: float) -> int:
+        return max(int(np.ceil(seconds / dt)), 8)
+
+    pieces = [(name, level, level, samples(seconds)) for name, level, seconds in levels]
+    at, along, rest = levels[-1][1], int(np.ceil(ramp / dt)), samples(small)
+    pieces += [
+        ("slow ramp", at, 0.0, int(along * at / 100)), ("slow ramp", 0.0, 0.0, rest),
+        ("slow ramp", 0.0, 100.0, along), ("slow ramp", 100.0, 100.0, rest),
+        ("slow ramp", 100.0, 0.0, along), ("slow ramp", 0.0, 0.0, rest),
     ]  # fmt: skip
-    pieces += way
-    sections.append(("slow ramp", start, start + sum(one.size for one in way)))
-    percent = np.concatenate(pieces)
+    percent = np.concatenate(
+        [np.linspace(a, b, count, endpoint=False) for _, a, b, count in pieces]
+    )
+    sections, start = [], 0
+    for name, own in groupby(pieces, key=itemgetter(0)):
+        stop = start + sum(count for *_, count in own)
+        sections.append((name, start * dt, stop * dt))
+        start = stop
     choices = [f"speed: dead time {in_time(late)}, T98 {in_time(t98)}"]
     if assumed:
         choices.append(
@@ -180,8 +177,8 @@ def _assembled(
         time=dt * np.arange(percent.size, dtype=np.float64),
         command=ends[0] + percent * (ends[1] - ends[0]) / 100,
         command_range=ends,
-        sections=tuple((name, a * dt, b * dt) for name, a, b in sections),
-        hold=max(int(np.ceil(small / dt)), 8) * dt,
+        sections=tuple(sections),
+        hold=rest * dt,
         choices=tuple(choices),
     )
 

@@ -198,8 +198,7 @@ class ValveReport(Result):
                 "size": one.size, "direction": one.direction, "stroke": one.stroke,
                 "count": one.count, "moved": one.moved, "settled": one.settled,
             }  # fmt: skip
-            named = {**one.estimates, "fitted_dead_time": one.fitted_dead_time}
-            for key, found in named.items():
+            for key, found in one.estimates.items():
                 row |= {key: found.value, f"{key}_low": found.low, f"{key}_high": found.high}
             rows.append(row)
         return pd.DataFrame(rows)

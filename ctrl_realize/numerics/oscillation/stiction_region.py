@@ -17,6 +17,7 @@ References
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import compress
 
 import numpy as np
 
@@ -68,16 +69,15 @@ class Region:
         center, fresh = self.best, {(0, 0)}
         while fresh and len(known) < _MOST_CELLS:
             wanted = {(i + di, j + dj) for i, j in fresh for di, dj in _NEIGHBOURS} - known.keys()
-            table = np.array(sorted(wanted), dtype=np.int64).reshape(-1, 2)
+            places = sorted(wanted)
+            table = np.array(places, dtype=np.float64).reshape(-1, 2)
             sticks = center.stick + self.cell[0] * table[:, 0]
             jumps = center.jump + self.cell[1] * table[:, 1]
             inside = (jumps >= 0) & (jumps <= sticks)
             if not inside.any():
                 break
             trials = self._tried(sticks[inside], jumps[inside])
-            tried = {
-                (i, j): one for (i, j), one in zip(table[inside].tolist(), trials, strict=True)
-            }
+            tried = dict(zip(compress(places, inside), trials, strict=True))
             known |= tried
             self.best = min(self.best, *trials)
             fresh = {place for place, one in tried.items() if self._is_inside(one)}
