@@ -44,11 +44,6 @@ class TunedLoop:
     warnings: tuple[str, ...]
 
 
-def middle_time(system: DelayedStateSpace) -> float:
-    """Dead time of a plant with half a sample for the hold, in s; a sample at least."""
-    return max(float(system.dead_time) + 0.5 * float(system.dt), float(system.dt))
-
-
 def rule_options(settings: Mapping[str, Any], system: DelayedStateSpace) -> JSON:
     """Keyword arguments of `pid` for the settings of a page."""
     rule, kind, speed = (settings[key] for key in ("rule", "kind", "speed"))
@@ -92,12 +87,13 @@ def _simulated(
 
     Where a sample is short beside the loop, controller and plants are sampled more coarsely.
     """
-    count, wait = _SAMPLES if whole else _FEW_SAMPLES, middle_time(system)
+    count, step = _SAMPLES if whole else _FEW_SAMPLES, float(system.dt)
+    wait = max(float(system.dead_time) + 0.5 * step, step)  # with half a sample for the hold
     slow = controller.ti if np.isfinite(controller.ti) else wait
-    every = max(1, int(np.ceil(_SETTLED * (slow + 3 * wait) / count / float(system.dt))))
+    every = max(1, int(np.ceil(_SETTLED * (slow + 3 * wait) / count / step)))
     plants, fit = _plants(system) if whole else [system], system.fit
     if every > 1 and isinstance(fit, OutputErrorFit):
-        dt, found = every * float(system.dt), fit.plausible_models if whole else None
+        dt, found = every * step, fit.plausible_models if whole else None
         controller = controller.discretised(dt)
         parts = [(fit.estimate.numerator, fit.poles, fit.dead_time)]
         parts += [(m.numerator, m.poles, m.dead_time) for m in (found.models if found else ())]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -100,12 +100,13 @@ def sketch(
     *results: Any,
     size: tuple[float, float] = (6.2, 4.0),
     words: Mapping[str, str] | None = None,
+    key: str | None = None,
     **options: Any,
 ) -> Sketch:
     """Make a figure by a plot function, with the title and caption of a row of `figures.toml`."""
     title, caption = (_WORDS[name][part].format(**(words or {})) for part in ("title", "caption"))
     draw = lambda figure: plot(*results, ax=figure, **options)  # noqa: E731
-    return Sketch(name.partition(".")[0], title, caption, draw, size)
+    return Sketch(key or name.partition(".")[0], title, caption, draw, size)
 
 
 def identification_sketches(
@@ -143,8 +144,10 @@ def fit_sketches(system: DelayedStateSpace, step: StepResponse | None) -> list[S
     elif step is not None:
         sketches.append(sketch("step", plots.step_plot, step, system))
     if isinstance(fit, StateSpaceFit) and fit.checks:
-        labels = fit.records[0].output_labels
-        sketches += [_output_sketch(fit, i, label) for i, label in enumerate(labels)]
+        plot, size = plots.state_space_fit_plot, (6.2, 5.4)
+        for i, label in enumerate(fit.records[0].output_labels):
+            words, key = {"label": label}, f"output_{i}"
+            sketches.append(sketch("output", plot, fit, output=i, size=size, words=words, key=key))
     if isinstance(fit, DelayScan):
         sketches.append(sketch("delay", plots.delay_plot, fit))
         sketches.append(sketch("impulse", plots.impulse_plot, fit.impulse, system))
@@ -160,12 +163,6 @@ def _each_record(
     words = {"more": f" {more} more records are not shown." if more > 0 else ""}
     size = (6.2, 0.6 + 1.7 * each_record_rows(len(records)))
     return sketch("each_record", plots.each_record_plot, system, records, size=size, words=words)
-
-
-def _output_sketch(fit: StateSpaceFit, output: int, label: str) -> Sketch:
-    plot, words = plots.state_space_fit_plot, {"label": label}
-    made = sketch("output", plot, fit, output=output, size=(6.2, 5.4), words=words)
-    return replace(made, key=f"output_{output}")
 
 
 def frf_sketches(

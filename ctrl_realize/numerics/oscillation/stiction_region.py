@@ -76,7 +76,10 @@ class Region:
             inside = (jumps >= 0) & (jumps <= sticks)
             if not inside.any():
                 break
-            trials = self._tried(sticks[inside], jumps[inside])
+            best, period = self.best, self.loop.period
+            lags = sorted({*near(best.lag, 1.1, period), *near(best.lag, 1.25, period)})
+            delays = near_delays(self.loop, best.delay, 2)
+            trials = self.loop.best(sticks[inside], jumps[inside], lags, delays, [best.start])
             tried = dict(zip(compress(places, inside), trials, strict=True))
             known |= tried
             self.best = min(self.best, *trials)
@@ -85,12 +88,6 @@ class Region:
 
     def _is_inside(self, trial: Trial) -> bool:
         return trial.error <= self.limit * self.best.error
-
-    def _tried(self, sticks: FloatArray, jumps: FloatArray) -> list[Trial]:
-        best, loop = self.best, self.loop
-        lags = sorted({*near(best.lag, 1.1, loop.period), *near(best.lag, 1.25, loop.period)})
-        delays = near_delays(loop, best.delay, 2)
-        return loop.best(sticks, jumps, lags, delays, [best.start])
 
 
 def near(lag: float, factor: float, period: float) -> list[float]:
