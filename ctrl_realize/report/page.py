@@ -18,7 +18,7 @@ from markupsafe import Markup
 from .._facts import facts
 from ..io.atomic import write_text
 from .sketches import Sketch
-from .verdict import Level
+from .verdict import Level, Verdict
 
 # control characters, and those that change the direction of writing, may occur in file names
 _CONTROLS = (*range(9), 11, 12, *range(14, 32), *range(127, 160))
@@ -179,7 +179,20 @@ def _template() -> Template:
     return environment.from_string(html, globals=parts)
 
 
-def write_page(path: str | os.PathLike[str], **content: Any) -> Path:
+def write_page(
+    path: str | os.PathLike[str],
+    *,
+    title: str,
+    subtitle: str,
+    verdict: Verdict,
+    version: str,
+    figures: Sequence[Sketch] = (),
+    tables: Sequence[Table] = (),
+    calls: Sequence[tuple[str, str]] = (),
+    simulated: bool = False,
+    parameters: Table | None = None,
+    controller: Controller | None = None,
+) -> Path:
     """Write a page to a file, atomically; all text is escaped, control characters are removed.
 
     Parameters
@@ -219,15 +232,15 @@ def write_page(path: str | os.PathLike[str], **content: Any) -> Path:
     >>> system = cr.identify(cr.bench.valve().step_record(16, rng=5), method="scan")
     >>> content = {
     ...     "title": "Valve 7", "subtitle": "before the overhaul", "version": cr.__version__,
-    ...     "verdict": report.verdict_of(system), "simulated": False, "parameters": None,
-    ...     "tables": [pairs("Bench", [("shaker", "4.2 kg")])], "figures": (), "calls": (),
-    ...     "controller": None,
+    ...     "verdict": report.verdict_of(system),
+    ...     "tables": [pairs("Bench", [("shaker", "4.2 kg")])],
     ... }
     >>> with tempfile.TemporaryDirectory() as folder:
     ...     html = write_page(Path(folder) / "valve.html", **content).read_text()
     >>> print(html[html.index("<h1"):html.index("</h1>") + 5])
     <h1>Valve 7</h1>
     """
+    content = {name: value for name, value in locals().items() if name != "path"}
     target = Path(path)
     write_text(target, _template().render(page=content).translate(_UNSEEN) + "\n")
     return target
