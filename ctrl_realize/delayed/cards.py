@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from abc import abstractmethod
+
 import control as ct
 import numpy as np
 
@@ -9,13 +11,35 @@ from .._shown import Card, ShownSystem, as_code
 from .._wording import in_time
 from ..data.shown_units import in_shown_units
 from ..numerics.arrays import ComplexArray
+from .deferred import DeferredMatrices
 from .parts import CoreAndDelays
 
 _MOST_POLES = 8
 
 
-class DelayedCards(ShownSystem, CoreAndDelays):
-    """Shows core and delay, not the augmented matrices."""
+class CoreCards(ShownSystem, DeferredMatrices):
+    """Shows core and delays, not the augmented matrices."""
+
+    _core: ct.StateSpace
+
+    @abstractmethod
+    def _facts(self) -> str:
+        """Delays and time base in a line."""
+
+    def _line(self) -> str:
+        name = "" if self._generic_name_check() else f" {self.name!r}"
+        signals = f"{', '.join(self.input_labels)} -> {', '.join(self.output_labels)}"
+        order = self._core.nstates
+        return f"<{type(self).__name__}{name}: {signals}, order {order}, {self._facts()}>"
+
+    def _with_signals(self, rows: list[tuple[str, str]]) -> Card:
+        name = "" if self._generic_name_check() else f" {self.name}"
+        signals = f"{', '.join(self.input_labels)} → {', '.join(self.output_labels)}"
+        return Card(f"{type(self).__name__}{name}", [("signals", signals), *rows])
+
+
+class DelayedCards(CoreCards, CoreAndDelays):
+    """Shows what is before and behind the core."""
 
     def _shift(self) -> str:
         if isinstance(self.delay, int):
@@ -34,14 +58,9 @@ class DelayedCards(ShownSystem, CoreAndDelays):
             delays.append(f"output_delay={self.output_delays!r}")
         return f"DelayedStateSpace(\n{core},\n{', '.join(delays)}, name={self.name!r})"
 
-    def _line(self) -> str:
-        name = "" if self._generic_name_check() else f" {self.name!r}"
-        signals = f"{', '.join(self.input_labels)} -> {', '.join(self.output_labels)}"
+    def _facts(self) -> str:
         fit = f", fit: {self.fit!r}" if self.fit is not None else ""
-        return (
-            f"<DelayedStateSpace{name}: {signals}, order {self._core.nstates}, {self._shift()}, "
-            f"dt = {self.dt:.6g} s{fit}>"
-        )
+        return f"{self._shift()}, dt = {self.dt:.6g} s{fit}"
 
     def __str__(self) -> str:
         lines = [self._line(), "", "core:", *matrix_lines(self._core), f"times {self._shift()}"]
@@ -49,10 +68,7 @@ class DelayedCards(ShownSystem, CoreAndDelays):
 
     @in_shown_units
     def _card(self) -> Card:
-        name = "" if self._generic_name_check() else f" {self.name}"
-        signals = f"{', '.join(self.input_labels)} → {', '.join(self.output_labels)}"
         rows = [
-            ("signals", signals),
             ("dead time", self._wait()),
             ("sample time", in_time(self.dt, 6)),
             ("core", f"order {self._core.nstates}"),
@@ -65,7 +81,7 @@ class DelayedCards(ShownSystem, CoreAndDelays):
             )
         if self.fit is not None:
             rows.append(("fit", repr(self.fit).strip("<>")))
-        return Card(f"DelayedStateSpace{name}", rows)
+        return self._with_signals(rows)
 
 
 def matrix_lines(core: ct.StateSpace) -> list[str]:

@@ -27,15 +27,10 @@ def parse_delays(given: int | Sequence[int], count: int, name: str, side: str) -
         raise DelayRangeError(f"{error}; for a fractional dead time see delayed_ss") from None
 
 
-def chain_labels(
-    inputs: Sequence[str], outputs: Sequence[str], before: tuple[int, ...], behind: tuple[int, ...]
-) -> list[str]:
-    """Name the states of the chains: u[k-1] ... and, for outputs before their delay, y*[k-1]."""
-    labels = [f"{u}[k-{i}]" for u, d in zip(inputs, before, strict=True) for i in range(1, d + 1)]
-    labels += [
-        f"{y}*[k-{i}]" for y, q in zip(outputs, behind, strict=True) for i in range(1, q + 1)
-    ]
-    return labels
+def past_of(signals: Sequence[str], delays: Sequence[float]) -> list[str]:
+    """Name the states of delay lines: u[k-1] ... u[k-d] of each signal."""
+    each = zip(signals, delays, strict=True)
+    return [f"{signal}[k-{i}]" for signal, delay in each for i in range(1, int(delay) + 1)]
 
 
 def augment(core: Matrices, before: Sequence[int], behind: Sequence[int]) -> Matrices:

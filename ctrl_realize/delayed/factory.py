@@ -80,10 +80,8 @@ def delayed_ss(
     >>> cr.delayed_ss(lag, dead_time=0.025, dt=0.01)
     <DelayedStateSpace: u -> y, order 1, z^-3 (0.03 s), dt = 0.01 s>
     """
-    kinds, expected = (
-        (ct.StateSpace, ct.TransferFunction),
-        "a control.StateSpace or TransferFunction",
-    )
+    expected = "a control.StateSpace or TransferFunction"
+    kinds = ct.StateSpace, ct.TransferFunction
     check_type(core, kinds, "core", expected, UnsuitableSystemError)
     if delay is not None and dead_time is not None:
         raise OptionError(f"delay={delay!r} and dead_time={dead_time!r}: expected one of them")
@@ -94,21 +92,20 @@ def delayed_ss(
         DelayedStateSpace, output_delay=output_delay, fit=fit, name=name, inputs=inputs,
         outputs=outputs, time_unit=time_unit,
     )  # fmt: skip
-    dead_time = None if dead_time is None else real(dead_time, "dead_time", "dead time in s, >= 0")
-    if dead_time is not None and dead_time < 0:
-        raise DelayRangeError(f"dead_time={dead_time:g} s; expected a value >= 0")
+    wait = 0.0 if dead_time is None else real(dead_time, "dead_time", "dead time in s, >= 0")
+    if wait < 0:
+        raise DelayRangeError(f"dead_time={wait:g} s; expected a value >= 0")
     if system.isctime(strict=True) or (dt is not None and system.dt is None):
         if dt is None:
             raise UnsuitableSystemError("the core is continuous; give dt, its sample time in s")
         step = positive(dt, "dt", "sample time in s")
-        _check_span(system, dead_time or 0.0, step)
-        if delay is None and split_dead_time(dead_time or 0.0, step)[1] and np.any(system.D):
+        _check_span(system, wait, step)
+        if split_dead_time(wait, step)[1] and np.any(system.D):
             raise UnsuitableSystemError(
                 "the core has a feedthrough D, whose response jumps between two samples when "
-                f"the dead time is {(dead_time or 0.0) / step:.6g} samples; use a whole number of "
-                "samples"
+                f"the dead time is {wait / step:.6g} samples; use a whole number of samples"
             )
-        *sampled, samples = sample_with_dead_time(*matrices_of(system), step, dead_time or 0.0)
+        *sampled, samples = sample_with_dead_time(*matrices_of(system), step, wait)
         if not all(np.isfinite(M).all() for M in sampled):
             raise UnsuitableSystemError(
                 f"sampled every {step:g} s the core has non-finite entries; its poles reach "
@@ -119,17 +116,14 @@ def delayed_ss(
     check_core(system)
     if dt is not None and not np.isclose(positive(dt, "dt", "sample time in s"), system.dt):
         raise OptionError(f"dt={dt:g} s, but the core has the sample time {system.dt:g} s")
-    if dead_time is not None:
-        _check_span(system, dead_time, system.dt)
-        delay, rest = split_dead_time(dead_time, system.dt)
-        if rest:
-            raise DelayRangeError(
-                f"dead_time={dead_time:g} s is {dead_time / system.dt:.6g} samples of "
-                f"{system.dt:g} s; "
-                "a discrete core needs a whole number of samples (a continuous core takes "
-                "any dead time)"
-            )
-    return made(system, 0 if delay is None else delay)
+    _check_span(system, wait, system.dt)
+    samples, rest = split_dead_time(wait, system.dt)
+    if rest:
+        raise DelayRangeError(
+            f"dead_time={wait:g} s is {wait / system.dt:.6g} samples of {system.dt:g} s; a "
+            "discrete core needs a whole number of samples (a continuous core takes any dead time)"
+        )
+    return made(system, samples if delay is None else delay)
 
 
 def _check_span(system: ct.StateSpace, dead_time: float, step: float) -> None:
@@ -139,8 +133,9 @@ def _check_span(system: ct.StateSpace, dead_time: float, step: float) -> None:
             f"dead_time={dead_time:g} s is {dead_time / step:.3g} samples of {step:g} s; at most "
             f"{MAX_DELAY} are allowed: use a longer sample time"
         )
-    largest = max(float(np.abs(M).max(initial=0.0)) for M in (system.A, system.B))
-    if system.isctime() and not math.isfinite(largest * step):
+    matrices = (system.A, system.B) if system.isctime() else ()
+    largest = max((float(np.abs(M).max(initial=0.0)) for M in matrices), default=0.0)
+    if not math.isfinite(largest * step):
         raise UnsuitableSystemError(
             f"the core has entries up to {largest:.3g} per s, too large for samples of {step:g} s: "
             "use a shorter dt"

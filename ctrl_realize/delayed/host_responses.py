@@ -18,7 +18,9 @@ from .._checks import finite
 from ..errors import DataError, UnsuitableSystemError
 from ..numerics.arrays import ComplexArray, FloatArray, IntArray
 from ..numerics.internal_delays.form import DelayForm
+from ..numerics.state_space.responses import Schur, schur_form
 from .host_margins import HostMargins
+from .parts import settled_values
 
 PLAIN = frozenset({"squeeze", "transpose"})
 """Arguments of python-control's responses that need no states."""
@@ -36,17 +38,17 @@ ON_CIRCLE = 1e-8
 class HostResponses(HostMargins):
     """Time responses without matrices."""
 
+    _core: ct.StateSpace
+    _schur: Schur | None = None
     _stepped: tuple[DelayForm, IntArray] | None = None
+
+    @abstractmethod
+    def _values(self, schur: Schur, points: ComplexArray) -> ComplexArray:
+        """Transfer matrix (p, m, K), with the Schur form of the core's A."""
 
     @abstractmethod
     def _simulated(self, inputs: FloatArray, state: FloatArray | None = None) -> FloatArray:
         """Compute the outputs (p, N) from zero initial state, or from a given one."""
-
-    def _in_continuous_time(
-        self, kind: str, timepts: Any, inputs: Any, state: ArrayLike, settings: dict[str, Any]
-    ) -> ct.TimeResponseData:
-        """Response of a system with internal delays, which alone may be continuous."""
-        raise NotImplementedError
 
     @abstractmethod
     def dominant_poles(self, count: int = 10) -> ComplexArray:
@@ -82,6 +84,20 @@ class HostResponses(HostMargins):
         last = np.append(first[1:], self.nstates)[: first.size] - 1
         given = np.atleast_1d(np.asarray(u, dtype=np.float64))
         return form, state, np.concatenate([given, state[last]]), first
+
+    def horner(self, x: ArrayLike, warn_infinite: bool = True) -> ComplexArray:
+        """Evaluate the transfer matrix, shape (outputs, inputs, K).
+
+        See `control.StateSpace.horner`; the cost does not grow with the delays.
+        """
+        points = np.atleast_1d(np.asarray(x, dtype=np.complex128))
+        if points.ndim > 1:
+            raise ValueError("input list must be 1D")
+        if self._schur is None:
+            self._schur = schur_form(self._core.A)
+        return settled_values(
+            self._values(self._schur, points), points, warn_infinite=warn_infinite
+        )
 
     def simulate(self, inputs: ArrayLike) -> FloatArray:
         """Compute the response to any input from zero initial state, sample by sample.
@@ -157,15 +173,7 @@ class HostResponses(HostMargins):
         .. [1] A. Bellen and M. Zennaro, Numerical Methods for Delay Differential Equations, Oxford
            University Press 2003, chapters 2 and 3, doi:10.1093/acprof:oso/9780198506546.001.0001.
         """
-        if not self.dt:
-            return self._in_continuous_time("forced", timepts, inputs, initial_state, settings)
-        if set(settings) - PLAIN:
-            return super().forced_response(timepts, inputs, initial_state, **settings)
-        given = finite(inputs, "inputs")
-        times = self._times(timepts, np.atleast_2d(given).shape[-1])
-        rows = self._input_rows(given, times.size)
-        outputs = self._simulated(rows, self._state(initial_state))
-        return self._data(times, outputs, inputs=rows, plot_inputs=True, **settings)
+        return self._responded("forced", timepts, inputs, initial_state, settings)
 
     def initial_response(
         self,
@@ -178,13 +186,7 @@ class HostResponses(HostMargins):
         In discrete time of all states, as in `forced_response`; in continuous time of the core,
         with ``history`` and ``tolerance`` as in `forced_response`.
         """
-        if not self.dt:
-            return self._in_continuous_time("initial", timepts, 0.0, initial_state, settings)
-        if set(settings) - PLAIN:
-            return super().initial_response(timepts, initial_state, **settings)
-        times = self._all_times(timepts)
-        rest = np.zeros((self.ninputs, times.size))
-        return self._data(times, self._simulated(rest, self._state(initial_state)), **settings)
+        return self._responded("initial", timepts, 0.0, initial_state, settings)
 
     def step_response(
         self,
@@ -198,11 +200,7 @@ class HostResponses(HostMargins):
         5000 samples at most. In continuous time from zero initial state, and ``tolerance`` is
         accepted as in `forced_response`.
         """
-        if not self.dt:
-            return self._in_continuous_time("step", timepts, 1.0, initial_state, settings)
-        if set(settings) - PLAIN:
-            return super().step_response(timepts, initial_state, **settings)
-        return self._traces(timepts, "step", 1.0, initial_state, settings)
+        return self._responded("step", timepts, 1.0, initial_state, settings)
 
     def step_info(self, timepts: ArrayLike | float | None = None, **settings: Any) -> Any:
         """Compute rise time, settling time, overshoot and so on, see `control.step_info`.
@@ -269,24 +267,27 @@ class HostResponses(HostMargins):
         In continuous time those to impulses, from zero initial state: the slope of the step
         response; impulses in the output are omitted. `timepts` as for `step_response`.
         """
-        if not self.dt:
-            return self._in_continuous_time("impulse", timepts, 1.0, 0.0, settings)
-        if set(settings) - PLAIN:
-            return super().impulse_response(timepts, **settings)
-        return self._traces(timepts, "impulse", 1 / self.dt, 0.0, settings)
+        return self._responded("impulse", timepts, 1.0, 0.0, settings)
 
-    def _traces(
-        self,
-        timepts: ArrayLike | float | None,
-        kind: str,
-        height: float,
-        state: ArrayLike,
-        settings: dict[str, Any],
+    def _responded(
+        self, kind: str, timepts: Any, inputs: Any, state: ArrayLike, settings: dict[str, Any]
     ) -> ct.TimeResponseData:
+        """Respond in discrete time; systems with internal delays do so in continuous time, too."""
+        if set(settings) - PLAIN:
+            given = {"forced": (inputs, state), "impulse": ()}.get(kind, (state,))
+            return getattr(super(), f"{kind}_response")(timepts, *given, **settings)
+        if kind == "forced":
+            inputs = finite(inputs, "inputs")
+            times = self._times(timepts, np.atleast_2d(inputs).shape[-1])
+            rows = self._input_rows(inputs, times.size)
+            outputs = self._simulated(rows, self._state(state))
+            return self._data(times, outputs, inputs=rows, plot_inputs=True, **settings)
         times = self._all_times(timepts)
-        signal = np.zeros(times.size)
-        signal[: 1 if kind == "impulse" else None] = height
-        drive, outputs = self._one_by_one(signal, self._state(state))
+        if kind == "initial":
+            rest = np.zeros((self.ninputs, times.size))
+            return self._data(times, self._simulated(rest, self._state(state)), **settings)
+        step, pulse = np.ones(times.size), np.eye(1, times.size)[0] / self.dt
+        drive, outputs = self._one_by_one(step if kind == "step" else pulse, self._state(state))
         return self._unit_responses(times, outputs, drive, kind, **settings)
 
     def _one_by_one(

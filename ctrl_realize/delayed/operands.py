@@ -10,7 +10,7 @@ import control as ct
 import numpy as np
 
 from ..data.shown_units import unit_among
-from ..errors import DelayRangeError, OptionError, UnsuitableSystemError
+from ..errors import OptionError, UnsuitableSystemError
 from ..numerics.internal_delays import form as forms
 from ..numerics.internal_delays.form import DelayForm
 from ..numerics.internal_delays.merging import ends_apart
@@ -174,18 +174,3 @@ def shapes(left: DelayForm, right: DelayForm) -> str:
     """Text with the sizes of two systems, for error messages."""
     one, other = (left.outputs, left.inputs), (right.outputs, right.inputs)
     return f"of (outputs, inputs) {one} and {other}"
-
-
-def whole_samples(delays: Sequence[float], dt: float) -> None:
-    """Check that delays of a discrete system are whole samples.
-
-    Raises
-    ------
-    DelayRangeError
-    """
-    for delay in delays:
-        if delay != int(delay):
-            raise DelayRangeError(
-                f"a delay is {delay:g} samples of {dt:g} s; a discrete system needs whole samples. "
-                "Define the system in continuous time and sample it: sys.to_discrete(dt)"
-            )

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from functools import wraps
 from typing import Any, ClassVar
 
 import control as ct
@@ -17,6 +18,7 @@ from .deferred import DeferredMatrices
 from .operands import (
     Numbers,
     check_divisor,
+    common_dt,
     core_states,
     everywhere,
     form_of,
@@ -31,6 +33,7 @@ from .operands import (
 )
 from .parts import signals_of
 
+Call = Callable[..., Any]
 ENDS, INSIDE = "ends", "inside"
 
 
@@ -82,9 +85,7 @@ class DelayOperators(DeferredMatrices):
         """Form of the other operand; None if it has its own operator, or is not a system."""
         if isinstance(other, (complex, np.complexfloating)):
             raise UnsuitableSystemError(f"got the complex number {other}; expected a real gain")
-        if isinstance(other, ct.FrequencyResponseData) or not is_linear(other):
-            return None
-        return form_of(other)
+        return form_of(other) if is_linear(other) else None
 
     def _scaled(self, factor: float) -> Any:
         form, labels = self._form(), (self.input_labels, self.output_labels)
@@ -167,7 +168,7 @@ class DelayOperators(DeferredMatrices):
             The feedthroughs of both form an algebraic loop without a solution, or the time bases
             differ.
         """
-        if isinstance(other, ct.FrequencyResponseData) or not is_linear(other):
+        if not is_linear(other):
             return super().feedback(other, sign)
         if isinstance(other, Numbers):
             other = float(other) * np.eye(self.ninputs, self.noutputs)
@@ -207,25 +208,48 @@ class DelayOperators(DeferredMatrices):
         return self._joined(form, **time_base(self, other))
 
 
+def left_to_the_other(original: Call) -> Call:
+    """Leave a product or sum with a system that has delays to that system's operators."""
+
+    @wraps(original)
+    def operator(self: Any, other: Any) -> Any:
+        if isinstance(other, DelayOperators) and not isinstance(self, DelayOperators):
+            return NotImplemented  # Python asks the other operand then
+        return original(self, other)
+
+    return operator
+
+
+def with_delays(original: Call) -> Call:
+    """Do an interconnection with a system that has delays as if this one had some, too."""
+
+    @wraps(original)
+    def method(self: Any, other: Any = 1, *more: Any, **settings: Any) -> Any:
+        if isinstance(other, DelayOperators) and not isinstance(self, DelayOperators):
+            return getattr(_delayed(self, other), original.__name__)(other, *more, **settings)
+        return original(self, other, *more, **settings)
+
+    return method
+
+
+def _delayed(system: Any, beside: Any) -> Any:
+    """Make a system with delays, of which it has none, so that its operators are exact."""
+    names = {**signals_of(system), "name": system.name}
+    form, sizes = form_of(system), (beside.ninputs, beside.noutputs)
+    if form.states == 0 and is_single(form) and sizes != (1, 1):
+        # the number 1 in ct.feedback(1, L), which python-control has made a system
+        form, names = form_of(float(form.D[0, 0]) * np.eye(*sizes)), {}
+    inside = DelayOperators._kinds[INSIDE]
+    return inside(plain(form, common_dt(system, beside)), (), **names)
+
+
 class BesideDelays(ct.StateSpace):  # type: ignore[misc]  # control is untyped
     """Controller that leaves operations with delayed systems to their operators."""
 
-    def __mul__(self, other: Any) -> Any:
-        return NotImplemented if isinstance(other, DelayOperators) else super().__mul__(other)
-
-    def __add__(self, other: Any) -> Any:
-        return NotImplemented if isinstance(other, DelayOperators) else super().__add__(other)
-
-    def __sub__(self, other: Any) -> Any:
-        return NotImplemented if isinstance(other, DelayOperators) else super().__sub__(other)
-
-    def feedback(self, other: Any = 1, sign: float = -1) -> Any:
-        """Close `other` around this controller; see `control.feedback`."""
-        if not isinstance(other, DelayOperators):
-            return super().feedback(other, sign)
-        inside = DelayOperators._kinds[INSIDE]
-        own = inside(plain(form_of(self), self.dt), (), **signals_of(self))
-        return own.feedback(other, sign)
+    __mul__ = left_to_the_other(ct.StateSpace.__mul__)
+    __add__ = left_to_the_other(ct.StateSpace.__add__)
+    __sub__ = left_to_the_other(ct.StateSpace.__sub__)
+    feedback = with_delays(ct.StateSpace.feedback)
 
 
 @contextmanager

@@ -12,7 +12,7 @@ import numpy as np
 from .._checks import check_type, system_names
 from ..errors import OptionError, UnsuitableSystemError
 from ..numerics.arrays import ComplexArray, IntArray, Matrices
-from .chains import chain_labels
+from .chains import past_of
 from .deferred import DeferredMatrices
 
 MAX_DELAY = 10_000_000
@@ -31,8 +31,9 @@ class CoreAndDelays(DeferredMatrices):
     output_delays: tuple[int, ...]
 
     def _name_states(self) -> list[str]:
-        delays = self.input_delays, self.output_delays
-        chain = chain_labels(self.input_labels, self.output_labels, *delays)
+        chain = past_of(self.input_labels, self.input_delays)
+        # outputs before their delay
+        chain += past_of([f"{y}*" for y in self.output_labels], self.output_delays)
         names = dict.fromkeys([*self._core.state_labels, *chain])
         if len(names) < self.nstates:
             # A core that itself was made of core and delays has state names of delay lines.

@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from .._checks import integer
 from ..numerics.arrays import ComplexArray, FloatArray, later
@@ -13,32 +12,21 @@ from ..numerics.internal_delays.recurrence import recurrence
 from ..numerics.state_space import responses
 from .chains import powers
 from .host_responses import HostResponses
-from .parts import CoreAndDelays, matrices_of, settled_values
+from .parts import CoreAndDelays, matrices_of
 
 
 class DelayedResponses(HostResponses, CoreAndDelays):
     """Responses whose cost does not grow with the delay."""
 
-    _schur: responses.Schur | None
-
-    def horner(self, x: ArrayLike, warn_infinite: bool = True) -> ComplexArray:
-        """Evaluate the transfer matrix: core(x) x^-d, shape (outputs, inputs, K).
-
-        See `control.StateSpace.horner`; the cost does not grow with the delay.
-        """
-        points = np.atleast_1d(np.asarray(x, dtype=np.complex128))
-        if points.ndim > 1:
-            raise ValueError("input list must be 1D")
+    def _values(self, schur: responses.Schur, points: ComplexArray) -> ComplexArray:
         core = self._core
-        if self._schur is None:
-            self._schur = responses.schur_form(core.A)
         with np.errstate(divide="ignore", invalid="ignore"):
-            out = responses.frequency_response(self._schur, core.B, core.C, core.D, points)
+            out = responses.frequency_response(schur, core.B, core.C, core.D, points)
             if any(self.input_delays):
                 out = out * powers(points, self.input_delays)[None, :, :]
             if any(self.output_delays):
                 out = out * powers(points, self.output_delays)[:, None, :]
-        return settled_values(out, points, warn_infinite=warn_infinite)
+        return out
 
     def markov(self, count: int) -> FloatArray:
         """Compute the unit-pulse response, delay included.

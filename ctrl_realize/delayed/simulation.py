@@ -13,12 +13,9 @@ from ..data import Record
 from ..data.given import check_complete, check_input
 from ..errors import DataError, UnsuitableSystemError
 from ..numerics.arrays import FloatArray, later, unit_columns
-from ..numerics.internal_delays.form import DelayForm, delayed_ends
 from ..numerics.state_space.responses import markov, step_response
-from ..numerics.state_space.sampling import continuous_ends
-from . import DelayedStateSpace, DelaySystem
-from .inside.conversions import check_logarithm
-from .operands import plain
+from . import DelayedStateSpace
+from .inside.conversions import continuous
 from .parts import matrices_of
 
 Start = Literal["estimate", "rest"]
@@ -139,10 +136,4 @@ def as_delayed(system: Any, record: Record, *, stable: bool = True) -> DelayedSt
 
 def _on_axis(model: DelayedStateSpace, step: float) -> DelayedStateSpace:
     """Sample the continuous model again, at the steps of the time axis of irregular stamps."""
-    core = model.delay_free
-    check_logarithm(core.A)
-    ends = model.input_delays, model.output_delays
-    matrices, *delays = continuous_ends(matrices_of(core), float(core.dt), *ends)
-    form = delayed_ends(DelayForm(*matrices), *delays)
-    sampled: Any = DelaySystem(plain(form, 0), form.delays).to_discrete(step)
-    return sampled.replace(fit=model.fit)  # type: ignore[no-any-return]
+    return continuous(model).to_discrete(step).replace(fit=model.fit)  # type: ignore[no-any-return]

@@ -161,7 +161,6 @@ class DelayedStateSpace(
         self.input_delays = before
         self.output_delays = behind
         self.fit: ModelFit | None = fit
-        self._schur = None
         self._locked = True
 
     def replace(self, **changes: Any) -> DelayedStateSpace:

@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike
 from .._shown import Card, ShownSystem
 from .._wording import in_time
 from ..data.shown_units import in_shown_units
+from ..delayed.chains import past_of
 from ..delayed.operators import DelayOperators
 from ..numerics.arrays import ComplexArray, FloatArray, read_only
 from ..numerics.internal_delays.form import DelayForm
@@ -111,9 +112,8 @@ class DelayLineController(ShownSystem, DelayOperators):
         return full_A, full_B, full_C, D.copy()
 
     def _name_states(self) -> list[str]:
-        (out,) = self.output_labels
-        past = [f"{out}[k-{i}]" for i in range(1, self.line_length + 1)]
-        return [f"x[{i}]" for i in range(self._parts[0].shape[0])] + past
+        inner = [f"x[{i}]" for i in range(self.inner_poles.size)]
+        return inner + past_of(self.output_labels, [self.line_length])
 
     def _without_matrices(self) -> str:
         return (

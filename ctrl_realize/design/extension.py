@@ -3,22 +3,17 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable
 from functools import wraps
 from threading import local
 from typing import Any
 
 import control as ct
-import numpy as np
 
-from ..delayed import DelaySystem, exp, interconnect
-from ..delayed.operands import common_dt, form_of, is_linear, plain
-from ..delayed.operators import DelayOperators
-from ..delayed.parts import signals_of
+from ..delayed import exp, interconnect
+from ..delayed.operands import is_linear
+from ..delayed.operators import Call, DelayOperators, left_to_the_other, with_delays
 from .loops.gang_of_four import gang_of_four
 from .loops.root_locus import root_locus
-
-Call = Callable[..., Any]
 
 
 class ControlExtension:
@@ -45,9 +40,9 @@ class ControlExtension:
                     self._change(module, held, changed)
         for owner in (ct.TransferFunction, ct.StateSpace):
             for name in ("__mul__", "__add__", "__sub__"):
-                self._change(owner, name, _left_to_the_other(vars(owner)[name]))
+                self._change(owner, name, left_to_the_other(vars(owner)[name]))
             for name in ("feedback", "append"):
-                self._change(owner, name, _with_delays(vars(owner)[name]))
+                self._change(owner, name, with_delays(vars(owner)[name]))
         self._change(ct.TransferFunction, "exp", exp)
         self._change(ct, "exp", exp)
 
@@ -133,36 +128,6 @@ def _by_system(original: Call, exact: Call) -> Call:
             _inside.exact = False
 
     return chosen
-
-
-def _left_to_the_other(original: Call) -> Call:
-    @wraps(original)
-    def operator(self: Any, other: Any) -> Any:
-        if isinstance(other, DelayOperators) and not isinstance(self, DelayOperators):
-            return NotImplemented  # Python asks the other operand then
-        return original(self, other)
-
-    return operator
-
-
-def _with_delays(original: Call) -> Call:
-    @wraps(original)
-    def method(self: Any, other: Any = 1, *more: Any, **settings: Any) -> Any:
-        if isinstance(other, DelayOperators) and not isinstance(self, DelayOperators):
-            return getattr(_delayed(self, other), original.__name__)(other, *more, **settings)
-        return original(self, other, *more, **settings)
-
-    return method
-
-
-def _delayed(system: Any, beside: Any) -> Any:
-    """Make a system with delays, of which it has none, so that its operators are exact."""
-    names = {**signals_of(system), "name": system.name}
-    form, sizes = form_of(system), (beside.ninputs, beside.noutputs)
-    if (form.states, form.inputs, form.outputs) == (0, 1, 1) and sizes != (1, 1):
-        # the number 1 in ct.feedback(1, L), which python-control has made a system
-        form, names = form_of(float(form.D[0, 0]) * np.eye(*sizes)), {}
-    return DelaySystem(plain(form, common_dt(system, beside)), (), **names)
 
 
 def _response(original: Call, sysdata: Any, *given: Any, **settings: Any) -> Any:

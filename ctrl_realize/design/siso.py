@@ -49,6 +49,26 @@ def delayed_system(system: Any, purpose: str, *, siso: bool = True) -> DelayedSt
     return DelayedStateSpace(proper_ss(system, purpose), 0, **names)
 
 
+def with_dead_time(system: Any, purpose: str, dt: float | None = None) -> Any:
+    """Return one input and output as a system with delays, of which it may have none.
+
+    A number, and a gain without a time base, have the time base `dt`.
+
+    Raises
+    ------
+    UnsuitableSystemError
+        Not a linear system, not a proper one, or several channels.
+    """
+    if isinstance(system, (int, float, np.number)):
+        system = ct.StateSpace([], [], [], [[float(system)]], dt)
+    if not isinstance(system, (DelayedStateSpace, DelaySystem)):
+        plain = proper_ss(system, purpose)
+        core = plain if dt is None else ct.StateSpace(plain, dt=dt)
+        system = DelaySystem(core, name=plain.name)
+    check_single(system, purpose)
+    return system
+
+
 def is_continuous(system: Any) -> bool:
     """Whether a linear system is one in continuous time."""
     linear = isinstance(system, (ct.StateSpace, ct.TransferFunction))

@@ -14,13 +14,7 @@ from .._wording import in_time
 from ..delayed import DelayedStateSpace
 from ..design.loops.margin_result import Margins
 from ..design.loops.margins import margins
-from ..design.loops.performance import (
-    controller_responses,
-    lasting,
-    loop_times,
-    settled_responses,
-    step_responses,
-)
+from ..design.loops.performance import lasting, loop_times, settled_responses, step_responses
 from ..design.siso import delayed_system
 from ..design.tuning.algorithm import PIDAlgorithm
 from ..design.tuning.controller import PIDController
@@ -269,7 +263,7 @@ def _linear_signals(
     length = 2 ** int(np.ceil(np.log2(2 * count)))
     responses = (
         *step_responses(plant, controller, length),
-        *controller_responses(plant, controller, length),
+        *step_responses(plant, controller, length, of_controller=True),
     )
     return [height * y[:count] for height, y in zip(steps * 2, responses, strict=True)]
 

@@ -2,21 +2,17 @@
 
 from __future__ import annotations
 
-import control as ct
-
-from ..._shown import Card, ShownSystem, as_code
+from ..._shown import Card, as_code
 from ..._wording import in_time
 from ...data.shown_units import in_shown_units
-from ..cards import matrix_lines
-from ..deferred import DeferredMatrices
+from ..cards import CoreCards, matrix_lines
 
 CONTINUOUS = {None: "of any time base", 0: "continuous"}
 
 
-class InsideCards(ShownSystem, DeferredMatrices):
-    """Shows core and delays, not the augmented matrices."""
+class InsideCards(CoreCards):
+    """Shows what closes loops around the core."""
 
-    _core: ct.StateSpace
     internal_delays: tuple[float, ...]
 
     def _delays(self) -> str:
@@ -27,14 +23,9 @@ class InsideCards(ShownSystem, DeferredMatrices):
         values = ", ".join(f"{delay:g}" for delay in self.internal_delays)
         return f"internal delay{'s' if count > 1 else ''} {values} {unit}"
 
-    def _line(self) -> str:
-        name = "" if self._generic_name_check() else f" {self.name!r}"
-        signals = f"{', '.join(self.input_labels)} -> {', '.join(self.output_labels)}"
+    def _facts(self) -> str:
         base = f"dt = {self.dt:.6g} s" if self.dt else CONTINUOUS[self.dt]
-        return (
-            f"<{type(self).__name__}{name}: {signals}, order {self._core.nstates}, "
-            f"{self._delays()}, {base}>"
-        )
+        return f"{self._delays()}, {base}"
 
     def _repr_eval_(self) -> str:
         core = as_code(self._core)
@@ -49,13 +40,10 @@ class InsideCards(ShownSystem, DeferredMatrices):
 
     @in_shown_units
     def _card(self) -> Card:
-        name = "" if self._generic_name_check() else f" {self.name}"
-        signals = f"{', '.join(self.input_labels)} → {', '.join(self.output_labels)}"
         seconds = [delay * (self.dt or 1.0) for delay in self.internal_delays]
         rows = [
-            ("signals", signals),
             ("delays inside", ", ".join(in_time(t, 5) for t in seconds) or "none"),
             ("time", f"samples of {in_time(self.dt, 6)}" if self.dt else CONTINUOUS[self.dt]),
             ("core", f"order {self._core.nstates}"),
         ]
-        return Card(f"{type(self).__name__}{name}", rows)
+        return self._with_signals(rows)

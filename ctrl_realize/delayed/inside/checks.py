@@ -10,11 +10,8 @@ import control as ct
 from ..._checks import check_type
 from ..._facts import facts
 from ...errors import DelayRangeError, UnsuitableSystemError
-from ...numerics.internal_delays.form import DelayForm, without_zero_delays
 from ..deferred import DeferredMatrices
-from ..operands import plain, whole_samples
-from ..operators import solvable
-from ..parts import MAX_DELAY, check_entries, matrices_of
+from ..parts import MAX_DELAY, check_entries
 
 _INSTEAD = facts("delayed/advice.toml")["instead"]
 """What to call instead, by the function of python-control that was called."""
@@ -76,24 +73,15 @@ def check_delays(delays: tuple[float, ...], core: ct.StateSpace, dt: float | Non
     if any(delay < 0 for delay in delays):
         raise DelayRangeError(f"internal_delays={delays}; expected delays >= 0")
     if dt:
-        whole_samples(delays, dt)
+        for delay in delays:
+            if delay != int(delay):
+                raise DelayRangeError(
+                    f"a delay is {delay:g} samples of {dt:g} s; a discrete system needs whole "
+                    "samples. Define the system in continuous time and sample it: "
+                    "sys.to_discrete(dt)"
+                )
         if sum(delays) > MAX_DELAY:
             raise DelayRangeError(
                 f"the delays are {delays} samples; at most {MAX_DELAY} are allowed. Use a longer "
                 "sample time"
             )
-
-
-def without_zeros(
-    core: ct.StateSpace, delays: tuple[float, ...], dt: float
-) -> tuple[ct.StateSpace, tuple[float, ...]]:
-    """Close the channels whose delay is 0.
-
-    Raises
-    ------
-    UnsuitableSystemError
-        They close an algebraic loop.
-    """
-    with solvable("its delays of 0 s"):
-        form = without_zero_delays(DelayForm(*matrices_of(core), delays))
-    return plain(form, dt, core.state_labels), form.delays

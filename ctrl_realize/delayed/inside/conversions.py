@@ -158,19 +158,7 @@ class InsideConversions(DelayOperators):
         """
         if not self.dt:
             raise UnsuitableSystemError(f"{self.name!r} is already continuous")
-        if (paths := paths_apart(self._form())) is None:
-            raise UnsuitableSystemError(
-                f"{self.name!r} has delays in a loop that is closed in discrete time, which no "
-                "continuous system has; convert the plant, cr.design.to_continuous(plant).system, "
-                "and close the loop around it"
-            )
-        core, before, behind, left, right = paths
-        check_logarithm(core.A)
-        whole = [[int(tau) for tau in end] for end in (before, behind)]
-        found, entry, exit_ = continuous_ends(matrices_of(core), float(self.dt), *whole)
-        made = forms.through(forms.delayed_ends(DelayForm(*found), entry, exit_), left, right)
-        base: dict[str, Any] = {"dt": 0.0, "time_unit": self.time_unit}
-        return self._joined(made, self.input_labels, self.output_labels, **base)
+        return continuous(self)
 
     def sample(
         self, Ts: float, method: str = "zoh", *, name: str | None = None, **settings: Any
@@ -204,6 +192,23 @@ class InsideConversions(DelayOperators):
             "for a discrete controller, sample the plant and close the loop in discrete time",
             ModelWarning,
         )
+
+
+def continuous(system: DelayOperators) -> Any:
+    """Invert the hold of a discrete system whose delays are in paths of their own."""
+    if (paths := paths_apart(system._form())) is None:
+        raise UnsuitableSystemError(
+            f"{system.name!r} has delays in a loop that is closed in discrete time, which no "
+            "continuous system has; convert the plant, cr.design.to_continuous(plant).system, "
+            "and close the loop around it"
+        )
+    core, before, behind, left, right = paths
+    check_logarithm(core.A)
+    whole = [[int(tau) for tau in end] for end in (before, behind)]
+    found, entry, exit_ = continuous_ends(matrices_of(core), float(system.dt), *whole)
+    made = forms.through(forms.delayed_ends(DelayForm(*found), entry, exit_), left, right)
+    base: dict[str, Any] = {"dt": 0.0, "time_unit": system.time_unit}
+    return system._joined(made, system.input_labels, system.output_labels, **base)
 
 
 def check_logarithm(A: FloatArray) -> None:

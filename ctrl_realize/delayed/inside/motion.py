@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from typing import Any
 
 import control as ct
 import numpy as np
@@ -11,7 +12,7 @@ from numpy.typing import ArrayLike
 from ..._checks import finite, positive
 from ...errors import DataError, ModelWarning, UnsuitableSystemError, warn_caller
 from ...numerics.arrays import FloatArray
-from ...numerics.internal_delays.equation import TooManyStepsError, solve
+from ...numerics.internal_delays.equation import Signal, TooManyStepsError, solve
 from ..host_responses import spread
 from .poles import InsidePoles
 
@@ -31,59 +32,44 @@ class Motion(InsidePoles):
         inputs: ArrayLike | Callable[[FloatArray], FloatArray] = 0.0,
         initial_state: ArrayLike = 0.0,
         *,
+        shown: Mapping[str, Any],
         history: ArrayLike = 0.0,
         tolerance: float = TOLERANCE,
-        squeeze: bool | None = None,
-        transpose: bool = False,
     ) -> ct.TimeResponseData:
         """Compute the response to any input, linear between the given times."""
         times = _checked_times(timepts, self.name)
-        m = self.ninputs
         if callable(inputs):
-            given = inputs
-
-            def signal(t: FloatArray) -> FloatArray:
-                return np.asarray(given(t), dtype=np.float64).reshape(m, t.size)
-
-            breaks = np.zeros(0)
+            signal, breaks = _called(inputs, self.ninputs), np.zeros(0)
         else:
             rows = self._input_rows(inputs, times.size)
-
-            def signal(t: FloatArray) -> FloatArray:
-                return np.stack([np.interp(t, times, row) for row in rows])
-
+            signal = _between(times, rows)
             kinks = np.abs(np.diff(rows, 2)) > 1e-12 * np.abs(rows).max(initial=0.0)
             breaks = times[1:-1][kinks.any(axis=0)]
         outputs = self._solved(
             signal, times, breaks, tolerance, initial_state=initial_state, history=history
         )
-        options = {"squeeze": squeeze, "transpose": transpose, "plot_inputs": True}
-        return self._data(times, outputs, signal(times), **options)
+        return self._data(times, outputs, signal(times), plot_inputs=True, **shown)
 
     def _unit_motion(
         self,
         timepts: ArrayLike | float | None,
         kind: str,
         *,
+        shown: Mapping[str, Any],
         tolerance: float = TOLERANCE,
-        squeeze: bool | None = None,
-        transpose: bool = False,
     ) -> ct.TimeResponseData:
         """Compute the responses to a unit step, or a unit impulse, on each input."""
         times = self._motion_times(timepts)
-        units, pulse = np.eye(self.ninputs)[:, :, None], kind == "impulse"
+        drive, pulse = np.eye(self.ninputs)[:, :, None] * np.ones(times.size), kind == "impulse"
         every = [
-            self._solved(_constant(unit), times, np.zeros(0), tolerance, slope=pulse)
-            for unit in units
+            self._solved(_between(times, rows), times, np.zeros(0), tolerance, slope=pulse)
+            for rows in drive
         ]
-        drive = units * np.ones(times.size)
-        return self._unit_responses(
-            times, np.stack(every, axis=1), drive, kind, squeeze=squeeze, transpose=transpose
-        )
+        return self._unit_responses(times, np.stack(every, axis=1), drive, kind, **shown)
 
     def _solved(
         self,
-        signal: Callable[[FloatArray], FloatArray],
+        signal: Signal,
         times: FloatArray,
         breaks: FloatArray,
         tolerance: float,
@@ -139,9 +125,14 @@ class Motion(InsidePoles):
         return min(max(slow + delay, 5 * delay), 100 * delay + slow) or 1.0
 
 
-def _constant(inputs: FloatArray) -> Callable[[FloatArray], FloatArray]:
-    """Make the signal that is the inputs (m, 1) at all times."""
-    return lambda t: np.repeat(inputs, t.size, axis=1)
+def _called(given: Signal, count: int) -> Signal:
+    """Make the signal of a function, whose values may have another shape for one input."""
+    return lambda t: np.asarray(given(t), dtype=np.float64).reshape(count, t.size)
+
+
+def _between(times: FloatArray, rows: FloatArray) -> Signal:
+    """Make the signal that is linear between the given values (m, K)."""
+    return lambda t: np.stack([np.interp(t, times, row) for row in rows])
 
 
 def _checked_times(timepts: ArrayLike | None, name: str) -> FloatArray:

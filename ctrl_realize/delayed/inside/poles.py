@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import control as ct
 import numpy as np
 
 from ..._checks import integer
@@ -23,7 +22,6 @@ FIRST_POLES, MOST_POLES = 20, 640
 class InsidePoles(HostResponses, DelayOperators):
     """Roots of the characteristic function; the matrices of the delays are not formed."""
 
-    _core: ct.StateSpace
     internal_delays: tuple[float, ...]
 
     def poles(self) -> ComplexArray:

@@ -12,40 +12,31 @@ from ..._checks import integer
 from ...errors import OptionError
 from ...numerics.arrays import ComplexArray, FloatArray
 from ...numerics.internal_delays.recurrence import recurrence
-from ...numerics.internal_delays.response import Response
-from ..host_responses import HostResponses
+from ...numerics.internal_delays.response import response
+from ...numerics.state_space.responses import Schur
+from ..host_responses import PLAIN, HostResponses
 from ..operators import DelayOperators
-from ..parts import settled_values
 from .motion import Motion
 
 
 class InsideResponses(Motion, HostResponses, DelayOperators):
     """Responses whose cost does not depend on the delays."""
 
-    _core: ct.StateSpace
-    _response: Response | None
+    def _values(self, schur: Schur, points: ComplexArray) -> ComplexArray:
+        return response(self._form(), schur, points, discrete=bool(self.dt))
 
-    def horner(self, x: ArrayLike, warn_infinite: bool = True) -> ComplexArray:
-        """Evaluate the transfer matrix, shape (outputs, inputs, K).
-
-        See `control.StateSpace.horner`; the cost does not grow with the delays.
-        """
-        points = np.atleast_1d(np.asarray(x, dtype=np.complex128))
-        if points.ndim > 1:
-            raise ValueError("input list must be 1D")
-        if self._response is None:
-            self._response = Response(self._form(), discrete=bool(self.dt))
-        return settled_values(self._response(points), points, warn_infinite=warn_infinite)
-
-    def _in_continuous_time(
+    def _responded(
         self, kind: str, timepts: Any, inputs: Any, state: ArrayLike, settings: dict[str, Any]
     ) -> ct.TimeResponseData:
+        if self.dt:
+            return super()._responded(kind, timepts, inputs, state, settings)
         if kind == "step" and np.any(state):
             raise OptionError("a step response starts from rest; use sys.forced_response")
+        shown = {key: settings.pop(key) for key in PLAIN & settings.keys()}
         if kind in ("step", "impulse"):
-            return self._unit_motion(timepts, kind, **settings)
+            return self._unit_motion(timepts, kind, shown=shown, **settings)
         times = self._motion_times(timepts) if kind == "initial" else timepts
-        return self._forced_motion(times, inputs, state, **settings)
+        return self._forced_motion(times, inputs, state, shown=shown, **settings)
 
     def markov(self, count: int) -> FloatArray:
         """Compute the unit-pulse response.

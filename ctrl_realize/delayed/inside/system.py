@@ -15,14 +15,14 @@ import numpy as np
 
 from ..._checks import real, system_name
 from ...numerics.arrays import Matrices
-from ...numerics.internal_delays.form import DelayForm, through
+from ...numerics.internal_delays.form import DelayForm, through, without_zero_delays
 from ...numerics.internal_delays.merging import ends_apart
-from ...numerics.internal_delays.response import Response
+from ..chains import past_of
 from ..operands import plain, time_base
-from ..operators import INSIDE, DelayOperators
+from ..operators import INSIDE, DelayOperators, solvable
 from ..parts import matrices_of, named, parts_of, signal_names, signals_of, stand_in, with_core
 from .cards import InsideCards
-from .checks import check_core, check_delays, not_rational, without_zeros
+from .checks import check_core, check_delays, not_rational
 from .conversions import InsideConversions
 from .responses import InsideResponses
 
@@ -118,7 +118,9 @@ class DelaySystem(InsideResponses, InsideConversions, InsideCards, DelayOperator
         input_names = signal_names(inputs, core.input_labels[: core.ninputs - q], "u")
         output_names = signal_names(outputs, core.output_labels[: core.noutputs - q], "y")
         if 0 in delays:
-            core, delays = without_zeros(core, delays, float(core.dt))
+            with solvable("its delays of 0 s"):
+                form = without_zero_delays(DelayForm(*matrices_of(core), delays))
+            core, delays = plain(form, dt, core.state_labels), form.delays
             q = len(delays)
         states = core.nstates + (int(sum(delays)) if dt else 0)
         called = None if name is None else system_name(name)
@@ -128,7 +130,6 @@ class DelaySystem(InsideResponses, InsideConversions, InsideCards, DelayOperator
         out = [*output_names, *(f"z[{i}]" for i in range(q))]
         self._core = named(core, into, out, core.state_labels, name=f"{self.name}_core")
         self.internal_delays = delays
-        self._response: Response | None = None
         self._locked = True
 
     @property
@@ -160,11 +161,9 @@ class DelaySystem(InsideResponses, InsideConversions, InsideCards, DelayOperator
         return super()._make_matrices()
 
     def _name_states(self) -> list[str]:
-        names = list(self._core.state_labels)
-        if self.dt:
-            for i, delay in enumerate(self.internal_delays):
-                names += [f"z[{i}][k-{k}]" for k in range(1, int(delay) + 1)]
-        return names
+        delays = self.internal_delays if self.dt else ()
+        ends = [f"z[{i}]" for i in range(len(delays))]
+        return [*self._core.state_labels, *past_of(ends, delays)]
 
     def _without_matrices(self) -> str:
         return (

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import control as ct
@@ -27,35 +27,32 @@ from .loop import open_loop
 class DataLoop:
     """Loop response on a grid, interpolated in log magnitude and delay-free phase.
 
-    ``log_gain`` and ``phase`` are monotone cubics over log omega that pass through the points
-    without overshoot; ``phase`` excludes ``dead_time``.
+    ``course``, log gain and phase without ``dead_time``, is of monotone cubics over log omega that
+    pass through the points without overshoot.
     """
 
-    omega: FloatArray
-    values: ComplexArray
-    std: FloatArray | None
-    repeats: float | None
+    points: MeasuredPoints
     dead_time: float
-    log_gain: Any
-    phase: Any
+    course: Any
     unstable_poles: int
     integrators: int
     left_out: tuple[Flag, ...] = ()
 
     def __call__(self, omega: FloatArray) -> ComplexArray:
         """Interpolated response."""
-        x = np.log(omega)
-        turn = self.phase(x) - omega * self.dead_time
-        return np.asarray(np.exp(self.log_gain(x) + 1j * turn), dtype=np.complex128)
+        log_gain, phase = self.course(np.log(omega)).T
+        turn = phase - omega * self.dead_time
+        return np.asarray(np.exp(log_gain + 1j * turn), dtype=np.complex128)
 
     def dense(self) -> tuple[FloatArray, ComplexArray]:
         """Grid with 8 points between neighbours, and more for a long delay."""
-        low, top = self.omega[0], self.omega[-1]
-        ratios = np.log(self.omega[1:] / self.omega[:-1])
+        omega = self.points.omega
+        low, top = omega[0], omega[-1]
+        ratios = np.log(omega[1:] / omega[:-1])
         share = np.arange(8) / 8
-        inner = (self.omega[:-1, None] * np.exp(ratios[:, None] * share)).ravel()
+        inner = (omega[:-1, None] * np.exp(ratios[:, None] * share)).ravel()
         turns = int(16 * abs(self.dead_time) * top / (2 * np.pi)) + 2
-        grid = np.unique(np.concatenate([inner, self.omega, np.linspace(low, top, turns)]))
+        grid = np.unique(np.concatenate([inner, omega, np.linspace(low, top, turns)]))
         return grid, self(grid)
 
     def closed_loop_count(self) -> tuple[int, bool]:
@@ -78,12 +75,12 @@ class DataLoop:
     def flags(self) -> Iterator[Flag]:
         """Flag assumptions about the response outside of the band."""
         yield from self.left_out
-        first, last = self.values[0], self.values[-1]
+        omega, (first, last) = self.points.omega, self.points.response[[0, -1]]
         if abs(last) > 0.9:
-            yield flagged("band_ends_early", size=abs(last), omega=self.omega[-1])
+            yield flagged("band_ends_early", size=abs(last), omega=omega[-1])
         if self.integrators == 0 and abs(np.sin(np.angle(first))) > 0.5:
             phase = np.degrees(np.angle(first))
-            yield flagged("band_starts_late", omega=self.omega[0], phase=phase)
+            yield flagged("band_starts_late", omega=omega[0], phase=phase)
 
 
 def data_loop(
@@ -101,7 +98,7 @@ def data_loop(
     system = None if isinstance(other, ct.FrequencyResponseData | None) else open_loop(other)
     points, left_out = below_nyquist(points, system.dt if system else None, "controller")
     _check_points(points)
-    omega, values, std, known = points.omega, points.response, points.std, 0.0
+    omega, known = points.omega, 0.0
     if other is not None:
         if system is None:
             beside = _on_grid(other, omega)
@@ -112,22 +109,18 @@ def data_loop(
             if system.dt and not (held and same_time(held, system.dt)):
                 beside = beside * hold_response(omega, system.dt)
                 beside = beside / hold_response(omega, held) if held else beside
-        values = values * beside
-        std = None if std is None else std * np.abs(beside)
+        std = None if points.std is None else points.std * np.abs(beside)
+        points = replace(points, response=points.response * beside, std=std)
+    values = points.response
     # The known delay is removed before the rest is estimated.
     dead_time = known + dead_time_from_phase(omega, values * np.exp(1j * omega * known))
     phase = unwrap_with_dead_time(omega, values, dead_time) + omega * dead_time
-    x = np.log(omega)
     if integrators is None:
         integrators = _read_integrators(omega, values)
     return DataLoop(
-        omega,
-        values,
-        std,
-        points.repeats,
+        points,
         dead_time,
-        PchipInterpolator(x, np.log(np.abs(values))),
-        PchipInterpolator(x, phase),
+        PchipInterpolator(np.log(omega), np.stack([np.log(np.abs(values)), phase], axis=1)),
         integer(unstable_poles, "unstable_poles", 0),
         integer(integrators, "integrators", 0),
         left_out,

@@ -83,30 +83,23 @@ def delay_robustness(
     >>> print(f"stable from {found.stable_from:.4f} to {found.stable_to:.4f} s")
     stable from 0.0000 to 0.2490 s
     """
+    purpose, nominal = "robustness to the dead time", 0.0
     if is_continuous(system):
-        return _continuous(system, controller, dead_time_interval)
-    plant = delayed_system(system, "robustness to the dead time")
-    warn_unresolved(plant)
-    interval = _interval(plant, dead_time_interval)
-    loop = open_loop(plant, controller)
-    return over_interval(plant, loop, loop_margins(loop), interval, MAX_DELAYS)
-
-
-def _interval(plant: Any, given: tuple[float, float] | None) -> tuple[float, float]:
-    interval = interval_of_dead_time(plant, given)
+        core, nominal = core_and_dead_time(system, purpose)
+    else:
+        core = system = delayed_system(system, purpose)
+        warn_unresolved(system)
+    interval = interval_of_dead_time(system, dead_time_interval)
     if interval is None:
         raise OptionError(
             "the model has no dead-time interval; give dead_time_interval=(low, high) in s"
         )
-    return interval
-
-
-def _continuous(system: Any, controller: Any, given: tuple[float, float] | None) -> DelayRobustness:
-    core, nominal = core_and_dead_time(system, "robustness to the dead time")
-    interval = _interval(system, given)
     loop = open_loop(core, controller, nominal)
+    found = loop_margins(loop)
+    if loop.dt:
+        return over_interval(system, loop, found, interval, MAX_DELAYS)
     delays = np.unique([*np.linspace(*interval, MAX_DELAYS), nominal])
-    return _tried(system, loop, loop_margins(loop), delays, interval, nominal)
+    return _tried(system, loop, found, delays, interval, nominal)
 
 
 def over_interval(

@@ -26,7 +26,8 @@ class DelayRobustness(Result):
     Attributes
     ----------
     delays : ndarray, shape (K,)
-        Delays that were tried, increasing: in samples, or in s for a continuous loop.
+        Delays that were tried, increasing: in samples, or in s for a continuous loop. They are
+        within the interval, but for the nominal one, which is always among them.
     stable_at : ndarray of bool, shape (K,)
     modulus_margin : ndarray, shape (K,)
         ``min |1 + L|``; 0 if unstable.
@@ -71,7 +72,7 @@ class DelayRobustness(Result):
     @property
     def stable(self) -> bool:
         """Stable over the whole interval, including delays between those tried."""
-        times = self.dead_times[self._inside()]
+        times = self.dead_times
         slack = 1e-6 * self.dt or 1e-9 * times.max()
         # nan, for a loop that is unstable at the nominal delay, compares as false.
         return bool(
@@ -82,7 +83,7 @@ class DelayRobustness(Result):
     @property
     def worst_modulus_margin(self) -> float:
         """Smallest modulus margin over the interval; its inverse is the worst Ms."""
-        return float(self.modulus_margin[self._inside()].min())
+        return float(self.modulus_margin.min())
 
     @property
     def dead_times(self) -> FloatArray:
@@ -93,14 +94,6 @@ class DelayRobustness(Result):
     def nominal_dead_time(self) -> float:
         """Nominal dead time in s."""
         return self.nominal * (self.dt or 1.0) - self.fractional_time
-
-    def _inside(self) -> BoolArray:
-        low, high = self.dead_time_interval
-        if self.dt:
-            low = np.floor((low + self.fractional_time) / self.dt + 1e-9)
-            high = np.ceil((high + self.fractional_time) / self.dt - 1e-9)
-        inside = (self.delays >= low) & (self.delays <= high)
-        return np.asarray(inside | (self.delays == self.nominal), dtype=np.bool_)
 
     def table(self) -> pd.DataFrame:
         """One row for each delay."""

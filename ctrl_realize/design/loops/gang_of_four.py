@@ -4,15 +4,12 @@ from __future__ import annotations
 
 from typing import Any
 
-import control as ct
 import numpy as np
 
-from ...delayed import DelaySystem
 from ...delayed.operands import common_dt
-from ...delayed.operators import DelayOperators
-from ...delayed.parts import check_single
 from ...errors import UnsuitableSystemError
-from ..siso import proper_ss
+from ..delay_line import DelayLineController
+from ..siso import with_dead_time
 
 
 def gang_of_four(plant: Any, controller: Any) -> Any:
@@ -62,20 +59,13 @@ def gang_of_four(plant: Any, controller: Any) -> Any:
     if all(getattr(system, "dt", None) is None for system in (plant, controller)):
         raise UnsuitableSystemError("neither the plant nor the controller has a time base dt")
     dt = common_dt(plant, controller)
-    parts = [_with_delays(system, dt) for system in (plant, controller)]
+    parts = [
+        system if isinstance(system, DelayLineController) else with_dead_time(system, "a loop", dt)
+        for system in (plant, controller)
+    ]
     both = parts[0].append(parts[1])
     # plant input v = d + u, controller input e = r - y; inputs (d, r), outputs (y, u)
     loop = both.feedback(np.array([[0.0, 1.0], [-1.0, 0.0]]), sign=1)
     four = (loop + np.array([[0.0, 0.0], [1.0, 0.0]]))[:, ::-1]
     four.update_names(name="gang_of_four", inputs=["r", "d"], outputs=["y", "v"])
     return four
-
-
-def _with_delays(system: Any, dt: float | None) -> Any:
-    if isinstance(system, (int, float, np.number)):
-        system = ct.StateSpace([], [], [], [[float(system)]], dt)
-    if not isinstance(system, DelayOperators):
-        plain = proper_ss(system, "a loop")
-        system = DelaySystem(ct.StateSpace(plain, dt=dt))
-    check_single(system, "a loop")
-    return system

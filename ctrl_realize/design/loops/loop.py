@@ -19,6 +19,7 @@ import numpy as np
 
 from ..._checks import sample_time_of
 from ...data.shown_units import unit_among
+from ...delayed.operands import Numbers
 from ...delayed.parts import check_entries
 from ...errors import UnsuitableSystemError
 from ...numerics.arrays import ComplexArray, FloatArray
@@ -167,9 +168,6 @@ def open_loop(plant: Any, controller: Any = None, dead_time: float = 0.0) -> Loo
         Systems with several channels, of mixed time bases, or not linear.
     """
     systems = [plant] if controller is None else [plant, controller]
-    for system in systems:
-        if isinstance(system, (ct.StateSpace, ct.TransferFunction, int, float, np.number)):
-            check_entries(system)
     bases = {base for base in map(_time_base, systems) if base is not None}
     if len(bases) > 1:
         words = " and ".join(f"dt = {dt:g} s" if dt else "continuous" for dt in sorted(bases))
@@ -184,13 +182,14 @@ def open_loop(plant: Any, controller: Any = None, dead_time: float = 0.0) -> Loo
 
 def _time_base(system: Any) -> float | None:
     """Return dt; 0.0 for continuous, None for a static gain."""
-    if isinstance(system, (int, float, np.number)):
-        return None
-    if not isinstance(system, (ct.StateSpace, ct.TransferFunction)):
+    if not isinstance(system, (ct.StateSpace, ct.TransferFunction, *Numbers)):
         raise UnsuitableSystemError(
             f"got a {type(system).__name__}; expected a control.StateSpace, TransferFunction, "
             "FrequencyResponseData or a number"
         )
+    check_entries(system)
+    if isinstance(system, Numbers):
+        return None
     if not system.issiso():
         raise UnsuitableSystemError(
             f"{system.name!r} has {system.ninputs} inputs and {system.noutputs} outputs; "

@@ -19,7 +19,7 @@ from ...delayed import DelayedStateSpace
 from ...errors import ModelWarning, UnsuitableSystemError, warn_caller
 from ...identification.plausible import PlausibleModels
 from ...numerics.arrays import ComplexArray
-from ...results import Result
+from ...results import ModelFit, Result
 from ..siso import interval_of_dead_time
 from .delay_robustness import over_interval
 from .delay_robustness_result import DelayRobustness
@@ -147,45 +147,39 @@ class LoopCheck(Result):
 
 
 @in_shown_units
-def loop_check(plant: Any, controller: Any, dead_time: float = 0.0) -> LoopCheck:
+def loop_check(plant: Any, controller: Any) -> LoopCheck:
     """Check the closed loop with the model, and over its interval of dead times if it has one.
 
     Parameters
     ----------
     plant : DelayedStateSpace, or a continuous system
     controller : system of the same time base
-    dead_time : float, optional
-        In s, of a continuous plant.
     """
-    loop = open_loop(plant, controller, dead_time)
+    loop = open_loop(plant, controller)
     found = loop_margins(loop)
-    flags = _sensitive(found)
-    if not isinstance(plant, DelayedStateSpace) or not found.stable:
+    flags: tuple[Flag, ...] = ()
+    if found.stable and found.ms > MOST_SENSITIVE * (1 + ROUNDED):
+        flags = (flagged("sensitive", ms=found.ms, most=MOST_SENSITIVE),)
+    fit = plant.fit if isinstance(plant, DelayedStateSpace) else None
+    if fit is None or not found.stable:
         return LoopCheck(found, flags=flags)
     interval = interval_of_dead_time(plant, None)
     robust = None if interval is None else over_interval(plant, loop, found, interval, TRIED)
-    corners = _corners(plant, loop, found, robust)
-    made = LoopCheck(found, robust, corners, by_models=_models_of(plant) is not None)
+    corners = _corners(plant, fit, loop, found, robust)
+    made = LoopCheck(found, robust, corners, by_models=fit.plausible_models is not None)
     return replace(made, flags=(*flags, *_left_open(made)))
 
 
-def _sensitive(found: Margins) -> tuple[Flag, ...]:
-    if not found.stable or found.ms <= MOST_SENSITIVE * (1 + ROUNDED):
-        return ()
-    return (flagged("sensitive", ms=found.ms, most=MOST_SENSITIVE),)
-
-
 def _corners(
-    plant: DelayedStateSpace, loop: Loop, found: Margins, robust: DelayRobustness | None
-) -> tuple[Corner, ...]:
+    plant: DelayedStateSpace, fit: ModelFit, loop: Loop, found: Margins,
+    robust: DelayRobustness | None,
+) -> tuple[Corner, ...]:  # fmt: skip
     """Ms at the ends of the intervals of dead time and gain; the gain scales the whole loop."""
-    models = _models_of(plant)
-    if models is not None and plant.fit is not None:
-        return _of_models(loop, models, plant.fit.integrators)
-    gains = _gains(plant)
+    if fit.plausible_models is not None:
+        return _of_models(loop, fit.plausible_models, fit.integrators)
+    gains = _gains(fit)
     if robust is None and not gains:
         return ()
-    nominal = plant.fit.gain if plant.fit is not None else None
     if robust is None:
         ends = [(int(plant.delay), float(plant.dead_time), found.modulus_margin)]
     else:
@@ -193,15 +187,11 @@ def _corners(
         ends = [
             (int(d), float(t), float(m)) for d, t, m in tried if d != plant.delay or len(tried) < 3
         ]
-    corners = [Corner(time, nominal, _ms(size)) for _, time, size in ends]
+    corners = [Corner(time, fit.gain, _ms(size)) for _, time, size in ends]
     for gain, ratio in gains:
         for delay, time, _ in ends:
             corners.append(Corner(time, gain, _ms(distance_if_stable(_moved(loop, delay, ratio)))))
     return tuple(corners)
-
-
-def _models_of(plant: DelayedStateSpace) -> PlausibleModels | None:
-    return None if plant.fit is None else plant.fit.plausible_models
 
 
 def _of_models(loop: Loop, models: PlausibleModels, integrators: int) -> tuple[Corner, ...]:
@@ -224,10 +214,9 @@ def _ms(modulus_margin: float) -> float:
     return 1 / modulus_margin if modulus_margin else float("inf")
 
 
-def _gains(plant: DelayedStateSpace) -> list[tuple[float, float]]:
+def _gains(fit: ModelFit) -> list[tuple[float, float]]:
     """Ends of the interval of the gain, each with its ratio to that of the model."""
-    fit = plant.fit
-    if fit is None or not fit.gain or fit.gain_interval is None:
+    if not fit.gain or fit.gain_interval is None:
         return []
     ends = [(float(end), float(end) / fit.gain) for end in fit.gain_interval]
     return ends if all(np.isfinite(ratio) and ratio for _, ratio in ends) else []
@@ -266,6 +255,21 @@ def _left_open(made: LoopCheck) -> tuple[Flag, ...]:
             corner=worst,
         )
     return (found,)
+
+
+def verified(
+    plant: Any, controller: Any, what: str, to_stabilize: str, more_robust: str
+) -> LoopCheck:
+    """Check a loop; refuse one that is unstable, and warn of one that is not robust.
+
+    Raises
+    ------
+    UnsuitableSystemError
+    """
+    check = loop_check(plant, controller)
+    refuse_unstable(check, what, to_stabilize)
+    warn_of(check, more_robust)
+    return check
 
 
 def warn_of(check: LoopCheck, advice: str) -> None:

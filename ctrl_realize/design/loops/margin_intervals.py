@@ -10,11 +10,12 @@ the others.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 
-from ...numerics.arrays import ComplexArray, FloatArray
+from ...numerics.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from ...numerics.statistics import circle_quantile, upper_quantile
 from .data_loops import DataLoop
 from .margin_result import Margins
@@ -49,19 +50,22 @@ class _Tube:
     def radius(self) -> FloatArray:
         return self.alone * self.spread
 
-    def runs(self, distance: FloatArray, side: FloatArray) -> list[tuple[slice, bool]]:
+    def runs(
+        self, distance: FloatArray, side: FloatArray, meets: BoolArray
+    ) -> Iterator[tuple[IntArray, bool]]:
         """Ranges of frequency in which the true curve may cross a line, and whether it must.
 
-        Outside of these ranges all disks together (`together`) determine the side of the line.
+        Outside of these ranges all disks together (`together`) determine the side of the line. Of
+        each range the points whose disks meet the line, if there are any.
         """
         near = np.concatenate([[False], distance <= self.together * self.spread, [False]])
         starts, stops = np.flatnonzero(near[1:] & ~near[:-1]), np.flatnonzero(near[:-1] & ~near[1:])
-        found = []
         for start, stop in zip(starts, stops, strict=True):
             inside = start > 0 and stop < self.omega.size
             crosses = inside and side[start - 1] * side[stop] < 0
-            found.append((slice(int(start), int(stop)), bool(crosses)))
-        return found
+            at = np.arange(start, stop)[meets[start:stop]]
+            if at.size:
+                yield at, bool(crosses)
 
 
 def margin_intervals(loop: DataLoop, plain: Margins) -> dict[str, Interval]:
@@ -102,22 +106,22 @@ def closest_approach(loop: DataLoop) -> Interval:
     Rice-distributed). If s was estimated from repeats, quantiles of Student's and of the F
     distribution are used.
     """
-    spread = _spread(loop, loop.omega)
-    most = upper_quantile(TAIL / loop.omega.size, loop.repeats)
-    high = float(np.min(np.abs(1 + loop.values) + most * spread))
+    spread = _spread(loop, loop.points.omega)
+    most = upper_quantile(TAIL / loop.points.omega.size, loop.points.repeats)
+    high = float(np.min(np.abs(1 + loop.points.response) + most * spread))
     # Between the points the interpolated curve is used, with the error of its neighbours.
     omega, values = loop.dense()
-    beside, z = _spread(loop, omega), upper_quantile(TAIL, loop.repeats)
+    beside, z = _spread(loop, omega), upper_quantile(TAIL, loop.points.repeats)
     # The circle is for the standard deviation of both directions together.
-    bend = 2 * circle_quantile(1 - TAIL, loop.repeats) ** 2 - z**2
+    bend = 2 * circle_quantile(1 - TAIL, loop.points.repeats) ** 2 - z**2
     inner = np.sqrt(np.maximum(np.abs(1 + values) ** 2 - bend * beside**2, 0))
     return max(0.0, float(np.min(inner - z * beside))), high
 
 
 def _spread(loop: DataLoop, omega: FloatArray) -> FloatArray:
     """Standard deviation in one direction of the plane; `std` is that of both together."""
-    assert loop.std is not None
-    beside = np.interp(np.log(omega), np.log(loop.omega), loop.std)
+    assert loop.points.std is not None
+    beside = np.interp(np.log(omega), np.log(loop.points.omega), loop.points.std)
     return np.asarray(beside / np.sqrt(2), dtype=np.float64)
 
 
@@ -125,9 +129,9 @@ def _tube(loop: DataLoop, crossovers: FloatArray) -> _Tube:
     grid, _ = loop.dense()
     around = np.outer(crossovers, np.concatenate([1 - NEAR, [1.0], 1 + NEAR])).ravel()
     omega = np.unique(np.concatenate([grid, around]))
-    omega = omega[(omega >= loop.omega[0]) & (omega <= loop.omega[-1])]
-    tails = TAIL, TAIL / (2 * loop.omega.size)
-    one, every = (upper_quantile(tail, loop.repeats) for tail in tails)
+    omega = omega[(omega >= loop.points.omega[0]) & (omega <= loop.points.omega[-1])]
+    tails = TAIL, TAIL / (2 * loop.points.omega.size)
+    one, every = (upper_quantile(tail, loop.points.repeats) for tail in tails)
     return _Tube(omega, loop(omega), _spread(loop, omega), one, every)
 
 
@@ -139,10 +143,7 @@ def _phase_margins(tube: _Tube) -> tuple[list[Stretch], list[Stretch]]:
     arc = np.arccos(np.clip(cosine, -1, 1))
     phases: list[Stretch] = []
     waits: list[Stretch] = []
-    for part, crosses in tube.runs(np.abs(size - 1), size - 1):
-        at = np.arange(part.start, part.stop)[meets[part]]
-        if at.size == 0:
-            continue
+    for at, crosses in tube.runs(np.abs(size - 1), size - 1, meets):
         # The phases of a range are relative to one of them, so that no range is cut at 180 deg.
         first = at[np.argmin(np.abs(size[at] - 1))]
         middle = np.angle(-tube.values[first]) + np.angle(tube.values[at] / tube.values[first])
@@ -163,12 +164,10 @@ def _log_gain_margins(tube: _Tube) -> list[Stretch]:
     meets = (np.abs(y) <= radius) & (half - x > 0)
     distance = np.where(x < 0, np.abs(y), np.abs(tube.values))
     found: list[Stretch] = []
-    for part, crosses in tube.runs(distance, y):
-        at = np.arange(part.start, part.stop)[meets[part]]
-        if at.size:
-            smallest = float(np.min(-x[at] - half[at]))
-            high = -np.log(smallest) if smallest > 0 else float("inf")
-            found.append((float(-np.log(np.max(half[at] - x[at]))), float(high), crosses))
+    for at, crosses in tube.runs(distance, y, meets):
+        smallest = float(np.min(-x[at] - half[at]))
+        high = -np.log(smallest) if smallest > 0 else float("inf")
+        found.append((float(-np.log(np.max(half[at] - x[at]))), float(high), crosses))
     return found
 
 

@@ -246,7 +246,7 @@ def _from_data(loop: DataLoop) -> Margins:
     phases = negative_axis_crossings(loop, omega, values)
     plain = _collect(loop, omega, values, phases, closest, *loop.closed_loop_count(), 0.0)
     plain = replace(plain, flags=(*plain.flags, *loop.flags()))
-    if loop.std is None:
+    if loop.points.std is None:
         return plain
     intervals = margin_intervals(loop, plain)
     flags = plain.flags

@@ -11,12 +11,12 @@ import numpy as np
 from ..._wording import in_time
 from ...delayed import DelayedStateSpace, DelaySystem
 from ...errors import ModelWarning, UnsuitableSystemError, warn_caller
-from ...numerics.arrays import ComplexArray, FloatArray
+from ...numerics.arrays import FloatArray
 from ...numerics.blas_threads import single_threaded
 from ...numerics.loops.circle import damped_circle, step_on_circle
 from ..models.conversions import to_discrete
 from ..resolved import warn_unresolved
-from ..siso import delayed_system, is_continuous, proper_ss
+from ..siso import delayed_system, is_continuous, with_dead_time
 from .loop import open_loop
 from .margins import margins
 
@@ -79,7 +79,7 @@ class Performance:
 
 
 def step_responses(
-    plant: DelayedStateSpace, controller: Any, count: int
+    plant: DelayedStateSpace, controller: Any, count: int, *, of_controller: bool = False
 ) -> tuple[FloatArray, FloatArray]:
     """Output after a unit step of set-point, and of load at the plant input.
 
@@ -92,34 +92,21 @@ def step_responses(
     controller : control system of the same sample time
     count : int
         Number of samples; a power of two is fastest.
+    of_controller : bool, optional
+        The output of the controller, not that of the plant.
 
     Returns
     -------
     setpoint, load : ndarray, shape (count,)
     """
-    z, values, process = _on_circle(plant, controller, count)
-    setpoint = step_on_circle(values / (1 + values), z, count)
-    return setpoint, step_on_circle(process / (1 + values), z, count)
-
-
-def _on_circle(
-    plant: DelayedStateSpace, controller: Any, count: int
-) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
-    """Points of a circle with the responses of the open loop and of the plant."""
     z = damped_circle(count)
     values = np.ones(z.size, dtype=np.complex128)
     for factor in open_loop(plant, controller).factors:
         values = values * factor.response(z - 1) * z ** (-factor.delay)
-    return z, values, np.asarray(plant.horner(z)[0, 0])
-
-
-def controller_responses(
-    plant: DelayedStateSpace, controller: Any, count: int
-) -> tuple[FloatArray, FloatArray]:
-    """Output of the controller after unit steps of set-point and of load; see `step_responses`."""
-    z, values, process = _on_circle(plant, controller, count)
+    process = np.asarray(plant.horner(z)[0, 0])
     closed = values / (1 + values)
-    return step_on_circle(closed / process, z, count), -step_on_circle(closed, z, count)
+    pair = (closed / process, -closed) if of_controller else (closed, process / (1 + values))
+    return step_on_circle(pair[0], z, count), step_on_circle(pair[1], z, count)
 
 
 @single_threaded
@@ -167,10 +154,8 @@ def performance(plant: DelayedStateSpace | DelaySystem, controller: Any) -> Perf
     >>> cr.design.performance(plant, 0.5).setpoint_error
     inf
     """
-    if not is_continuous(plant):
-        plant = delayed_system(plant, "the performance of a loop")
-    elif not isinstance(plant, DelaySystem):
-        plant = DelaySystem(proper_ss(plant, "the performance of a loop"))
+    made = with_dead_time if is_continuous(plant) else delayed_system
+    plant = made(plant, "the performance of a loop")
     warn_unresolved(plant)
     slow, turn = loop_times(plant, controller)
     if not plant.dt:

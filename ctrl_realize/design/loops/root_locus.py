@@ -10,12 +10,11 @@ from numpy.typing import ArrayLike
 from scipy.optimize import linear_sum_assignment
 
 from ..._checks import integer, numbers
-from ...delayed import DelayedStateSpace, DelaySystem
-from ...delayed.parts import check_single
+from ...delayed import DelayedStateSpace
 from ...errors import DataError
 from ...numerics.arrays import ComplexArray, FloatArray
 from ...numerics.blas_threads import single_threaded
-from ..siso import proper_ss
+from ..siso import with_dead_time
 from .margins import margins
 
 POINTS = 80
@@ -78,7 +77,7 @@ def root_locus(system: Any, gains: ArrayLike | None = None, *, count: int = 10) 
     [0.9993 1.     1.0001]
     """
     wanted = integer(count, "count", 1)
-    loop = _with_delays(system)
+    loop = with_dead_time(system, "a root locus")
     values = _gains(loop) if gains is None else _given(gains)
     few = min(wanted + 2 + wanted // 2, loop.nstates) if loop.dt else wanted + 2 + wanted // 2
     found = [ct.feedback(float(k) * loop).dominant_poles(max(few, 1)) for k in values]
@@ -94,14 +93,6 @@ def root_locus(system: Any, gains: ArrayLike | None = None, *, count: int = 10) 
         sys=loop,
         sort_loci=False,
     )
-
-
-def _with_delays(system: Any) -> Any:
-    if not isinstance(system, (DelayedStateSpace, DelaySystem)):
-        plain = proper_ss(system, "a root locus")
-        system = DelaySystem(plain, name=plain.name)
-    check_single(system, "a root locus")
-    return system
 
 
 def _given(gains: ArrayLike) -> FloatArray:

@@ -21,6 +21,7 @@ from ..siso import (
     held_fraction,
     interval_of_dead_time,
     is_continuous,
+    with_dead_time,
 )
 from .robust_stability import UncertaintyBound
 
@@ -134,11 +135,11 @@ def _models(systems: Any) -> list[Any]:
 
 def _plant(system: Any) -> tuple[DelayedStateSpace | DelaySystem, float]:
     """Check a system, and return it with its dead time in s."""
+    purpose = "an uncertainty bound"
     if is_continuous(system):
-        _, dead_time = core_and_dead_time(system, "an uncertainty bound")
-        plain = isinstance(system, DelaySystem)
-        return system if plain else DelaySystem(ct.ss(system)), dead_time
-    plant = delayed_system(system, "an uncertainty bound")
+        _, dead_time = core_and_dead_time(system, purpose)
+        return with_dead_time(system, purpose), dead_time
+    plant = delayed_system(system, purpose)
     return plant, float(plant.dead_time) - held_fraction(plant)
 
 
@@ -151,13 +152,9 @@ def _grid(
             slow = np.abs(np.log(np.abs(np.asarray(plant.delay_free.poles())) + 1e-12)) / plant.dt
         else:
             slow = np.abs(plant.core.poles())
-            top = (
-                100 * max(float(slow.max(initial=0.0)), 1 / dead_time if dead_time else 0.0) or 1.0
-            )
-        low = float(
-            np.clip(1e-3 * slow[slow > 1e-9 * top].min(initial=top), 1e-8 * top, 0.01 * top)
-        )
-        return np.geomspace(low, top, GRID_POINTS)
+            top = 100 * max(slow.max(initial=0.0), 1 / dead_time if dead_time else 0.0) or 1.0
+        slowest = slow[slow > 1e-9 * top].min(initial=top)
+        return np.geomspace(np.clip(1e-3 * slowest, 1e-8 * top, 0.01 * top), top, GRID_POINTS)
     grid = numbers(omega, "omega")
     if grid.ndim != 1 or grid.size == 0 or grid[0] <= 0 or np.any(np.diff(grid) <= 0):
         raise DataError("omega must be increasing and > 0, in rad/s")

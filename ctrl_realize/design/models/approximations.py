@@ -5,9 +5,8 @@ from __future__ import annotations
 import control as ct
 
 from ..._checks import integer, positive
+from ...delayed.inside.conversions import MAX_PADE_ORDER
 from ...numerics.state_space.pade import pade_ladder
-
-MAX_PADE_ORDER = 20
 
 
 def pade_ss(dead_time: float, order: int = 5, *, name: str | None = None) -> ct.StateSpace:

@@ -159,11 +159,11 @@ def both_forms(
         span = float(np.sum(1 / speeds)) + total
         if span == 0:
             raise UnsuitableSystemError(f"{core.name!r} has no lag and no dead time to reduce")
-        model = ContinuousModel(core, (total,), (0.0,), min(span / 1000, longest))
-        if np.any(core.D):
+        step = min(span / 1000, longest)
+        if total and np.any(core.D):
             # A feedthrough causes a jump; with whole samples it stays in place.
-            step = total / max(1, round(total / model.dt)) if total else model.dt
-            model = ContinuousModel(core, (total,), (0.0,), step)
+            step = total / max(1, round(total / step))
+        model = ContinuousModel(core, (total,), (0.0,), step)
         return model, to_discrete(model)
     warn_unresolved(system)
     return None, delayed_system(system, "a reduction")

@@ -10,7 +10,7 @@ from ...data.shown_units import in_shown_units
 from ...delayed import DelayedStateSpace
 from ..delay_line import DelayLineController
 from ..loops.delay_robustness_result import DelayRobustness
-from ..loops.loop_check import LoopCheck, loop_check, refuse_unstable, warn_of
+from ..loops.loop_check import LoopCheck, verified
 
 
 class CheckedController(DelayLineController):
@@ -35,9 +35,7 @@ class CheckedController(DelayLineController):
 
     def verified(self, what: str, to_stabilize: str, more_robust: str) -> Self:
         """Return the controller with the check of its loop; unstable loops are refused."""
-        check = loop_check(self.model, self)
-        refuse_unstable(check, what, to_stabilize)
-        warn_of(check, more_robust)
+        check = verified(self.model, self, what, to_stabilize, more_robust)
         make, arguments, settings = self._made_by()
         made: Self = make(*arguments, **settings | {"design": {**self._design, "check": check}})
         return made

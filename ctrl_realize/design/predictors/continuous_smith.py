@@ -10,7 +10,7 @@ import numpy as np
 from ..._checks import positive
 from ...delayed import DelaySystem, delay
 from ...errors import OptionError, UnsuitableSystemError
-from ..loops.loop_check import loop_check, refuse_unstable, warn_of
+from ..loops.loop_check import verified
 from ..siso import core_and_dead_time, proper_ss
 
 ON_AXIS = 1e-9
@@ -58,8 +58,7 @@ def continuous_smith_predictor(
     late = filtered * delay(dead_time)
     # the inner loop sees G (1 - F exp(-tau s)), with one G
     made = (DelaySystem(ct.ss(primary))).feedback((1 - late) * core) * filtered
-    check = loop_check(plant, made)
-    refuse_unstable(check, "the Smith predictor", STABILIZE)
-    warn_of(check, more_robust(filter_time, dead_time))
+    advice = STABILIZE, more_robust(filter_time, dead_time)
+    verified(plant, made, "the Smith predictor", *advice)
     names = {"inputs": ["e"], "outputs": plant.input_labels, "name": name}
     return DelaySystem(made.core, made.internal_delays, **names)

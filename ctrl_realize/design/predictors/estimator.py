@@ -135,11 +135,8 @@ def kalman_predictor(system: DelayedStateSpace, QN: ArrayLike, RN: ArrayLike) ->
     noise = np.zeros_like(A)
     noise[: core.nstates, : core.nstates] = weight
     gain, cost, poles = riccati(ct.dlqr, A.T, C.T, noise, price, "QN and RN")
-    if common:
-        gain, cost = _late(core, plant.output_delays, common, (A, gain.T, cost, noise))
-        poles = np.append(poles, np.zeros(common * core.noutputs))
-    else:
-        gain = gain.T
+    gain, cost = _late(core, plant.output_delays, common, (A, gain.T, cost, noise))
+    poles = np.append(poles, np.zeros(common * core.noutputs))
     n = core.nstates
     return KalmanPredictor(read_only(gain), read_only(cost[:n, :n]), locked(poles), float(plant.dt))
 

@@ -24,7 +24,7 @@ from ...numerics.state_space import responses
 from ...numerics.state_space.delayed_lqr import line_gain
 from ...results import Result
 from ..delay_line import DelayLineController
-from ..loops.loop_check import LoopCheck, loop_check, refuse_poles, refuse_unstable, warn_of
+from ..loops.loop_check import LoopCheck, refuse_poles, verified
 from ..resolved import check_sign, warn_unresolved
 from ..siso import delayed_system
 from .riccati import has_states, riccati, weight_matrix
@@ -183,9 +183,8 @@ def predictor_lqr(system: DelayedStateSpace, Q: ArrayLike, R: ArrayLike) -> Pred
     if plant.ninputs > 1:
         refuse_poles(found.poles, "the regulator", TOO_LONG)
         return found
-    check = loop_check(*_state_loop(plant, found))
-    refuse_unstable(check, "the regulator", TOO_LONG)
-    warn_of(check, "Try 10 * R: slower and more robust")
+    more_robust = "Try 10 * R: slower and more robust"
+    check = verified(*_state_loop(plant, found), "the regulator", TOO_LONG, more_robust)
     return replace(found, check=check)
 
 

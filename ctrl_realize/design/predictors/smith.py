@@ -225,33 +225,29 @@ def _assemble(
     direct = float(core.D[0, 0])
     # Rows over [x_c, x_d, x_F], the line and e.
     n = nc + nk + nf
-    into = np.zeros((1, n)), np.zeros((1, d)), Df * np.ones((1, 1))
-    ahead = Ck @ np.linalg.matrix_power(Ak, d)
-    into[0][0, nc : nc + nk] = (Df * Ck - ahead)[0]
-    into[0][0, nc + nk :] = Cf[0]
-    into[1][0] = -taps[1:]
-    into[1][0, -1] += Df * direct
+    of_c, of_d, of_F, line = slice(nc), slice(nc, nc + nk), slice(nc + nk, n), slice(n, n + d)
+    into = np.zeros(n + d + 1)
+    into[of_d] = (Df * Ck - Ck @ np.linalg.matrix_power(Ak, d))[0]
+    into[of_F], into[line], into[-1] = Cf[0], -taps[1:], Df
+    into[-2] += Df * direct
     # v still contains -g_0 u[k]: u (1 + Dc g_0) = Cc x_c + Dc (the rest of v)
     solve = 1 + Dc[0, 0] * taps[0]
     if abs(solve) < 1e-12:
         raise UnsuitableSystemError(
             "controller and feedthrough of the core make an algebraic loop of gain -1"
         )
-    out = [Dc @ block / solve for block in into]
-    out[0][0, :nc] += Cc[0] / solve
-    v = [block - taps[0] * row for block, row in zip(into, out, strict=True)]
-    A, E, B = np.zeros((n, n)), np.zeros((n, d)), np.zeros((n, 1))
-    A[:nc, :nc] = Ac
-    A[:nc] += Bc @ v[0]
-    E[:nc], B[:nc] = Bc @ v[1], Bc @ v[2]
-    A[nc : nc + nk, nc : nc + nk] = Ak
-    E[nc : nc + nk, -1] = Bk[:, 0]
+    out = Dc[0, 0] * into / solve
+    out[of_c] += Cc[0] / solve
+    later = np.zeros((n, n + d + 1))
+    later[of_c, of_c] = Ac
+    later[of_c] += Bc * (into - taps[0] * out)
+    later[of_d, of_d], later[of_d, -2] = Ak, Bk[:, 0]
     if nf:
-        A[nc + nk :, nc : nc + nk] = Bf @ Ck
-        A[nc + nk :, nc + nk :] = Af
-        E[nc + nk :, -1] = Bf[:, 0] * direct + removed_part(filter_, removed)[:, 0]
-        B[nc + nk :] = Bf
+        later[of_F, of_d], later[of_F, of_F], later[of_F, -1] = Bf @ Ck, Af, Bf[:, 0]
+        later[of_F, -2] = Bf[:, 0] * direct + removed_part(filter_, removed)[:, 0]
+    A, E, B = np.split(later, [n, n + d], axis=1)
+    C, h, D = np.split(out[None, :], [n, n + d], axis=1)
     # The delay line contains -taps alone, through the controller's B and D.
     mix = -np.vstack([Bc, np.zeros((nk + nf, 1)), Dc]) / solve
     core_A, core_B, core_C = (np.asarray(M, np.float64) for M in (core.A, core.B, core.C))
-    return A, B, out[0], out[2], E, out[1], (core_A, core_B, mix @ core_C)
+    return A, B, C, D, E, h, (core_A, core_B, mix @ core_C)

@@ -120,15 +120,10 @@ class PIDController(ShownSystem, BesideDelays):
         )
 
     def _matrices(self, h: float) -> tuple[FloatArray, ...]:
-        parts: list[tuple[float, float, float, float]] = [(0.0, 0.0, 0.0, self.kp)]
-        if self.ti < INF:
-            parts.append(self._integral(h))
-        if self.td > 0:
-            parts.append(self._derivative(h))
-        A = np.diag([part[0] for part in parts[1:]]).reshape(len(parts) - 1, len(parts) - 1)
-        B = np.array([[part[1]] for part in parts[1:]]).reshape(-1, 1)
-        C = np.array([[part[2] for part in parts[1:]]]).reshape(1, -1)
-        return A, B, C, np.array([[sum(part[3] for part in parts)]])
+        actions = {"I": self._integral, "D": self._derivative}
+        parts = [action(h) for letter, action in actions.items() if letter in self.kind]
+        a, b, c, d = np.array(parts).reshape(-1, 4).T
+        return np.diag(a), b[:, None], c[None, :], np.array([[sum(d, self.kp)]])
 
     def _integral(self, h: float) -> tuple[float, float, float, float]:
         if h == 0:

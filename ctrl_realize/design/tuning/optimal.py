@@ -136,7 +136,22 @@ def optimal(
     -------
     (kp, ti, td)
     """
-    problem = _problem(plant, total_time, max_sensitivity, filter_ratio, method, direct)
+    poles = np.abs(np.asarray(plant.delay_free.poles()))
+    if np.any(poles > 1 + 1e-9):
+        raise UnsuitableSystemError(
+            "the plant is unstable, where a limit on the sensitivity does not imply "
+            "stability. Use design.lqg"
+        )
+    loop = open_loop(plant)
+    # Finer than for bracketing: the limit is evaluated at the points of the grid.
+    omega, values = follow(loop, loop.grid(), largest_turn=0.05)
+    count = 2 ** int(np.ceil(np.log2(min(60 * total_time / plant.dt + 64, LONGEST))))
+    circle = damped_circle(count)
+    on_circle = np.asarray(plant.horner(circle)[0, 0])
+    problem = _Problem(
+        plant, 1 / max_sensitivity, filter_ratio, method, omega, values, circle, on_circle, count,
+        loop.sign(), loop.integrators() > 0, direct,
+    )  # fmt: skip
     # behind a short dead time all times are short: 30 / omega at the limit of a P controller
     _, at = largest_gain(problem.sign * problem.loop, problem.distance)
     short = min(total_time, 30 / float(problem.omega[at]))
@@ -157,41 +172,6 @@ def optimal(
             "model has too little dead time to limit a controller, or too many integrators"
         )
     return problem.sign * gain, ti, td
-
-
-def _problem(
-    plant: DelayedStateSpace,
-    total_time: float,
-    max_sensitivity: float,
-    filter_ratio: float,
-    method: str,
-    direct: float,
-) -> _Problem:
-    poles = np.abs(np.asarray(plant.delay_free.poles()))
-    if np.any(poles > 1 + 1e-9):
-        raise UnsuitableSystemError(
-            "the plant is unstable, where a limit on the sensitivity does not imply "
-            "stability. Use design.lqg"
-        )
-    loop = open_loop(plant)
-    # Finer than for bracketing: the limit is evaluated at the points of the grid.
-    omega, values = follow(loop, loop.grid(), largest_turn=0.05)
-    count = 2 ** int(np.ceil(np.log2(min(60 * total_time / plant.dt + 64, LONGEST))))
-    circle = damped_circle(count)
-    return _Problem(
-        plant,
-        1 / max_sensitivity,
-        filter_ratio,
-        method,
-        omega,
-        values,
-        circle,
-        np.asarray(plant.horner(circle)[0, 0]),
-        count,
-        loop.sign(),
-        loop.integrators() > 0,
-        direct,
-    )
 
 
 def _two_times(problem: _Problem, low: float, high: float) -> tuple[float, float]:

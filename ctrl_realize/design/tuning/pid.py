@@ -270,11 +270,14 @@ def _one_that_works(system: Any, options: TuningOptions) -> str:
         if rule in MODEL_RULES and kind in kinds_of(rule)
     ]
     tries.append(replace(usual, rule="optimal", kind="PI"))
+    tries.append(replace(usual, rule="simc", kind="PI", closed_loop_time="robust"))
     best: tuple[float, str] = (np.inf, "")
-    for changed in [*tries, *_slower(system, usual)]:
-        if changed == options:
-            continue
+    for changed in tries:
         try:
+            if changed.closed_loop_time == "robust":  # as a number, which can be given
+                changed = _robust(system, changed)
+            if changed == options:
+                continue
             made, plant = tuned(system, changed)
         except ValueError:
             continue
@@ -294,14 +297,6 @@ def _one_that_works(system: Any, options: TuningOptions) -> str:
             f"{best[1]}, at worst {best[0]:.3g}"
         )
     return "No other rule does better; see design.compare_pid, or use design.lqg"
-
-
-def _slower(system: Any, options: TuningOptions) -> list[TuningOptions]:
-    """A closed-loop time of simc that is robust, or comes closest to it."""
-    try:
-        return [_robust(system, replace(options, rule="simc", kind="PI"))]
-    except ValueError:
-        return []
 
 
 def _call(options: TuningOptions) -> str:

@@ -6,6 +6,7 @@ Each function returns (kp, ti, td); ti is inf without an integral, td is 0 witho
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 
@@ -33,18 +34,16 @@ def simc(model: ProcessModel, kind: str, closed_loop_time: float | None) -> Para
         ti, second = min(model.lag, 4 * (tau_c + theta)), model.second_lag
     if "D" not in kind:
         return kp, ti if "I" in kind else INF, 0.0
-    if second == 0 and "I" in kind:
-        return kp, ti, 0.0
+    if "I" in kind:
+        # The rule is for the series form; this is the equivalent ideal form.
+        factor = 1 + second / ti
+        return kp * factor, ti * factor, second / factor
     if second == 0:
         raise OptionError(
             "simc has a derivative only for models with a second lag; use kind='P', or a model "
             "from reduce_sopdt"
         )
-    if "I" not in kind:
-        return kp, INF, second
-    # The rule is for the series form; this is the equivalent ideal form.
-    factor = 1 + second / ti
-    return kp * factor, ti * factor, second / factor
+    return kp, INF, second
 
 
 def lambda_(model: ProcessModel, kind: str, closed_loop_time: float | None) -> Parameters:
@@ -118,33 +117,20 @@ def cohen_coon(model: ProcessModel, kind: str, closed_loop_time: float | None) -
     }[kind]
 
 
-def chr_setpoint_0(model: ProcessModel, kind: str, closed_loop_time: float | None) -> Parameters:
-    """Chien, Hrones and Reswick (1952): fastest set-point response without overshoot."""
-    return _chr(model, {"P": (0.3, INF, 0), "PI": (0.35, 1.2, 0), "PID": (0.6, 1, 0.5)}[kind])
+CHR_RULES: dict[str, dict[str, Parameters]] = {
+    "chr_setpoint_0": {"P": (0.3, INF, 0), "PI": (0.35, 1.2, 0), "PID": (0.6, 1, 0.5)},
+    "chr_setpoint_20": {"P": (0.7, INF, 0), "PI": (0.6, 1, 0), "PID": (0.95, 1.4, 0.47)},
+    "chr_load_0": {"P": (0.3, INF, 0), "PI": (0.6, 4, 0), "PID": (0.95, 2.4, 0.42)},
+    "chr_load_20": {"P": (0.7, INF, 0), "PI": (0.7, 2.3, 0), "PID": (1.2, 2, 0.42)},
+}
+"""Factors of 1 / a (kp), of the lag or, for a load, the dead time (ti), and the dead time (td)."""
 
 
-def chr_setpoint_20(model: ProcessModel, kind: str, closed_loop_time: float | None) -> Parameters:
-    """Chien, Hrones and Reswick (1952): fastest set-point response with 20 % of overshoot."""
-    return _chr(model, {"P": (0.7, INF, 0), "PI": (0.6, 1, 0), "PID": (0.95, 1.4, 0.47)}[kind])
-
-
-def chr_load_0(model: ProcessModel, kind: str, closed_loop_time: float | None) -> Parameters:
-    """Chien, Hrones and Reswick (1952): fastest response to a load without overshoot."""
-    row = {"P": (0.3, INF, 0), "PI": (0.6, 4, 0), "PID": (0.95, 2.4, 0.42)}[kind]
-    return _chr(model, row, load=True)
-
-
-def chr_load_20(model: ProcessModel, kind: str, closed_loop_time: float | None) -> Parameters:
-    """Chien, Hrones and Reswick (1952): fastest response to a load with 20 % of overshoot."""
-    row = {"P": (0.7, INF, 0), "PI": (0.7, 2.3, 0), "PID": (1.2, 2, 0.42)}[kind]
-    return _chr(model, row, load=True)
-
-
-def _chr(model: ProcessModel, row: tuple[float, float, float], *, load: bool = False) -> Parameters:
-    """Factors of 1 / a, of the lag (set-point) or dead time (load), and of the dead time."""
+def _chr(rule: str, model: ProcessModel, kind: str, closed_loop_time: float | None) -> Parameters:
+    """Chien, Hrones and Reswick (1952): fastest response to set-point or load, 0 or 20 % over."""
     _needs_lag(model, "chr")
-    L = _dead_time(model, "chr")
-    return row[0] * model.lag / (model.gain * L), row[1] * (L if load else model.lag), row[2] * L
+    L, (kp, ti, td) = _dead_time(model, "chr"), CHR_RULES[rule][kind]
+    return kp * model.lag / (model.gain * L), ti * (L if "load" in rule else model.lag), td * L
 
 
 def itae_load(model: ProcessModel, kind: str, closed_loop_time: float | None) -> Parameters:
@@ -202,10 +188,7 @@ MODEL_RULES: dict[str, tuple[Rule, tuple[str, ...]]] = {
     "amigo": (amigo, ("PI", "PID")),
     "ziegler_nichols": (ziegler_nichols, ("P", "PI", "PID")),
     "cohen_coon": (cohen_coon, ("P", "PI", "PD", "PID")),
-    "chr_setpoint_0": (chr_setpoint_0, ("P", "PI", "PID")),
-    "chr_setpoint_20": (chr_setpoint_20, ("P", "PI", "PID")),
-    "chr_load_0": (chr_load_0, ("P", "PI", "PID")),
-    "chr_load_20": (chr_load_20, ("P", "PI", "PID")),
+    **{rule: (partial(_chr, rule), tuple(rows)) for rule, rows in CHR_RULES.items()},
     "itae_setpoint": (itae_setpoint, ("PI", "PID")),
     "itae_load": (itae_load, ("PI", "PID")),
 }

@@ -147,10 +147,8 @@ def ultimate(system: Any, *, continuous: bool = False, reverse: bool | None = No
         )
     gain, period = critical_point(exact, reverse)
     found = np.array([_crossing(one, np.sign(gain)) for one in others])
-    gains: Interval | None = None
-    periods: Interval | None = None
-    if found.size:
-        gains, periods = ((float(each.min()), float(each.max())) for each in found.T)
+    ends: Any = [(float(each.min()), float(each.max())) for each in found.T] or (None, None)
+    gains, periods = ends
     return UltimateGain(gain, period, step, gains, periods, *gain_and_time_units(plant))
 
 

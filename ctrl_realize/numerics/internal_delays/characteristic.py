@@ -18,6 +18,8 @@ References
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 from scipy.sparse.csgraph import connected_components
 
@@ -125,9 +127,12 @@ def discrete_poles(form: DelayForm) -> ComplexArray:
     -------
     ndarray, shape (n + sum(d),)
     """
-    return np.concatenate(
-        [np.zeros(0, dtype=np.complex128), *(_loop_poles(part) for part in loops(form))]
-    )
+    return each_loop(form, _loop_poles)
+
+
+def each_loop(form: DelayForm, poles: Callable[[DelayForm], ComplexArray]) -> ComplexArray:
+    """Join the poles of all loops."""
+    return np.concatenate([np.zeros(0, dtype=np.complex128), *map(poles, loops(form))])
 
 
 def loops(form: DelayForm) -> list[DelayForm]:

@@ -18,7 +18,7 @@ import numpy as np
 from ..arrays import ComplexArray, FloatArray
 from ..loops.crossings import follow, half_turns
 from ..state_space.responses import frequency_response, schur_form
-from .characteristic import discrete_poles, loops, newton_polished, newton_steps
+from .characteristic import discrete_poles, each_loop, newton_polished, newton_steps
 from .form import DelayForm
 
 ALL = 400
@@ -45,12 +45,7 @@ def dominant_discrete_poles(form: DelayForm, count: int) -> ComplexArray:
     ndarray, shape (count,) or less
         Falling in size; a pair is never split.
     """
-    found = [np.zeros(0, dtype=np.complex128)]
-    for part in loops(form):
-        total = part.states + int(sum(part.delays))
-        short = total <= ALL or not part.delays or (not np.any(part.D) and not part.states)
-        found.append(discrete_poles(part) if short else _largest(part, total, count))
-    return largest(np.concatenate(found), count)
+    return largest(each_loop(form, lambda part: _of_loop(part, count)), count)
 
 
 def largest(poles: ComplexArray, count: int) -> ComplexArray:
@@ -68,7 +63,10 @@ def with_whole_pairs(poles: ComplexArray, count: int) -> ComplexArray:
     return poles[:count]
 
 
-def _largest(part: DelayForm, total: int, count: int) -> ComplexArray:
+def _of_loop(part: DelayForm, count: int) -> ComplexArray:
+    total = part.states + int(sum(part.delays))
+    if total <= ALL or not part.delays or (not np.any(part.D) and not part.states):
+        return discrete_poles(part)
     # The upper half; the system is real.
     circle = np.exp(1j * np.pi * np.arange(total + 1) / total)
     own = np.linalg.eigvals(part.A).astype(np.complex128)

@@ -232,20 +232,6 @@ def without_zero_delays(form: DelayForm) -> DelayForm:
     return wired(opened, gain, slice(p), slice(m))
 
 
-def with_states(
-    form: DelayForm, at: list[int], lines: FloatArray, entry: FloatArray, exit_: FloatArray
-) -> DelayForm:
-    """Put a rational system, of matrices `lines`, `entry` and `exit_`, in place of some delays."""
-    rest = [i for i in range(len(form.delays)) if i not in at]
-    split = form.channels([*rest, *at])
-    m, p, size = form.inputs + len(rest), form.outputs + len(rest), form.states + len(lines)
-    B, C, D = split.B, split.C, split.D
-    A = np.block([[form.A, B[:, m:] @ exit_], [entry @ C[p:], lines + entry @ D[p:, m:] @ exit_]])
-    into = np.vstack([B[:, :m], entry @ D[p:, :m]])
-    out = np.hstack([C[:p], D[:p, m:] @ exit_])
-    return DelayForm(A.reshape(size, size), into, out, D[:p, :m].copy(), split.delays[: len(rest)])
-
-
 def _check_regular(matrix: FloatArray) -> None:
     if matrix.size and not 1 / np.linalg.cond(matrix) > SINGULAR:
         raise np.linalg.LinAlgError

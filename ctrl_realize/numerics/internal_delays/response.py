@@ -17,7 +17,7 @@ from contextlib import suppress
 import numpy as np
 
 from ..arrays import ComplexArray, whole_power
-from ..state_space.responses import Schur, frequency_response, schur_form
+from ..state_space.responses import Schur, frequency_response
 from .form import DelayForm
 
 CANCELS = 1e4
@@ -117,37 +117,34 @@ def solve_each(matrices: ComplexArray, right: ComplexArray) -> ComplexArray:
         return out
 
 
-class Response:
-    """The response of one form at any points.
+def response(
+    form: DelayForm, schur: Schur, points: ComplexArray, *, discrete: bool
+) -> ComplexArray:
+    """Evaluate the transfer matrix, shape (p, m, K); not finite at a pole.
 
     Parameters
     ----------
     form : DelayForm
+    schur : Schur
+        Of its A.
+    points : ndarray, shape (K,)
+        z with delays in samples, or s with delays in s.
     discrete : bool
-        Points are z with delays in samples, or s with delays in s.
+        Which of them.
     """
-
-    def __init__(self, form: DelayForm, *, discrete: bool) -> None:
-        self.form = form
-        self.discrete = discrete
-        self.schur: Schur = schur_form(form.A)
-
-    def __call__(self, points: ComplexArray) -> ComplexArray:
-        """Evaluate the transfer matrix, shape (p, m, K); not finite at a pole."""
-        form, q = self.form, len(self.form.delays)
-        m, p = form.inputs, form.outputs
-        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-            core = frequency_response(self.schur, form.B, form.C, form.D, points)
-            if not q:
-                return core
-            held, late = turns(form.delays, points, discrete=self.discrete)
-            out, largest = _closed(core, held, late, p, m)
-            doubtful = ~np.isfinite(out).all(axis=(0, 1)) | (largest > CANCELS).any(axis=(0, 1))
-        for pole in np.diag(self.schur[0]):
-            doubtful |= np.abs(points - pole) < NEAR_POLE * max(1.0, abs(pole))
-        if doubtful.any():
-            out[:, :, doubtful] = solved_response(form, points[doubtful], discrete=self.discrete)
-        return out
+    m, p = form.inputs, form.outputs
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        core = frequency_response(schur, form.B, form.C, form.D, points)
+        if not form.delays:
+            return core
+        held, late = turns(form.delays, points, discrete=discrete)
+        out, largest = _closed(core, held, late, p, m)
+        doubtful = ~np.isfinite(out).all(axis=(0, 1)) | (largest > CANCELS).any(axis=(0, 1))
+    for pole in np.diag(schur[0]):
+        doubtful |= np.abs(points - pole) < NEAR_POLE * max(1.0, abs(pole))
+    if doubtful.any():
+        out[:, :, doubtful] = solved_response(form, points[doubtful], discrete=discrete)
+    return out
 
 
 def _closed(

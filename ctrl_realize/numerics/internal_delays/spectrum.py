@@ -26,9 +26,9 @@ import numpy as np
 from scipy.linalg import block_diag, eig
 
 from ..arrays import ComplexArray, FloatArray
-from .characteristic import loops, newton_polished
+from .characteristic import each_loop, loops, newton_polished
 from .dominant import RESIDUAL, apart, with_pairs, with_whole_pairs
-from .form import DelayForm, with_states
+from .form import DelayForm
 
 FIRST_POINTS, MOST_POINTS = 16, 160
 """Chebyshev points of each delay, at first and at most."""
@@ -46,13 +46,15 @@ def discretised(form: DelayForm, points: int) -> DelayForm:
 
     The states are the values on Chebyshev points of what is on its way.
     """
-    q = len(form.delays)
-    D = _differences(points)
+    slopes = _differences(points)
     # on [-tau, 0]: the first point holds z, the last one gives w
-    lines = block_diag(*[D[1:, 1:] * (2 / tau) for tau in form.delays])
-    entry = block_diag(*[D[1:, :1] * (2 / tau) for tau in form.delays])
-    exit_ = block_diag(*[np.eye(1, points, points - 1)] * q)
-    return with_states(form, list(range(q)), lines, entry, exit_)
+    lines = block_diag(*[slopes[1:, 1:] * (2 / tau) for tau in form.delays])
+    entry = block_diag(*[slopes[1:, :1] * (2 / tau) for tau in form.delays])
+    exit_ = block_diag(*[np.eye(1, points, points - 1)] * len(form.delays))
+    m, p, B, C, D = form.inputs, form.outputs, form.B, form.C, form.D
+    A = np.block([[form.A, B[:, m:] @ exit_], [entry @ C[p:], lines + entry @ D[p:, m:] @ exit_]])
+    into, out = np.vstack([B[:, :m], entry @ D[p:, :m]]), np.hstack([C[:p], D[:p, m:] @ exit_])
+    return DelayForm(A, into, out, D[:p, :m])
 
 
 def _differences(points: int) -> FloatArray:
@@ -80,16 +82,13 @@ def rightmost_poles(form: DelayForm, count: int) -> ComplexArray:
     ndarray, shape (count,)
         Falling in real part; a pair is never split.
     """
-    found = [np.zeros(0, dtype=np.complex128)]
-    for part in loops(form):
-        plain = not part.delays or (not part.states and not np.any(part.D))
-        own = np.linalg.eigvals(part.A).astype(np.complex128)
-        found.append(own if plain else _of_loop(part, count))
-    return in_order(np.concatenate(found), count)
+    return in_order(each_loop(form, lambda part: _of_loop(part, count)), count)
 
 
 def _of_loop(part: DelayForm, count: int) -> ComplexArray:
     """Refine the discretisation until the first poles stay as they are."""
+    if not part.delays or (not part.states and not np.any(part.D)):
+        return np.linalg.eigvals(part.A).astype(np.complex128)
     before = np.zeros(0, dtype=np.complex128)
     points = FIRST_POINTS + count
     while True:
