@@ -24,7 +24,7 @@ noise."""
 _QUIET = 1e-5
 """Noise over the range of a step response, up to which no filter is better: a zero-phase one begins
 before the response. Of ten delays of a scan without noise 10 are right, with the filter 0; of ten
-intervals 10 hold without it, 7 with it, up to 1e-5; 6 and 7 at 1e-4, 1 and 9 at 1e-3."""
+intervals 10 hold without it, 6 or 7 with it, up to 1e-5; 6 and 7 at 1e-4, 1 and 9 at 1e-3."""
 
 
 def impulse_from_step(
