@@ -64,7 +64,7 @@ def marked(mark: str) -> frozenset[str]:
     --------
     >>> from ctrl_realize._flags import marked
     >>> sorted(marked("wrong_dead_time"))
-    ['delay_at_bound', 'no_delay_resolved', 'order_in_noise']
+    ['delay_at_bound', 'no_delay_resolved', 'order_in_noise', 'phase_leads']
     """
     table = facts("flags.toml")
     return frozenset(code for code, row in table.items() if mark in row.get("marks", ()))

@@ -99,7 +99,8 @@ def chosen_model(
     left = np.linalg.norm(data.misfit(chosen)) / np.linalg.norm(data.weight * data.response)
     if left > _MOST_LEFT and not noise_known:
         flags.append(flagged("structured_misfit.most", left=plainly(100 * float(left), 2)))
-    flags.extend(_leading_phase(data, fits, chosen, unit))
+    # A response that leads its input explains the misfit, which no other order or bound mends.
+    flags = [*_leading_phase(data, fits, chosen, unit)] or flags
     if n > max(DEFAULT_ORDERS) or left > _MOST_LEFT:
         flags.extend(_unstable_pole(data, fits, chosen, unit))
     poles, pole_std = pole_deviations(data, chosen, scales[key_of(best)], robust=not noise_known)

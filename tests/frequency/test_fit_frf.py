@@ -254,6 +254,19 @@ def test_times_of_a_slow_plant_are_told_in_seconds():
     assert "negative dead time of -500 s" in flags["phase_leads"]
 
 
+def test_a_response_that_leads_is_not_told_to_look_for_a_longer_dead_time():
+    # As on the page on frequency responses; the noise unknown, and known.
+    f = np.geomspace(0.5, 100, 80)
+    s = 2j * np.pi * f
+    early = 2 / ((0.08 * s + 1) * (0.016 * s + 1)) * np.exp(0.02 * s)
+    for std in (None, np.full(80, 1e-3)):
+        fit = cr.fit_frf(cr.MeasuredFRF(early, f, std=std), 2, dt=0.002).fit
+        told = {flag.code: str(flag) for flag in fit.flags}
+        assert "negative dead time of -20 ms" in told["phase_leads"]
+        assert not told.keys() & {"delay_at_bound", "structured_misfit", "structures_disagree"}
+        assert not any("max_dead_time" in text for text in told.values())
+
+
 def test_hydrophone_answers_before_its_input_and_that_is_said(shared_data):
     frf = cr.read_frf(shared_data / "hydrophone" / "frf.csv")
     fit = cr.fit_frf(frf, 4, relative_degree=1, band_hz=(1e6, 60e6)).fit
