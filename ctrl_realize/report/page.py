@@ -240,7 +240,6 @@ def write_page(
     >>> print(html[html.index("<h1"):html.index("</h1>") + 5])
     <h1>Valve 7</h1>
     """
-    content = {name: value for name, value in locals().items() if name != "path"}
     target = Path(path)
-    write_text(target, _template().render(page=content).translate(_UNSEEN) + "\n")
+    write_text(target, _template().render(page=locals()).translate(_UNSEEN) + "\n")
     return target
