@@ -38,6 +38,7 @@ def test_the_interval_is_that_of_fieller(gain: float) -> None:
 
 def test_a_response_of_which_any_part_may_be_seen_has_no_upper_end() -> None:
     low, high = gain_ends([(_gain(2.0, 0.01, 0.9), 1.0)], 0.0)
+    # rel: the error of the height, of 1 %, is left out
     assert low == pytest.approx(2 / (1 + Z_95 * 0.9), rel=1e-2)
     assert high == np.inf
     assert gain_ends([(_gain(-2.0, 0.01, 0.9), 1.0)], 0.0) == pytest.approx((-high, -low))
@@ -46,6 +47,7 @@ def test_a_response_of_which_any_part_may_be_seen_has_no_upper_end() -> None:
 def test_small_errors_are_those_of_a_normal_distribution() -> None:
     low, high = gain_ends([(_gain(2.0, 1e-4, 2e-4), 1.0)], 0.0)
     reach = 2 * Z_95 * np.hypot(1e-4, 2e-4)
+    # abs: a ratio is skewed by the square of the error of its denominator
     assert (low, high) == pytest.approx((2 - reach, 2 + reach), abs=1e-3 * reach)
 
 
