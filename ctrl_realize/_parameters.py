@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ._checks import one_of
-from ._wording import number_within, numbers_alike
+from ._wording import number_within, numbers_alike, only_end
 from .numerics.constants import Z_95
 
 if TYPE_CHECKING:
@@ -118,9 +118,8 @@ class Parameter:
         unit = self.unit and " " + self.unit
         if np.isfinite([self.low, self.high]).all():
             return " to ".join(numbers_alike((self.low, self.high), self.low, self.high)) + unit
-        if np.isfinite(self.low):
-            return f"at least {self.low:.3g}{unit}"
-        return f"at most {self.high:.3g}{unit}" if np.isfinite(self.high) else ""
+        said = only_end(self.low, self.high)
+        return said and said + unit
 
 
 def checked_time_unit(unit: str) -> str:

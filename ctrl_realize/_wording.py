@@ -154,6 +154,20 @@ def interval_in_time(low: float, high: float, word: str = "to") -> str:
     return f"{f' {word} '.join(ends)} {name}"
 
 
+def only_end(low: float, high: float) -> str:
+    """Write the end of an interval that has one alone; empty if it has none, or two.
+
+    Examples
+    --------
+    >>> from ctrl_realize._wording import only_end
+    >>> only_end(0.2196, float("inf")), only_end(0.2, 0.3)
+    ('at least 0.22', '')
+    """
+    if np.isfinite(low) == np.isfinite(high):
+        return ""
+    return f"at least {low:.3g}" if np.isfinite(low) else f"at most {high:.3g}"
+
+
 def time_within(value: float, low: float, high: float) -> str:
     """Write an estimate in the unit of its interval, rounded to the same digit.
 

@@ -14,7 +14,7 @@ from typing import Literal, TypeAlias
 import numpy as np
 
 from .._flags import Flag, marked
-from .._wording import in_time, interval_in_time, plainly
+from .._wording import in_time, interval_in_time, only_end, plainly
 from ..numerics.engine.plausible_models import PlausibleModel
 from ..numerics.loops.reference import (
     controller_response,
@@ -131,8 +131,7 @@ def _gain(fit: FractionalDelayFit) -> Verdict:
     level, why = _level(fit.flags, "gain", half <= _CLOSE, some)
     said = f"known to {plainly(100 * half, 2)} %"
     if not np.isfinite(half):
-        said = f"at least {low:.3g}" if low > 0 else f"at most {high:.3g}"
-        said = said if low > 0 or high < 0 else "not determined"
+        said = only_end(low, high) or "not determined"
     return Verdict("gain", level, _because(said, why), float(half))
 
 

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..._flags import Flag, marked
-from ..._wording import in_time, interval_in_time, numbers_alike, time_within
+from ..._wording import in_time, interval_in_time, numbers_alike, only_end, time_within
 from ...numerics.arrays import FloatArray
 from ...numerics.constants import SMALLEST
 from ...numerics.engine.problem import Structure
@@ -101,8 +101,7 @@ def sign_is_told(interval: tuple[float, float] | None) -> bool:
 def gain_in_words(gain: float, interval: tuple[float, float]) -> str:
     """Write a gain with its interval, or that it is not determined."""
     low, high = interval
-    if np.isfinite(low) != np.isfinite(high):
-        said = f"at least {low:.3g}" if np.isfinite(low) else f"at most {high:.3g}"
+    if said := only_end(low, high):
         return f"{said}, the rest is extrapolated (gain of the model: {gain:.4g})"
     if np.isinf(low):
         return f"not determined by this record (gain of the model: {gain:.4g})"
