@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...numerics.arrays import BoolArray, ComplexArray, FloatArray, IntArray
+from ...numerics.arrays import BoolArray, ComplexArray, FloatArray, IntArray, runs
 from ...numerics.statistics import circle_quantile, upper_quantile
 from .data_loops import DataLoop
 from .margin_result import Margins
@@ -58,9 +58,8 @@ class _Tube:
         Outside of these ranges all disks together (`together`) determine the side of the line. Of
         each range the points whose disks meet the line, if there are any.
         """
-        near = np.concatenate([[False], distance <= self.together * self.spread, [False]])
-        starts, stops = np.flatnonzero(near[1:] & ~near[:-1]), np.flatnonzero(near[:-1] & ~near[1:])
-        for start, stop in zip(starts, stops, strict=True):
+        near = distance <= self.together * self.spread
+        for start, stop in zip(*runs(near), strict=True):
             inside = start > 0 and stop < self.omega.size
             crosses = inside and side[start - 1] * side[stop] < 0
             at = np.arange(start, stop)[meets[start:stop]]

@@ -11,7 +11,7 @@ import numpy as np
 from ..._checks import numbers, positive
 from ...data import Record
 from ...errors import DataError
-from ...numerics.arrays import FloatArray, locked
+from ...numerics.arrays import FloatArray, locked, runs
 from ...numerics.constants import LARGEST
 
 LONGEST_GAP = 3
@@ -118,6 +118,5 @@ def _without_short_gaps(good: np.ndarray) -> np.ndarray:
 
 def _longest_part(good: np.ndarray) -> tuple[int, int]:
     """First and last index of the longest run of true values."""
-    runs = np.flatnonzero(np.diff(np.r_[False, good, False])).reshape(-1, 2).tolist()
-    first, last = max(runs, key=lambda run: run[1] - run[0], default=(0, 0))
-    return first, last
+    parts = zip(*(ends.tolist() for ends in runs(good)), strict=True)
+    return max(parts, key=lambda part: part[1] - part[0], default=(0, 0))
