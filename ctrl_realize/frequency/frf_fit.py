@@ -164,6 +164,24 @@ class FRFFit(FractionalDelayFit):
         return np.asarray(core * np.exp(-points * self.dead_time), dtype=np.complex128)
 
     @property
+    def _gain_std(self) -> float:
+        """Standard error of the gain b0 / a0 of b(s) exp(-s L) / a(s), for the chosen structure."""
+        omega = 2 * np.pi * self.frequency_hz
+        unit = np.sqrt(omega[0] * omega[-1])
+        s, poles = 1j * omega[:, None] / unit, self.poles / unit
+        powers, below = s ** np.arange(self.order + 1), np.prod(s - poles, axis=1, keepdims=True)
+        value, free = self.response(omega)[:, None], self.order - self.relative_degree + 1
+        by_b, by_a = (
+            np.exp(-1j * omega[:, None] * self.dead_time) * powers[:, :free],
+            -value * powers,
+        )
+        J = np.hstack([by_b / below, by_a[:, :-1] / below, -s * value]) / self.sigma[:, None]
+        slope = np.zeros(J.shape[1])
+        slope[0], slope[free : free + (self.order > 0)] = 1.0, -self.gain
+        error = np.linalg.norm(slope @ np.linalg.pinv(np.sqrt(2) * np.vstack([J.real, J.imag])))
+        return float(self.weighted_rms * error / np.abs(np.prod(poles)))
+
+    @property
     def gain_resolved(self) -> bool:
         """Whether the points tell the slowest poles from integrators, and so the gain."""
         slow = np.abs(self.poles) < 2 * np.pi * self.frequency_hz[0]
@@ -195,14 +213,17 @@ class FRFFit(FractionalDelayFit):
         if not self.noise_known:
             size = f"{100 * self.weighted_rms:.3g} % of"
         hold, unknown = [], ""
+        total = in_time(self.total_delay, 5)
+        if abs(self.gain) <= Z_95 * self._gain_std:  # its slope over the gain has no interval
+            total = "not determined: the gain may be zero"
         if not self.gain_resolved:
-            unknown = f"not determined from {self.frequency_hz[0]:.4g} Hz on"
+            total = unknown = f"not determined from {self.frequency_hz[0]:.4g} Hz on"
         if self.hold_time is not None:
             hold.append(("hold", f"zero-order hold of {in_time(self.hold_time)}, divided out"))
         return [
             ("dead time", f"{time_within(self.dead_time, *self.interval)}, {self._std_in_words()}"),
             ("95 % interval", interval_in_time(*self.interval)),
-            ("total delay at DC", unknown or in_time(self.total_delay, 5)),
+            ("total delay at DC", total),
             ("structure", f"order {self.order}, relative degree {self.relative_degree}"),
             ("poles", ", ".join(shown) or "none"),
             ("gain", unknown or f"{self.gain:.5g}"),

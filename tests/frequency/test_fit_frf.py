@@ -267,6 +267,23 @@ def test_a_response_that_leads_is_not_told_to_look_for_a_longer_dead_time():
         assert not any("max_dead_time" in text for text in told.values())
 
 
+def total_row(report):
+    return next(line for line in report.splitlines() if line.startswith("  total delay"))
+
+
+@pytest.mark.parametrize(("slow", "told"), [(0.99, False), (-1.0, True)])
+def test_a_total_delay_over_a_gain_that_may_be_zero_is_no_number(slow, told):
+    # The gain is 0.01 or 2, with a standard deviation of 0.1 over such measurements.
+    f = np.geomspace(0.002, 0.3, 60)
+    s = 2j * np.pi * f
+    exact = np.exp(-4 * s) * (1 / (5 * s + 1) - slow / (300 * s + 1))
+    for seed in range(4):
+        noise = 0.01 * np.random.default_rng(seed).standard_normal((60, 2)) @ [1, 1j]
+        frf = cr.MeasuredFRF(exact + noise, f, std=np.full(60, 0.01 * np.sqrt(2)))
+        fit = cr.fit_frf(frf, 2, relative_degree=1).fit
+        assert ("not determined" not in total_row(fit.report())) == told
+
+
 def test_hydrophone_answers_before_its_input_and_that_is_said(shared_data):
     frf = cr.read_frf(shared_data / "hydrophone" / "frf.csv")
     fit = cr.fit_frf(frf, 4, relative_degree=1, band_hz=(1e6, 60e6)).fit

@@ -1,7 +1,9 @@
 """A gain and a total delay are stated as well as the record tells them, and designs heed it."""
 
+import re
 import warnings
 
+import control as ct
 import numpy as np
 import pytest
 
@@ -270,3 +272,21 @@ def test_an_integrator_that_may_be_a_lag_leaves_the_gain_open(kind):
     assert fit.integrators == 0
     assert fit.gain_interval[0] <= one.plant.gain <= fit.gain_interval[1]
     assert fit.verdicts[1].level == "no"
+
+
+def test_a_total_delay_of_either_sign_is_no_number():
+    """A lag of 5 s before one of 3000 s, of which the record shows a tenth."""
+    t = np.arange(300.0)
+    u = np.where(t < 30, 0.0, 1.0)
+    plant = ct.tf([1.0], [5, 1]) + ct.tf([5.0], [3000, 1])
+    exact = cr.delayed_ss(plant, dead_time=4.0, dt=1.0).simulate(u)
+    said = {}
+    for seed, noise in ((0, 0.01), (3, 0.01), (0, 0.001)):
+        y = exact + noise * np.random.default_rng(seed).standard_normal(t.size)
+        fit = cr.identify(cr.Record(t, u, y), structures=[(2, 1)]).fit
+        row = next(r for r in fit.report().splitlines() if r.startswith("  total delay"))
+        low, high = fit.total_delay_interval
+        said[low < 0 < high] = row
+        assert ("not determined" in row) == (low < 0 < high or high == np.inf), row
+    assert re.search(r"not determined \(-\d+ to \d+ s\)", said[True])
+    assert "dead time plus lags" in said[False]

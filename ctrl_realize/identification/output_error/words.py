@@ -82,6 +82,8 @@ def total_in_words(total: float, interval: tuple[float, float], flags: Iterable[
         return "not determined" + why * (not doubted)
     if np.isnan(high):
         return f"{in_time(total, 5)} (dead time plus lags)"
+    if low < 0 < high:  # of a ratio with the gain, as beside a slow mode of the other sign
+        return f"not determined ({interval_in_time(low, high)})"
     firm = "well determined, " if not doubted and is_firm(total, interval) else ""
     said = f"dead time plus lags; {firm}{interval_in_time(low, high)}"
     return f"{time_within(total, low, high)} ({said})"
