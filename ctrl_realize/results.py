@@ -222,6 +222,8 @@ class ModelFit(Result):
 
     else:
         _method = "model with dead time"
+    _answered_noise = False
+    """Whether noise is so slow that a controller answers it: lags are then taken for dead time."""
 
     @property
     def dead_time_interval(self) -> tuple[float, float] | None:
@@ -410,9 +412,6 @@ class FractionalDelayFit(ModelFit):
     >>> isinstance(fit, cr.results.FractionalDelayFit), fit.delay == fit.dead_time / fit.dt
     (True, True)
     """
-
-    _answered_noise = False
-    """Whether noise is so slow that a controller answers it: lags are then taken for dead time."""
 
     if TYPE_CHECKING:
 

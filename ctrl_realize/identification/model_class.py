@@ -20,8 +20,9 @@ from .._wording import interval_in_time
 from ..data import Record
 from ..delayed import DelayedStateSpace, fit_of
 from ..errors import DataError, OrderError, UnsuitableSystemError
-from ..numerics.arrays import FloatArray
+from ..numerics.arrays import ComplexArray, FloatArray
 from ..numerics.constants import VERY_STRONG
+from ..numerics.engine.plausible_models import PlausibleModel
 from ..numerics.output_error.any_input.data import MOST_SAMPLES
 from ..numerics.rules import Rule
 from ..numerics.signals.noise import correlation_time
@@ -36,6 +37,7 @@ from .output_error.words import FAR_APART
 from .state_space_fit.starts import Outcome, from_starts
 from .validation.residuals import analyse_residuals
 from .validation.residuals_result import ResidualAnalysis
+from .verdicts import verdicts_beside_lags
 
 LAGS = 25
 """Lags after the dead time at which the correlation of residual and input is tested."""
@@ -204,11 +206,19 @@ def _chosen(
         dead_time=dead_time,
         interval=(low, high),
         total_delay=_total_delay(system),
+        gain=float(np.real(system.dcgain())),
         lags=lags,
         choices=(*reasons, *modes.choices, *notes),
         flags=tuple(flags),
     )
-    return system.replace(fit=fit)
+    as_lags = PlausibleModel(lags.dead_time, lags._plain_poles, lags.estimate.numerator)
+
+    def response(omega: FloatArray) -> ComplexArray:
+        turn = np.exp(1j * omega * dt)
+        return np.asarray(system(turn) * np.sqrt(turn))  # a hold is half a sample
+
+    judged = verdicts_beside_lags(fit, lags, as_lags, response)
+    return system.replace(fit=replace(fit, verdicts=judged))
 
 
 def _total_delay(system: DelayedStateSpace) -> float | None:

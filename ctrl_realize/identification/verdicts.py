@@ -7,14 +7,16 @@ in `benchmarks.verdicts`, on other records than those by which the limits were c
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
-from typing import Literal, TypeAlias
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import Any, Literal, TypeAlias
 
 import numpy as np
 
 from .._flags import Flag, marked
 from .._wording import in_time, interval_in_time, only_end, plainly
+from ..numerics.arrays import ComplexArray, FloatArray
 from ..numerics.engine.plausible_models import PlausibleModel
 from ..numerics.loops.reference import (
     controller_response,
@@ -27,6 +29,7 @@ from ..results import FractionalDelayFit
 
 Level: TypeAlias = Literal["good", "with care", "no"]
 Question: TypeAlias = Literal["dead time", "gain", "tuning"]
+Response: TypeAlias = Callable[[FloatArray], ComplexArray]
 LEVELS: tuple[Level, ...] = ("good", "with care", "no")
 
 _NARROW, _FEW, _OF_TOTAL = 0.4, 2.0, 0.1
@@ -54,7 +57,8 @@ class Verdict:
         The reason, with its number.
     number : float
         Width of the dead time's interval in s; half width of the gain's in parts of the gain;
-        largest sensitivity Ms of a PI over the plausible models.
+        largest sensitivity Ms of a PI over the plausible models. Beside a state-space model: part
+        by which the gain of lags with dead time differs, Ms of their PI on the model.
 
     Examples
     --------
@@ -90,7 +94,39 @@ def verdicts(
     others : sequence of PlausibleModel
         Models that the data do not rule out.
     """
-    return _dead_time(fit), _gain(fit), _tuning(fit, model, others)
+    tried = [partial(model_response, one) for one in others]
+    said = "a PI has Ms {own} on the model, {there} on models that fit as well"
+    return _dead_time(fit), _gain(fit), _tuning(fit, fit.flags, model, tried, _SELDOM, said)
+
+
+def verdicts_beside_lags(
+    fit: Any, lags: FractionalDelayFit, model: PlausibleModel, response: Response
+) -> tuple[Verdict, ...]:
+    """Judge a state-space model beside the lags with dead time that it replaces, never as good.
+
+    The data do not tell its errors: its gain is compared with that of the lags, and their PI is
+    tried on it.
+
+    Parameters
+    ----------
+    fit : StateSpaceFit
+        With gain, dead time, interval and flags.
+    lags : FractionalDelayFit
+    model : PlausibleModel
+        That of the lags.
+    response : callable
+        Frequency response of the state-space model at frequencies in rad/s, without the hold.
+    """
+    low, high = lags.gain_interval or (-np.inf, np.inf)
+    apart = abs(lags.gain / fit.gain - 1) if fit.gain and lags.gain else np.inf
+    some = apart <= _ROUGH and not low <= 0 <= high and not lags.integrators
+    level, why = _level(fit.flags, "gain", False, some)
+    said = f"{fit.gain:.3g}; lags with dead time have {lags.gain:.3g}"
+    gain = Verdict("gain", level, _because(said, why), float(apart))
+    said = "a PI for lags with dead time has Ms {own} on them, {there} on this model"
+    tuning = _tuning(lags, fit.flags, model, [response], 0, said)
+    found = _dead_time(fit), gain, tuning
+    return tuple(replace(v, level=max(v.level, "with care", key=LEVELS.index)) for v in found)
 
 
 def _level(flags: Iterable[Flag], question: str, good: bool, some: bool) -> tuple[Level, str]:
@@ -104,7 +140,7 @@ def _level(flags: Iterable[Flag], question: str, good: bool, some: bool) -> tupl
     return level, ""
 
 
-def _dead_time(fit: FractionalDelayFit) -> Verdict:
+def _dead_time(fit: Any) -> Verdict:
     low, high = fit.interval
     width, least = high - low, _FEW * fit.dt
     if fit.onset is not None and np.isfinite(fit.onset):
@@ -136,25 +172,27 @@ def _gain(fit: FractionalDelayFit) -> Verdict:
 
 
 def _tuning(
-    fit: FractionalDelayFit, model: PlausibleModel, others: Sequence[PlausibleModel]
-) -> Verdict:
-    if np.sum(model.poles == 0) > 1 or not fit.gain:
+    fit: FractionalDelayFit, flags: Sequence[Flag], model: PlausibleModel,
+    others: Sequence[Response], seldom: int, words: str,
+) -> Verdict:  # fmt: skip
+    """Try the PI of the model of a fit on others, `seldom` of which may be worse."""
+    if np.sum(model.poles == 0) > 1 or np.any(model.poles.real > 0) or not fit.gain:
         return Verdict("tuning", "no", "no rule for such a plant", float("inf"))
     low, high = fit.gain_interval or (-np.inf, np.inf)
     if low <= 0 <= high:
         return Verdict("tuning", "no", "the sign of the gain is not known", float("inf"))
     omega = grid(model, fit.dt)
     controller = controller_response(*robust_pi(model, fit.dt), omega, fit.dt)
-    responses = np.stack([model_response(one, omega) for one in (model, *others)])
+    responses = np.stack([model_response(model, omega), *(other(omega) for other in others)])
     loops = controller * responses
     if abs(loops[0, 0]) < 1:
         said = f"a PI of this model crosses over below {omega[0]:.3g} rad/s"
         return Verdict("tuning", "no", said, float("inf"))
     own, *found = largest_sensitivity(loops)
-    worst = float(np.sort(found)[-1 - _SELDOM])
-    level, why = _level(fit.flags, "tuning", worst <= _ROBUST, worst <= _TOO_MUCH)
-    there = f"at most {worst:.3g}" if np.isfinite(worst) else "is unstable"
-    said = f"a PI has Ms {own:.3g} on the model, {there} on models that fit as well"
+    worst = float(np.sort(found)[-1 - seldom])
+    level, why = _level(flags, "tuning", worst <= _ROBUST, worst <= _TOO_MUCH)
+    there = f"{'at most ' * bool(seldom)}{worst:.3g}" if np.isfinite(worst) else "is unstable"
+    said = words.format(own=f"{own:.3g}", there=there)
     return Verdict("tuning", level, _because(said, why), worst)
 
 

@@ -190,3 +190,49 @@ def test_lags_that_leave_little_more_widen_the_interval_and_others_do_not():
     assert loud.lags.residual > 2 * loud.noise_std[0]
     # the lags alone place it at 0.24 s, far from the truth
     assert loud.lags.interval[1] < loud.interval[0] <= 0.55 <= loud.interval[1]
+
+
+QUESTIONS = ["dead time", "gain", "tuning"]
+
+
+def test_a_model_of_modes_answers_the_three_questions_and_keeps_them(chosen, tmp_path):
+    fit = chosen.fit
+    assert [one.question for one in fit.verdicts] == QUESTIONS
+    assert {one.level for one in fit.verdicts} <= {"with care", "no"}
+    assert fit.verdicts[0].number == pytest.approx(fit.interval[1] - fit.interval[0])
+    assert fit.dt == DT
+    # noise of a tenth of the output on 600 samples
+    assert fit.gain == pytest.approx(float(TWO_MODES.dcgain()), rel=0.05)
+    assert "verdict: tuning" in fit.report()
+    cr.save_model(tmp_path / "arm.json", chosen)
+    again = cr.load_model(tmp_path / "arm.json").fit
+    assert (again.verdicts, again.gain) == (fit.verdicts, fit.gain)
+    use = cr.report.summary(chosen)["use"]
+    assert [one["allowed"] for one in use.values()] == [one.level for one in fit.verdicts]
+
+
+def test_the_verdict_on_tuning_is_the_loop_of_the_lags_controller_with_the_modes():
+    rng = np.random.default_rng(8)
+    u = np.repeat(rng.choice([-1.0, 1.0], 200), 3)
+    modes = ct.tf([14.4], [1, 0.6, 144.0]) + ct.tf([4.9], [1, 0.5, 49.0])
+    y = cr.delayed_ss(ct.tf([1.0], [0.5, 1]) + modes, dead_time=0.55, dt=DT).simulate(u)
+    data = cr.Record(DT * np.arange(600), u, y + 0.2 * rng.standard_normal(600))
+    found = cr.identify(data)
+    # SIMC as it is: Ms is below 1.7 on the lags, above which the verdict would lower its gain
+    pid = cr.design.pid(cr.fit_output_error(data), "simc", "PI", reduction="half_rule")
+    tuning = found.fit.verdicts[2]
+    assert tuning.level == "with care"
+    # that of the verdict is continuous, behind a hold; 1.2 is the gain of the plant
+    assert tuning.number == pytest.approx(cr.design.margins(found, pid).ms, rel=0.01)
+    assert found.fit.gain == pytest.approx(1.2, rel=0.05)
+
+
+def test_modes_of_a_plant_whose_gain_may_have_either_sign_are_not_for_tuning():
+    rng = np.random.default_rng(1)
+    u = np.repeat(rng.choice([-1.0, 1.0], 200), 3)
+    modes = ct.tf([144.0], [1, 0.6, 144.0]) - ct.tf([49.0], [1, 0.5, 49.0])
+    y = cr.delayed_ss(modes, dead_time=0.3, dt=DT).simulate(u)
+    data = cr.Record(DT * np.arange(600), u, y + 0.1 * y.std() * rng.standard_normal(600))
+    fit = cr.identify(data).fit
+    assert isinstance(fit, cr.identification.StateSpaceFit)
+    assert [one.level for one in fit.verdicts[1:]] == ["no", "no"]

@@ -21,6 +21,7 @@ from ..output_error.loop_flags import unstable_flags
 from ..output_error.result import OutputErrorFit
 from ..validation.residuals import analyse_residuals
 from ..validation.residuals_result import ResidualAnalysis
+from ..verdicts import Verdict
 from .drift import without_drift
 from .search import Candidate
 
@@ -57,12 +58,16 @@ class StateSpaceFit(ModelFit):
     checks : tuple of ResidualAnalysis
         Of every record without gaps.
     dead_time : float or None
-        In s; this and the next three are for one input and output in `identify`, otherwise None.
+        In s; this and the next five are for one input and output in `identify`, otherwise None.
     interval : tuple of float, or None
         In s: dead times that the data do not rule out, for this model and for `lags` unless its
         residual is twice as large.
     total_delay : float or None
         Delay at zero frequency in s; None also for a plant with zero gain.
+    gain : float or None
+        At zero frequency.
+    verdicts : tuple of Verdict
+        On dead time, gain and tuning, none of them "good"; empty where the dead time is None.
     lags : OutputErrorFit or None
         The fit of lags with dead time that this one replaces.
     records : tuple of Record
@@ -103,7 +108,14 @@ class StateSpaceFit(ModelFit):
     dead_time: float | None = None
     interval: tuple[float, float] | None = None
     total_delay: float | None = None
+    gain: float | None = None
+    verdicts: tuple[Verdict, ...] = ()
     lags: OutputErrorFit | None = None
+
+    @property
+    def dt(self) -> float:
+        """Sample time in s, that of the records."""
+        return self.records[0].dt
 
     @property
     def delay(self) -> int | None:
@@ -113,8 +125,8 @@ class StateSpaceFit(ModelFit):
     @property
     def delay_interval(self) -> tuple[float, float] | None:
         """Interval of the dead time in samples."""
-        dt = self.records[0].dt
-        return None if self.interval is None else (self.interval[0] / dt, self.interval[1] / dt)
+        ends = self.interval
+        return None if ends is None else (ends[0] / self.dt, ends[1] / self.dt)
 
     @property
     def interval_kind(self) -> IntervalKind | None:
@@ -134,6 +146,7 @@ class StateSpaceFit(ModelFit):
 
     def _rows(self) -> list[tuple[str, str]]:
         return [
+            *((f"verdict: {v.question}", f"{v.level}: {v.sentence}") for v in self.verdicts),
             ("order", f"{self.order}, {'with' if self.feedthrough else 'without'} feedthrough"),
             ("input delays", " ".join(map(str, self.input_delays)) + " samples"),
             ("output delays", " ".join(map(str, self.output_delays)) + " samples"),
