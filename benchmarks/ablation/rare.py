@@ -74,6 +74,13 @@ def seldom_updated(rng: Rng) -> Case:
     return plant.case(record(u, sensors.stored(y, float(rng.uniform(0.02, 0.04)) * np.ptp(y))))
 
 
+def held_beneath_noise(rng: Rng) -> Case:
+    """An analyser holds its result for 3 to 12 samples and is read with 0.3 to 3 % noise."""
+    plant, u = drawn(rng), step()
+    y = sensors.every(stepped(rng, plant, u), int(rng.integers(3, 13)), rng)
+    return plant.case(record(u, noisy(rng, y, 10 ** rng.uniform(-2.5, -1.5))))
+
+
 def step_behind_a_filter(rng: Rng) -> Case:
     """A step behind a lag of 3 to 30 samples without noise; 1e-6 to 1e-4 of it in the output."""
     plant = drawn(rng)
@@ -334,6 +341,7 @@ MADE_FOR = {
     Rule.CURVES: step_behind_a_filter,
     Rule.SPIKES: spiky,
     Rule.REPEATS: seldom_updated,
+    Rule.HOLDS: held_beneath_noise,
     Rule.CONSTANT_REST: padded_rest,
     Rule.LOUDER: louder_from_the_step_on,
     Rule.FRICTION: friction_behind_lags,

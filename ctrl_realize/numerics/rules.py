@@ -87,6 +87,7 @@ class Rule(Enum):
     CURVES = "curves are no steps"
     SPIKES = "spikes left out"
     REPEATS = "repeats left out"
+    HOLDS = "holds beneath noise"
     LOOP = "loop without its set point"
     PAST = "past outputs tell a controller"
     SLOW_TURN = "first turn in slow noise"

@@ -3,6 +3,7 @@
 One record of a family each, beside those of test_flags; `benchmarks.worlds` counts all of them.
 """
 
+import control as ct
 import numpy as np
 import pytest
 
@@ -69,6 +70,25 @@ def test_samples_on_lines_between_the_samples_of_an_output_are_left_out():
     (flag,) = (one for one in fit.flags if one.code == "repeats_left_out")
     assert "interpolated between samples 7 apart" in str(flag)
     assert fit.interval[0] <= 10.3 <= fit.interval[1]
+
+
+@pytest.mark.parametrize(("seed", "period"), [(1, 5), (2, 8), (6, 5), (7, 8), (14, 20)])
+def test_an_output_that_is_held_beneath_noise_leaves_the_dead_time_inside(seed, period):
+    # called good and half a hold late: of 30 such records 13 intervals held the dead time
+    rng = np.random.default_rng(seed)
+    t = np.arange(300.0)
+    first, dead_time, lag = rng.integers(period), rng.uniform(2, 30), rng.uniform(2, 15)
+    u = np.where(t < 40, 0.0, 1.0)
+    plant = ct.tf([1.0], [20.0, 1.0]) * ct.tf([1.0], [lag, 1.0])
+    exact = cr.delayed_ss(plant, dead_time=dead_time, dt=1.0).simulate(u)
+    y = exact[np.maximum((np.arange(300) - first) // period * period + first, 0)]
+    noise = 0.003 if seed < 5 else 0.01 if seed < 10 else 0.03
+    fit = cr.identify(cr.Record(t, u, y + noise * rng.standard_normal(300))).fit
+    told = [one.message for one in fit.flags if one.code in ("repeats_left_out", "held_output")]
+    assert len(told) == 1
+    assert f"{period} s" in told[0]
+    assert fit.interval[0] <= dead_time <= fit.interval[1]
+    assert fit.gain_interval[0] <= 1 <= fit.gain_interval[1]
 
 
 def test_an_integrator_that_is_driven_by_steps_is_not_taken_for_interpolated():

@@ -31,6 +31,7 @@ from .actuated.alternatives import ASKED, Asked
 from .actuated.fit import with_actuator
 from .actuated.limits import (
     at_updates,
+    fit_means_of_holds,
     fit_within_limits,
     fit_without_spikes,
     has_pulses,
@@ -372,7 +373,10 @@ def _fit_linear(
         fit_one = partial(_fit_one, requested=requested, any_input=any_input)
         if requested.huber:
             fit_one = partial(fit_without_spikes, fit=fit_one)
-        result = fit_within_limits(several[0], fit_one, may_clip=may_clip)
+        fit_whole = partial(fit_within_limits, fit=fit_one, may_clip=may_clip)
+        if may_clip and not requested.loop:
+            fit_whole = partial(fit_means_of_holds, fit=fit_whole)
+        result = fit_whole(several[0])
         return replace(result, flags=result.flags + flags)
     several, at_limits = _left_out(several, without_cut_noise)
     # Complete records of one step each can be averaged. Of more steps the mean would end at the

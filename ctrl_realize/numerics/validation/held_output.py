@@ -14,6 +14,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..arrays import BoolArray, FloatArray, IntArray, runs
+from ..constants import SMALLEST
 from ..signals.noise import rounding_error
 
 _FAST = 0.2
@@ -37,6 +38,11 @@ shorter time by as much."""
 _BY_CHANCE = 3.0  # equal neighbours of which none is seen in one of twenty records
 _PASSED = 0.2
 """Part of the range of a model that it makes while an output without noise is taken for stuck."""
+_LONGEST = 100
+"""Samples of a hold beneath noise at most: time."""
+_CERTAIN, _FLAT = 5.0, 2.5
+"""Standard errors by which an output follows its model less than one that is not held, at least,
+and by which it may do so within its holds. Ablation: holds beneath noise."""
 _ALIKE, _MOST = 0.15, 0.9
 """Steps of 0.0445 that are recorded with two digits are 0.04 and 0.05 (the tacho of a motor): they
 differ by 12 % of their mean; of the steps of a held curve 30 % would be that near to a multiple."""
@@ -106,6 +112,42 @@ def _static(output: FloatArray, inputs: FloatArray, at: IntArray, rounding: floa
     alone = np.all((np.abs(way) <= rounding) | ~same, axis=-1)
     one_way = np.all(way >= -rounding, axis=-1) | np.all(way <= rounding, axis=-1)
     return bool(np.any(alone & one_way))
+
+
+def hold_in_noise(output: FloatArray, fitted: FloatArray) -> tuple[int, int, float] | None:
+    """Period of an output (N,) that is held beneath noise, its first update, variance of the noise.
+
+    An output that is not held follows its model (N,) between any two samples, with a factor of one;
+    within holds it does not at all. The factor is estimated by least squares for every period and
+    first update, without the means of the holds. The output is NaN where it is missing.
+    """
+    moves = np.abs(np.diff(fitted))
+    moving = np.flatnonzero(moves >= _FAST * moves.max(initial=0.0))
+    longest = min(output.size // 4, int(np.ptp(moving)) if moving.size else 0, _LONGEST)
+    seen = np.isfinite(output)
+    y, f = (np.where(seen, v - np.mean(v[seen]), 0.0) for v in (output, fitted))
+    ends = longest + 1, 2 * longest
+    sums = [np.cumsum(np.pad(v, ends)) for v in (seen + 0.0, y, f, y * y, y * f, f * f)]
+    best, found = _CERTAIN, None
+    for period in range(2, longest + 1):
+        count = output.size // period + 2  # of holds, also of those at the ends, which may be cut
+        before, at = longest - period, longest + count * period
+        n, of_y, of_f, yy, yf, ff = (
+            (v[longest:at] - v[before : at - period]).reshape(count, period) for v in sums
+        )
+        n = np.maximum(n, 1.0)
+        yy, yf, ff = (
+            np.sum(whole - left * right / n, axis=0)
+            for whole, left, right in ((yy, of_y, of_y), (yf, of_y, of_f), (ff, of_f, of_f))
+        )
+        ff = np.maximum(ff, SMALLEST)
+        variance = np.maximum(yy - yf**2 / ff, 0.0) / np.maximum(np.sum(n - 1, axis=0) - 1, 1.0)
+        error = np.maximum(np.sqrt(variance / ff), SMALLEST)
+        certain = np.where(yf / ff <= _FLAT * error, (1 - yf / ff) / error, 0.0)
+        first = int(np.argmax(certain))
+        if certain[first] > best:
+            best, found = float(certain[first]), (period, first, float(variance[first]))
+    return found
 
 
 def longest_hold(output: FloatArray, fitted: FloatArray) -> int:

@@ -5,6 +5,7 @@ import pytest
 
 from ctrl_realize.numerics.validation.held_output import (
     held_share,
+    hold_in_noise,
     longest_hold,
     stuck_samples,
     updates,
@@ -110,3 +111,23 @@ def test_held_output_beside_a_curve_that_it_follows_is_no_gain():
     curve, new = (TIME / 100.0) ** 2, TIME % 10 == 0
     held = curve[np.maximum.accumulate(np.where(new, TIME, 0))]
     assert np.array_equal(updates(held, curve[None]), new)
+
+
+@pytest.mark.parametrize(("period", "first"), [(2, 1), (5, 0), (12, 7), (30, 11)])
+def test_holds_beneath_noise_are_found_with_their_first_update(period, first):
+    noise = 0.003 * np.random.default_rng(period).standard_normal(300)
+    held = RISE[np.maximum((TIME - first) // period * period + first, 0)] + noise
+    late = np.interp(TIME - period / 2, TIME, RISE)  # as a model without holds has it
+    spiked = np.where(TIME % 50 == 49, np.nan, held)
+    for output in (held, spiked):
+        at_period, at, variance = hold_in_noise(output, late)
+        assert (at_period, at) == (period, first)
+        assert variance == pytest.approx(0.003**2, rel=0.3)  # a few of 290 degrees of freedom
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_an_output_that_follows_its_model_has_no_holds(seed):
+    noise = 0.03 * np.random.default_rng(seed).standard_normal(300)
+    assert hold_in_noise(RISE + noise, RISE) is None
+    assert hold_in_noise(noise, RISE * 0) is None
+    assert hold_in_noise(0.9 * RISE + noise, RISE) is None

@@ -20,7 +20,7 @@ from ....numerics.arrays import BoolArray, FloatArray, IntArray, without_gaps
 from ....numerics.constants import STRONG
 from ....numerics.rules import Rule
 from ....numerics.signals.noise import BEYOND, FAR, far_value, spikes
-from ....numerics.validation.held_output import updates
+from ....numerics.validation.held_output import hold_in_noise, updates
 from ....numerics.validation.limits import at_limit, clips, ends, passed, plateaus
 from ..arguments import FEWEST_SAMPLES, step_data_of
 from ..loop_flags import feedback_flags
@@ -32,6 +32,8 @@ _MORE = 0.05  # of the samples on plateaus that a model finds besides: it is fit
 _SELDOM = 0.05  # of the samples, up to which a value far beyond the others is no state of a plant
 _FEW_GAPS, _SHORT_GAP = 0.2, 5  # part of the samples, and samples in a row, that are interpolated
 _PULSE = 0.5  # ranges of the others by which an input is beyond them: the output tells what it is
+
+_EXPLAINED = 2.0  # standard deviations of the noise of means, up to which a model explains them
 
 Fit = Callable[[Record], OutputErrorFit]
 
@@ -138,6 +140,39 @@ def at_updates(record: Record) -> tuple[Record, tuple[Flag, ...]]:
         band = np.nanmin(np.abs(np.diff(output[new]))[:-1])
         flag = flagged("repeats_left_out.seldom", count=count, band=band, hold=longest)
     return _without(record, ~new), (flag,)
+
+
+def fit_means_of_holds(record: Record, fit: Fit) -> OutputErrorFit:
+    """Fit a record, and anew the means between two updates of an output that is held beneath noise.
+
+    They are measurements at the updates; that the output is held is told.
+    """
+    found = fit(record)
+    if found.data.every > 1:
+        return found
+    kept, rows = found.records[0], _rows(record, found)  # without spikes and codes
+    index = np.arange(record.n_samples)
+    fitted, output = np.interp(index, rows, found.fitted), np.full(index.size, np.nan)
+    output[rows] = found.measured
+    held = hold_in_noise(output, fitted)
+    if held is None or not Rule.HOLDS.on:
+        return found
+    period, first, variance = held
+    output[:first] = np.nan  # of a hold that began before the record
+    which = (index - first) // period + 1
+    count = np.bincount(which, np.isfinite(output))
+    mean = np.bincount(which, np.nan_to_num(output)) / np.where(count > 0, count, np.nan)
+    means = np.where((index - first) % period == 0, mean[which], np.nan)
+    time, updates_seen = period * record.dt, np.count_nonzero(np.isfinite(means))
+    if updates_seen < FEWEST_SAMPLES:
+        flag = flagged("held_output.noise", count=updates_seen, hold=in_time(time))
+        low = max(found.interval[0] - time, 0.0)
+        return replace(found, estimate=replace(found.estimate, low=low), flags=(*found.flags, flag))
+    again = fit(kept.__replace__(output=means, missing="keep"))
+    if again.residual**2 > _EXPLAINED**2 * variance / period:
+        return found
+    flag = flagged("repeats_left_out.noise", period=period, time=in_time(time))
+    return replace(again, flags=(*again.flags, flag))
 
 
 def _at_limit(limit: float, samples: BoolArray, *, left_out: bool) -> Flag:
