@@ -6,6 +6,7 @@ One record of a family each, beside those of test_flags; `benchmarks.worlds` cou
 import control as ct
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
 import ctrl_realize as cr
 from benchmarks.worlds import driven, sensors, steps
@@ -89,6 +90,22 @@ def test_an_output_that_is_held_beneath_noise_leaves_the_dead_time_inside(seed, 
     assert f"{period} s" in told[0]
     assert fit.interval[0] <= dead_time <= fit.interval[1]
     assert fit.gain_interval[0] <= 1 <= fit.gain_interval[1]
+
+
+def test_the_noise_of_a_regulated_loop_is_no_output_that_is_held():
+    # PI behind 12 samples; nothing moves but the noise, from sample to sample
+    rng = np.random.default_rng(9)
+    noise = 0.1 * lfilter([np.sqrt(1 - 0.81)], [1, -0.9], rng.standard_normal(900))
+    lag, fast, one, two, integral = np.exp(-1 / 25), np.exp(-1 / 8), 0.0, 0.0, 0.0
+    u, y = np.zeros(900), np.zeros(900)
+    for k in range(900):
+        y[k] = 2 * two + noise[k]
+        integral -= 0.5 * y[k] / 30
+        u[k] = integral - 0.5 * y[k]
+        two = fast * two + (1 - fast) * one
+        one = lag * one + (1 - lag) * (u[k - 12] if k >= 12 else 0.0)
+    told = codes(cr.identify(cr.Record(np.arange(900.0), u, y)).fit)
+    assert {"feedback", "repeats_left_out"} & told == {"feedback"}
 
 
 def test_an_integrator_that_is_driven_by_steps_is_not_taken_for_interpolated():

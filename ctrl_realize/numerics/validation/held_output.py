@@ -118,8 +118,9 @@ def hold_in_noise(output: FloatArray, fitted: FloatArray) -> tuple[int, int, flo
     """Period of an output (N,) that is held beneath noise, its first update, variance of the noise.
 
     An output that is not held follows its model (N,) between any two samples, with a factor of one;
-    within holds it does not at all. The factor is estimated by least squares for every period and
-    first update, without the means of the holds. The output is NaN where it is missing.
+    within holds it does not at all, and beside an update by more. The factor is estimated by least
+    squares for every period and first update, without the means of the holds. The output is NaN
+    where it is missing.
     """
     moves = np.abs(np.diff(fitted))
     moving = np.flatnonzero(moves >= _FAST * moves.max(initial=0.0))
@@ -143,7 +144,11 @@ def hold_in_noise(output: FloatArray, fitted: FloatArray) -> tuple[int, int, flo
         ff = np.maximum(ff, SMALLEST)
         variance = np.maximum(yy - yf**2 / ff, 0.0) / np.maximum(np.sum(n - 1, axis=0) - 1, 1.0)
         error = np.maximum(np.sqrt(variance / ff), SMALLEST)
-        certain = np.where(yf / ff <= _FLAT * error, (1 - yf / ff) / error, 0.0)
+        follows = yf / ff
+        # Its whole motion is at the updates, in the middle of what begins half a period later.
+        between = np.roll(follows + _FLAT * error, -(period // 2)) >= 1
+        held = between & (follows <= _FLAT * error)
+        certain = np.where(held, (1 - follows) / error, 0.0)
         first = int(np.argmax(certain))
         if certain[first] > best:
             best, found = float(certain[first]), (period, first, float(variance[first]))

@@ -157,6 +157,9 @@ def fit_means_of_holds(record: Record, fit: Fit) -> OutputErrorFit:
     held = hold_in_noise(output, fitted)
     if held is None or not Rule.HOLDS.on:
         return found
+    # The noise of a loop moves from sample to sample what its model takes for a response.
+    if not record.n_missing and any(feedback_flags((record,), found.delay)):
+        return found
     period, first, variance = held
     output[:first] = np.nan  # of a hold that began before the record
     which = (index - first) // period + 1
