@@ -20,6 +20,7 @@ import numpy as np
 
 from ..arrays import FloatArray
 from ..constants import SMALLEST
+from ..engine.eliminate import evaluate
 from ..engine.problem import Bounds, Mapped, Problem
 from ..engine.static_gain import INTEGRATOR, LocalErrors
 from ..engine.structures import FASTEST, LEAST_DAMPING, SLOWEST, Candidate, Scales
@@ -188,7 +189,7 @@ def fit_form(
         Models without the prescriptions, from which the search starts.
     """
     family = form_family(form, scales)
-    starts = [family.coordinates({**_start(form, c, scales), **form.start}) for c in like]
+    starts = [family.coordinates({**_start(problem, form, c, scales), **form.start}) for c in like]
     if "dead_time" not in form.start:
         starts += [np.append(0.5 * x[0], x[1:]) for x in starts]
     best = lowest(problem, family, np.array(starts), scales.dt)
@@ -199,7 +200,9 @@ def fit_form(
     return Candidate(replace(family, at_bound=ends), x, best.cost)
 
 
-def _start(form: ProcessForm, like: Candidate, scales: Scales) -> dict[str, float]:
+def _start(
+    problem: Problem, form: ProcessForm, like: Candidate, scales: Scales
+) -> dict[str, float]:
     """Parameters of the form that are closest to a model without prescriptions."""
     poles = like.poles[np.abs(like.poles) * scales.length >= INTEGRATOR]
     lags = sorted((float(1.0 / abs(p)) for p in poles), reverse=True) or [scales.rise]
@@ -211,6 +214,9 @@ def _start(form: ProcessForm, like: Candidate, scales: Scales) -> dict[str, floa
     needed = form.lags + 2 * form.pair
     lags = [*lags, *(0.2 * lags[-1] * 0.7**i for i in range(needed))][:needed]
     found = {"dead_time": like.dead_time, "lead_1": 0.1 * scales.rise}
+    if form.lead and like.structure.zeros:
+        numerator = evaluate(problem, like.structure, like.parameters[None]).numerator[0]
+        found["lead_1"] = float(numerator[1] / (numerator[0] or SMALLEST))
     if form.pair:
         pair, lags = lags[:2], lags[2:]
         swinging = like.poles[like.poles.imag > 0]
