@@ -85,6 +85,19 @@ def test_the_step_response_of_each_form_is_that_of_the_ideal_one(form):
     np.testing.assert_allclose(back.ideal, wanted.ideal, rtol=1e-12)
 
 
+@pytest.mark.parametrize("unit", ["ms", "min", "h"])
+def test_a_written_form_comes_back_with_its_ranges_and_unit(unit):
+    # ti of 600 s came back as 10 s, and a gain of 2 as 8
+    pid = PID(*FULL, time_unit=unit)
+    for form in ("ideal", "series", "parallel", "proportional_band"):
+        np.testing.assert_allclose(PID.from_form(form, pid.as_form(form)).ideal[:3], FULL[:3])
+    for form in DOCUMENTED:
+        back = PID.from_form(form, pid.as_form(form, **RANGES))
+        np.testing.assert_allclose(back.ideal[:3], FULL[:3], rtol=1e-12)
+    written = PID(2.0, 600.0).as_form("ideal")
+    assert PID.from_form("ideal", written, time_unit="min").ti == pytest.approx(36_000)
+
+
 def test_every_form_is_compared_with_its_equation_and_names_its_document():
     listed = cr.design.pid_forms()
     bands = {

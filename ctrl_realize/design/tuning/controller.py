@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
@@ -328,7 +329,8 @@ class PIDController(ShownSystem, BesideDelays):
         form, measured_range, output_range, time_unit
             As for `as_form`.
         values : mapping of str to float, or PIDForm
-            Parameter -> value, with the names that `as_form` lists; or what it returns.
+            Parameter -> value, with the names that `as_form` lists; or what it returns, with its
+            ranges and unit of time where no others are given.
         derivative_filter : float
             td / tf if the form has no filter.
         reversed_action : bool
@@ -344,10 +346,12 @@ class PIDController(ShownSystem, BesideDelays):
         >>> cr.design.PIDController.from_form("rockwell_pide_dependent", values)
         <PIDController 'PI': kp = 2, ti = 90 s, continuous>
         """
+        scaling = Scaling(measured_range, output_range, time_unit)
         if isinstance(values, PIDForm):
             reversed_action = reversed_action or values.reversed_action
+            given = {name: one for name, one in vars(scaling).items() if one is not None}
+            scaling = replace(values.scaling, **given)
             values = {one.name: one.value for one in values.values}
-        scaling = Scaling(measured_range, output_range, time_unit)
         kp, ti, td, tf = from_form(form, values, scaling)
         ratio = positive(derivative_filter, "derivative_filter", "td / tf")
         return cls(-kp if reversed_action else kp, ti, td, tf or td / ratio, **settings)

@@ -57,7 +57,10 @@ class PIDForm(Result):
         What to enter; also by name: ``form["Ti"]``.
     reversed_action : bool
         The gain was negative: the output must rise when the measured value rises (direct acting).
-        `PIDController.from_form` takes it together with the values.
+    scaling : Scaling
+        Ranges and unit of time of the values: the `measured_range`, `output_range` and `time_unit`
+        of `PIDController.as_form`. `PIDController.from_form` takes it, and the direction of action,
+        together with the values.
     ideal : tuple of float
         kp, ti, td, tf of the ideal form that the values give. It differs in tf from the controller
         if the filter cannot be set.
@@ -87,6 +90,7 @@ class PIDForm(Result):
     title: str
     values: tuple[FormValue, ...]
     reversed_action: bool
+    scaling: Scaling
     ideal: Ideal
     source: str
     notes: tuple[str, ...] = ()
@@ -186,6 +190,7 @@ def to_form(
         layout.title,
         tuple(shown),
         reverse,
+        scaling,
         typed,
         layout.source,
         _notes(layout, ideal, typed, weights),
