@@ -10,12 +10,14 @@ from scipy.stats import chi2
 from ..._flags import Flag, flagged
 from ..._wording import in_time, interval_in_time
 from ...frequency.comparison import hertz
+from ...frequency.disagreement import FAR
 from ...numerics.joint.agreement import BY_CHANCE
 from ...numerics.rational.bands import running_median, widest_run
 from ...numerics.signals.noise import largest_excess
 from ..output_error.flags import model_flags
 from .result import JointFit
 
+_NO_MODEL = ("phase_leads", "structured_misfit")  # flags of a response that none follows
 _SMOOTHED_POINTS = 3  # a single bad point is not a band
 
 
@@ -28,6 +30,7 @@ def joint_flags(fit: JointFit, latest: float | None) -> tuple[Flag, ...]:
 def _contradiction(fit: JointFit) -> Iterator[Flag]:
     agreed = fit.agreement
     if not agreed.contradicts:
+        yield from _left_alone(fit)
         return
     limit = float(chi2.isf(BY_CHANCE, agreed.parameters))
     limit = min(limit, 0.999 * max(agreed.record_rise, agreed.frf_rise))
@@ -41,6 +44,17 @@ def _contradiction(fit: JointFit) -> Iterator[Flag]:
         where=", and ".join(where),
         difference=_difference(fit),
     )
+
+
+def _left_alone(fit: JointFit) -> Iterator[Flag]:
+    """Report a frequency response that no model follows: its noise is what that leaves."""
+    other = fit.frf_fit
+    codes = [flag.code for flag in other.flags if flag.code in _NO_MODEL]
+    model, measured = fit.response(2 * np.pi * other.frequency_hz), other.measured
+    error = float(np.linalg.norm(model - measured) / np.linalg.norm(measured))
+    if codes and error >= FAR:
+        named = ", ".join(codes)
+        yield flagged("frf_contradicts_records.alone", codes=named, error=100 * error)
 
 
 def _points_outside(fit: JointFit) -> str:

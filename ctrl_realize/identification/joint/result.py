@@ -10,6 +10,7 @@ from ..._checks import numbers
 from ..._wording import time_within
 from ...frequency.frf_fit import FRFFit
 from ...numerics.arrays import ComplexArray, FloatArray
+from ...numerics.constants import Z_95
 from ...numerics.joint.agreement import Agreement
 from ...results import IntervalKind
 from ..output_error.result import OutputErrorFit
@@ -62,6 +63,17 @@ class JointFit(OutputErrorFit):
             return "spanned"
         free = self.estimate.others is None
         return "confidence" if self.at_noise_level and free else "conditional"
+
+    @property
+    def gain_interval(self) -> tuple[float, float]:
+        """95 % interval of the gain; if the two contradict each other, that of both and each."""
+        low, high = super().gain_interval
+        if not self.agreement.contradicts:
+            return low, high
+        other = self.frf_fit
+        reach = Z_95 * other._gain_std if other.gain_resolved else np.inf
+        first, last = self.record_fit.gain_interval
+        return min(low, first, other.gain - reach), max(high, last, other.gain + reach)
 
     def response(self, omega: FloatArray) -> ComplexArray:
         """Evaluate model and dead time at `omega` in rad/s."""

@@ -125,6 +125,31 @@ def test_another_gain_of_the_frequency_response_is_found():
     assert any("A gain of the frequency response" in flag.message for flag in fit.flags)
 
 
+@pytest.mark.parametrize("wrong", ["sign", "gain", "rad/s", "early"])
+def test_no_verdict_is_good_where_records_and_frequency_response_contradict_each_other(wrong):
+    # the compromise was called good, with a gain of 2.7 known to 0.3 % beside 3 and -3
+    plain, factor = response(), {"sign": -1.0, "gain": 1.1}.get(wrong, 1.0)
+    values = factor * plain.complex * np.exp(2j * np.pi * HZ * 0.04 * (wrong == "early"))
+    hz = HZ * (2 * np.pi if wrong == "rad/s" else 1.0)
+    frf = cr.MeasuredFRF(values, hz, std=plain.std)
+    fit = fit_joint(step(), frf, structures=ONE_LAG).fit
+    assert fit.flags[0].code == "frf_contradicts_records"
+    assert "good" not in {verdict.level for verdict in fit.verdicts}
+    low, high = fit.gain_interval
+    assert low <= min(GAIN, factor * GAIN)
+    assert max(GAIN, factor * GAIN) <= high
+
+
+def test_a_frequency_response_that_no_model_follows_is_not_said_to_agree():
+    # the sign of the phase; its noise is then what its own fit leaves, 50 times what was given
+    plain = response()
+    frf = cr.MeasuredFRF(np.conj(plain.complex), HZ, std=plain.std)
+    fit = fit_joint(step(), frf, structures=ONE_LAG).fit
+    assert "hardly counts" in fit.flags[0].message
+    assert "good" not in {verdict.level for verdict in fit.verdicts}
+    assert fit.gain == pytest.approx(GAIN, rel=0.01)
+
+
 def test_a_lag_that_only_the_frequency_response_has_is_where_it_is():
     s = 2j * np.pi * HZ
     lagging = response(more=1 / (s / 25 + 1), std=0.1)  # at 4 Hz
