@@ -104,3 +104,10 @@ def test_lqg_of_several_channels_has_the_poles_of_regulator_and_estimator(delays
     assert expected.size >= 5
     found = np.sort(np.abs(loop.poles()))[-expected.size :]
     np.testing.assert_allclose(found, expected, rtol=0, atol=1e-3)
+
+
+@pytest.mark.parametrize("price", [0.0, -1.0])
+def test_a_weight_on_the_input_is_above_zero(price):
+    plant = cr.delayed_ss(ct.tf([2.0], [40.0, 1.0]), dead_time=6.0, dt=1.0)
+    with pytest.raises(cr.errors.OptionError, match=r"R has an eigenvalue .*expected all of them"):
+        cr.design.predictor_lqr(plant, 1.0, price)

@@ -488,6 +488,13 @@ def test_dates_of_the_world_stand_beside_text_and_numbers(tmp_path, form, start)
     assert_array_equal(read_record(file).time, 10.0 * np.arange(8))
 
 
+def test_a_clock_of_half_days_needs_no_date(tmp_path):
+    file = tmp_path / "a.csv"
+    stamps = pd.date_range("2025-01-02 11:58:30", periods=8, freq="30s").strftime("%I:%M:%S %p")
+    file.write_text("Time,u,y\n" + "".join(f"{one},{k},{k}\n" for k, one in enumerate(stamps)))
+    assert_array_equal(read_record(file).time, 30.0 * np.arange(8))
+
+
 def test_dates_whose_day_and_month_cannot_be_told_apart_are_asked_about(tmp_path):
     file = tmp_path / "a.csv"
     rows = [f"0{k}/02/2026 10:00:00,{k},{k}" for k in range(1, 5)]

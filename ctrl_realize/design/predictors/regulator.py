@@ -198,7 +198,7 @@ def regulator(system: Any, Q: ArrayLike, R: ArrayLike) -> PredictorLQR:
     has_states(core, "predictor_lqr")
     A, B = np.asarray(core.A, dtype=np.float64), np.asarray(core.B, dtype=np.float64)
     weight = weight_matrix(Q, core.nstates, "Q", "core state(s)")
-    price = weight_matrix(R, core.ninputs, "R", "input(s)")
+    price = weight_matrix(R, core.ninputs, "R", "input(s)", definite=True)
     _check_coupling(price, delays)
     _check_forgetting_time(core.nstates + sum(delays), delays)
     gain, cost, poles = riccati(ct.dlqr, A, B, weight, price, "Q and R")

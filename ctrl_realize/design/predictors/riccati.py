@@ -15,8 +15,10 @@ from ...numerics.arrays import ComplexArray, FloatArray
 _ROUNDING = 1e-9  # of the largest eigenvalue, up to which a negative one counts as zero
 
 
-def weight_matrix(given: ArrayLike, size: int, name: str, of: str) -> FloatArray:
-    """Return a symmetric weight or covariance of the required size."""
+def weight_matrix(
+    given: ArrayLike, size: int, name: str, of: str, *, definite: bool = False
+) -> FloatArray:
+    """Return a symmetric weight or covariance of the required size, semidefinite or definite."""
     weight = np.atleast_2d(numbers(given, name))
     if weight.shape != (size, size):
         raise DataError(
@@ -28,8 +30,12 @@ def weight_matrix(given: ArrayLike, size: int, name: str, of: str) -> FloatArray
     if not np.allclose(weight, weight.T, rtol=1e-9, atol=0):
         raise OptionError(f"{name} is not symmetric")
     least, largest = np.linalg.eigvalsh(weight)[[0, -1]]
-    if least < -_ROUNDING * abs(largest):
-        raise OptionError(f"{name} has an eigenvalue of {least:.3g}; expected none below 0")
+    rounding = _ROUNDING * abs(largest)
+    if least < -rounding or (definite and least <= rounding):
+        raise OptionError(
+            f"{name} has an eigenvalue of {least:.3g}; expected "
+            + ("all of them above 0" if definite else "none below 0")
+        )
     return weight
 
 
