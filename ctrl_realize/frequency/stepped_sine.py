@@ -83,6 +83,10 @@ def stepped_sine_frf(
     It is the fraction of the output's power that is a repeatable sine: 1 for a noise-free linear
     plant, and ``1 / (1 + noise power / sine power)`` with noise on the output.
 
+    Between samples the input counts as a sine, as from an analog generator. A sine that is held
+    between them, as from a converter, is half a sample late in the input as recorded:
+    ``fit_frf(frf, hold="zoh", dt=record.dt)`` divides the hold out.
+
     The sine with a free frequency is the four-parameter fit of [1]_; averaging over repeats follows
     [2]_.
 

@@ -267,6 +267,17 @@ def test_a_response_that_leads_is_not_told_to_look_for_a_longer_dead_time():
         assert not any("max_dead_time" in text for text in told.values())
 
 
+@pytest.mark.parametrize("seed", [206, 210, 104])
+def test_noise_that_does_not_fall_with_the_response_makes_no_poles(seed):
+    # with relative weights orders 9 and 10 won, and no interval held the truth
+    f = np.geomspace(0.05, 10, 40)
+    s, rng = 2j * np.pi * f, np.random.default_rng(seed)
+    noise = 0.05 / 2**0.5 * (rng.standard_normal(40) + 1j * rng.standard_normal(40))
+    fit = cr.fit_frf(cr.MeasuredFRF(2 * np.exp(-0.1 * s) / (0.3 * s + 1) + noise, f)).fit
+    assert fit.order <= 4
+    assert fit.interval[0] <= 0.1 <= fit.interval[1]
+
+
 def total_row(report):
     return next(line for line in report.splitlines() if line.startswith("  total delay"))
 

@@ -25,7 +25,15 @@ from ..constants import VERY_STRONG
 from ..engine.problem import Structure
 from ..engine.structures import Candidate
 from .frf_data import FRFData
-from .search import MISSING, correlation_cost, fit_structures, information_criteria, unexplained
+from .search import (
+    DEFAULT_ORDERS,
+    MISSING,
+    correlation_cost,
+    fit_structures,
+    information_criteria,
+    information_criterion,
+    unexplained,
+)
 
 _TRIED = 100  # floors over the range of the response: 10 % apart over four decades
 
@@ -35,7 +43,8 @@ def fit_with_floor(
 ) -> tuple[FRFData, dict[Structure, Candidate]]:
     """Fit all structures to points with relative weights, and with a floor if the errors have one.
 
-    Where relative weights explain little, the errors are seen in a fit with uniform ones.
+    Where relative weights explain little, or need many poles, the errors are seen in a fit with
+    uniform ones. The floor is used where model and floor have the lower information criterion.
 
     Returns
     -------
@@ -45,7 +54,7 @@ def fit_with_floor(
     """
     fits = fit_structures(data, orders, degrees)
     seen, best = data, _best(data, fits)
-    if unexplained(data, best) > MISSING:
+    if unexplained(data, best) > MISSING or best.structure.order > max(DEFAULT_ORDERS):
         seen = replace(data, weight=np.ones(data.s.size))
         best = _best(seen, fit_structures(seen, orders, degrees))
     residual = seen.misfit(best) / seen.weight
@@ -55,7 +64,15 @@ def fit_with_floor(
     other = replace(data, weight=1 / np.hypot(np.abs(data.response), floor))
     again = fit_structures(other, orders, degrees)
     # A part of the response that the model does not follow is no noise.
-    return (other, again) if correlation_cost(other, _best(other, again)) == 1.0 else (data, fits)
+    is_noise = correlation_cost(other, _best(other, again)) == 1.0
+    less = _criterion(other, again, 1) < _criterion(data, fits, 0)
+    return (other, again) if is_noise and less else (data, fits)
+
+
+def _criterion(data: FRFData, fits: dict[Structure, Candidate], floors: int) -> float:
+    """Information criterion of the best fit, for any weights: those of a density [1]_."""
+    weights = 4 * float(np.sum(np.log(data.weight)))
+    return information_criterion(data, _best(data, fits), 2 * data.s.size, floors) - weights
 
 
 def _best(data: FRFData, fits: dict[Structure, Candidate]) -> Candidate:
