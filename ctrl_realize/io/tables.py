@@ -196,4 +196,5 @@ class Table:
             what = f"{text[:60]} is not finite (or too large for double precision)"
         elif missing:
             what = f"{text[:60]!r}: a value is missing; missing='keep' keeps gaps in a record"
+            what += ", a row of a frequency response can be deleted"
         raise DataError(f"{self.at(index, row)}: {what}")
