@@ -184,7 +184,7 @@ DEFECTS = (
        "if gain > VERY_STRONG and not late:", "if not late:",
        "identify decisions", FITS),
     _d("best of the models", "the most favourable model decides whether a plant can be tuned",
-       "worst = float(np.sort(found)[-1 - _SELDOM])", "worst = float(np.min(found))", "verdicts",
+       "worst = float(np.sort(found)[-1 - seldom])", "worst = float(np.min(found))", "verdicts",
        FITS),
     _d("never OKID", "a lightly damped plant is not given to OKID",
        "CLEARLY = 0.5", "CLEARLY = 0.0", "from_io decisions", FITS),

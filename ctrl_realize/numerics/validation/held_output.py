@@ -15,7 +15,7 @@ import numpy as np
 
 from ..arrays import BoolArray, FloatArray, IntArray, runs
 from ..constants import SMALLEST
-from ..signals.noise import rounding_error
+from ..signals.noise import is_coarse, quantisation_step, rounding_error
 
 _FAST = 0.2
 """Part of the steepest slope of a model from which its output counts as moving: of one lag, until
@@ -152,6 +152,8 @@ def hold_in_noise(output: FloatArray, fitted: FloatArray) -> tuple[int, int, flo
         first = int(np.argmax(certain))
         if certain[first] > best:
             best, found = float(certain[first]), (period, first, float(variance[first]))
+    if found is None or is_coarse(np.sqrt(found[2]), quantisation_step(output[seen])):
+        return None  # a converter holds what moves less than its step
     return found
 
 

@@ -148,7 +148,8 @@ def fit_means_of_holds(record: Record, fit: Fit) -> OutputErrorFit:
     They are measurements at the updates; that the output is held is told.
     """
     found = fit(record)
-    if found.data.every > 1:
+    # What a model does not follow tells nothing of samples.
+    if found.data.every > 1 or not found.at_noise_level:
         return found
     kept, rows = found.records[0], _rows(record, found)  # without spikes and codes
     index = np.arange(record.n_samples)
