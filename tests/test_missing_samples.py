@@ -381,3 +381,17 @@ def test_a_channel_without_a_value_is_named(empty, cells, tmp_path):
     # it said that time has shape (0,)
     with pytest.raises(DataError, match=f"the {empty} has no value in any of 50 rows"):
         cr.read_record(path)
+
+
+@pytest.mark.parametrize(("every", "first"), [(14, 12), (16, 0), (18, 12)])
+def test_an_output_that_is_measured_seldom_is_fitted_beside_an_input_that_is_not(every, first):
+    # 22 to 28 of 400 samples: a fast pole, whose free response is zero, had more rows (ValueError)
+    plant = cr.delayed_ss(ct.tf([2.0], [30.0, 1.0]), dead_time=12.4, dt=1.0)
+    u = np.repeat(np.random.default_rng(3).choice([-1.0, 1.0], 40), 10)
+    y = plant.simulate(u) + 0.02 * np.random.default_rng(0).standard_normal(400)
+    seldom = np.full(400, np.nan)
+    seldom[first::every] = y[first::every]
+    fit = cr.fit_output_error(cr.Record(np.arange(400.0), u, seldom, missing="keep")).fit
+    # noise of 1 % on a sample in half a lag; the structure is chosen by these few as well
+    assert fit.dead_time == pytest.approx(12.4, abs=2)
+    assert fit.gain == pytest.approx(2, rel=0.05)

@@ -124,8 +124,10 @@ class LocalTerms:
         found = []
         for rows, terms in zip(self._rows, self._terms, strict=True):
             batch, length, f = terms.shape
-            every = np.zeros((batch, f + columns.shape[2], length))
-            every[:, :f] = np.swapaxes(terms, 1, 2)
+            count = f + columns.shape[2]
+            # Of a short segment too as many rows are left, whether terms are zero or not.
+            every = np.zeros((batch, count, max(length, count)))
+            every[:, :f, :length] = np.swapaxes(terms, 1, 2)
             every[:, f:, : rows.stop - rows.start] = np.swapaxes(columns[:, rows], 1, 2)
             upper = triangle(np.swapaxes(every, 1, 2))
             found.append(Reduced(upper[:, :f, :f], upper[:, :f, f:], upper[:, f:, f:]))
