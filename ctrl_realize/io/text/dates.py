@@ -141,8 +141,9 @@ def _formats(cell: str) -> list[str]:
     """Formats that a cell may have: several, if day and month cannot be distinguished."""
     mark = re.sub(r"\w", "", cell)[:1]
     dates = [one.replace("-", mark) for one in _DATES if mark != "." or not one.startswith("%m")]
-    forms = [date + clock for date in (*dates, "") for clock in _CLOCKS if date or "%p" in clock]
-    return [form.strip() for form in forms if not np.isnat(_parsed([cell], form.strip())).any()]
+    forms = [date + clock for date in dates for clock in _CLOCKS]
+    forms += [clock.strip() for clock in _CLOCKS if "%p" in clock]  # a clock alone
+    return [form for form in forms if not np.isnat(_parsed([cell], form)).any()]
 
 
 def _in_format(cells: list[str], form: str) -> Stamps:
