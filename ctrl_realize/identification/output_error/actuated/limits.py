@@ -33,7 +33,9 @@ _SELDOM = 0.05  # of the samples, up to which a value far beyond the others is n
 _FEW_GAPS, _SHORT_GAP = 0.2, 5  # part of the samples, and samples in a row, that are interpolated
 _PULSE = 0.5  # ranges of the others by which an input is beyond them: the output tells what it is
 
-_EXPLAINED = 2.0  # standard deviations of the noise of means, up to which a model explains them
+_EXPLAINED = 2.0
+"""Residual of means over their noise, up to which a model explains them: 0.7 to 1.4 for 26 held
+outputs, simulated and measured."""
 
 Fit = Callable[[Record], OutputErrorFit]
 
