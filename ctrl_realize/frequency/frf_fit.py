@@ -12,6 +12,11 @@ from .._checks import numbers
 from .._wording import in_time, interval_in_time, time_and_interval, time_within
 from ..numerics.arrays import ComplexArray, FloatArray
 from ..numerics.constants import Z_95
+from ..numerics.engine.poles import parameters_from_poles
+from ..numerics.engine.problem import Structure
+from ..numerics.engine.static_gain import static_gain
+from ..numerics.engine.structures import Candidate
+from ..numerics.rational.frf_data import FRFData
 from ..results import Flag, FractionalDelayFit, IntervalKind
 
 if TYPE_CHECKING:
@@ -168,18 +173,11 @@ class FRFFit(FractionalDelayFit):
         """Standard error of the gain b0 / a0 of b(s) exp(-s L) / a(s), for the chosen structure."""
         omega = 2 * np.pi * self.frequency_hz
         unit = np.sqrt(omega[0] * omega[-1])
-        s, poles = 1j * omega[:, None] / unit, self.poles / unit
-        powers, below = s ** np.arange(self.order + 1), np.prod(s - poles, axis=1, keepdims=True)
-        value, free = self.response(omega)[:, None], self.order - self.relative_degree + 1
-        by_b, by_a = (
-            np.exp(-1j * omega[:, None] * self.dead_time) * powers[:, :free],
-            -value * powers,
-        )
-        J = np.hstack([by_b / below, by_a[:, :-1] / below, -s * value]) / self.sigma[:, None]
-        slope = np.zeros(J.shape[1])
-        slope[0], slope[free : free + (self.order > 0)] = 1.0, -self.gain
-        error = np.linalg.norm(slope @ np.linalg.pinv(np.sqrt(2) * np.vstack([J.real, J.imag])))
-        return float(self.weighted_rms * error / np.abs(np.prod(poles)))
+        data = FRFData(1j * omega / unit, self.measured, 1 / self.sigma, np.inf)
+        at = np.append(self.dead_time * unit, parameters_from_poles(self.poles / unit))
+        model = Candidate(Structure(self.order, self.relative_degree), at, 0.0)
+        variance = self.weighted_rms**2 / 2  # of each part of a point
+        return static_gain(data.problem, model, variance, data.scales.length).gain_std
 
     @property
     def gain_resolved(self) -> bool:
