@@ -21,9 +21,10 @@ from ..design.tuning.forms import PIDForm
 from ..errors import UnsuitableSystemError
 from ..frequency.comparison import FRFComparison
 from ..identification.campaign.campaign import Campaign
+from ..io.atomic import write_text
 from ..results import ModelFit
 from .controller import controller_of
-from .page import Controller, Table, pairs, write_page
+from .page import Controller, Table, pairs, rendered
 from .provenance import versions
 from .sketches import (
     Sketch,
@@ -292,21 +293,17 @@ def write_report(
     simulated: bool = False,
     figures: str | os.PathLike[str] | None = None,
 ) -> Path:
-    """Write a page, with tables of data and settings, and, if a folder is given, its figures."""
+    """Write a page, with tables of data and settings, and, if a folder is given, its figures.
+
+    The template reads its arguments by name, and what is made of them here. The file is written
+    atomically.
+    """
+    target, version = Path(path), version_of("ctrl-realize")
+    parameters = parameter_table(fit) if fit is not None and fit.parameters else None
     data = [data_table(records, files)] if files or records else []
     below = [*data, *settings_tables(settings), pairs("Versions", versions(), folded=True)]
+    tables = [*tables, *below]
     if figures is not None:
         save_sketches(figures, sketches)
-    return write_page(
-        path,
-        title=title,
-        subtitle=subtitle,
-        verdict=verdict,
-        version=version_of("ctrl-realize"),
-        figures=sketches,
-        tables=[*tables, *below],
-        calls=calls,
-        simulated=simulated,
-        parameters=parameter_table(fit) if fit is not None and fit.parameters else None,
-        controller=controller,
-    )
+    write_text(target, rendered(locals()))
+    return target

@@ -5,20 +5,17 @@ from __future__ import annotations
 import base64
 import functools
 import hashlib
-import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from importlib import resources
-from pathlib import Path
 from typing import Any
 
 from jinja2 import Environment, StrictUndefined, Template
 from markupsafe import Markup
 
 from .._facts import facts
-from ..io.atomic import write_text
 from .sketches import Sketch
-from .verdict import Level, Verdict
+from .verdict import Level
 
 # control characters, and those that change the direction of writing, may occur in file names
 _CONTROLS = (*range(9), 11, 12, *range(14, 32), *range(127, 160))
@@ -179,67 +176,14 @@ def _template() -> Template:
     return environment.from_string(html, globals=parts)
 
 
-def write_page(
-    path: str | os.PathLike[str],
-    *,
-    title: str,
-    subtitle: str,
-    verdict: Verdict,
-    version: str,
-    figures: Sequence[Sketch] = (),
-    tables: Sequence[Table] = (),
-    calls: Sequence[tuple[str, str]] = (),
-    simulated: bool = False,
-    parameters: Table | None = None,
-    controller: Controller | None = None,
-) -> Path:
-    """Write a page to a file, atomically; all text is escaped, control characters are removed.
+def rendered(page: Mapping[str, Any]) -> str:
+    """Return a self-contained page; all text is escaped, control characters are removed.
 
     Parameters
     ----------
-    path : path-like
-    title, subtitle, version : str
-        The version of the package is for the footer.
-    verdict : Verdict
-        Verdict at the top, from `verdict_of`.
-    figures : sequence of Sketch
-    tables : sequence of Table
-    calls : sequence of (name, text)
-        Commands that reproduce the result.
-    simulated : bool
-        Whether the data are simulated, which is stated at the top.
-    parameters : Table or None
-        Parameters of the model, above the figures.
-    controller : Controller or None
-        A controller for the model, below its parameters.
-
-    Returns
-    -------
-    pathlib.Path
-
-    Raises
-    ------
-    OSError
-        The folder is missing or cannot be written.
-
-    Examples
-    --------
-    >>> import tempfile
-    >>> from pathlib import Path
-    >>> import ctrl_realize as cr
-    >>> from ctrl_realize import report
-    >>> from ctrl_realize.report.page import pairs, write_page
-    >>> system = cr.identify(cr.bench.valve().step_record(16, rng=5), method="scan")
-    >>> content = {
-    ...     "title": "Valve 7", "subtitle": "before the overhaul", "version": cr.__version__,
-    ...     "verdict": report.verdict_of(system),
-    ...     "tables": [pairs("Bench", [("shaker", "4.2 kg")])],
-    ... }
-    >>> with tempfile.TemporaryDirectory() as folder:
-    ...     html = write_page(Path(folder) / "valve.html", **content).read_text()
-    >>> print(html[html.index("<h1"):html.index("</h1>") + 5])
-    <h1>Valve 7</h1>
+    page : mapping
+        What the template reads: `title`, `subtitle`, `verdict`, `version` (of the package, for the
+        footer), `sketches`, `tables`, `calls` (commands that reproduce the result), `simulated`,
+        `parameters` and `controller`, either of which may be None.
     """
-    target = Path(path)
-    write_text(target, _template().render(page=locals()).translate(_UNSEEN) + "\n")
-    return target
+    return _template().render(page=page).translate(_UNSEEN) + "\n"
