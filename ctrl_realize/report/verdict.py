@@ -67,16 +67,16 @@ def verdict_of(system: DelayedStateSpace, *, comparison: FRFComparison | None = 
 
 
 def _verdict(
-    system: DelayedStateSpace, flags: Sequence[Flag | str], facts: Sequence[tuple[str, str]]
+    system: DelayedStateSpace, flags: Sequence[Flag], facts: Sequence[tuple[str, str]]
 ) -> Verdict:
-    codes = {_code(flag) for flag in flags}
+    codes = {flag.code for flag in flags}
     level: Level = "caution" if flags else "good"
     words = JUDGEMENTS["model"]
     judgement = words[level]
     answers = () if system.fit is None else system.fit.verdicts
     if answers:
         said = {one.question: one.level for one in answers}
-        others = codes - {_code(flag) for flag in _flags_of(system)}
+        others = codes - {flag.code for flag in _flags_of(system)}
         level = "caution" if others or set(said.values()) != {"good"} else "good"
         if "no" in (said["dead time"], said["tuning"]):
             level = "poor"
@@ -134,7 +134,7 @@ def headline_of(system: DelayedStateSpace) -> str:
         said = time_within(wait, *interval)
         samples = number_within(*(bound / system.dt for bound in (wait, *interval)))
         within = f", {fit.interval_label} {interval_in_time(*interval)}"
-    apparent = any(_code(flag) == "apparent_dead_time" for flag in _flags_of(system))
+    apparent = any(flag.code == "apparent_dead_time" for flag in _flags_of(system))
     kind = "Apparent dead time" if apparent else "Dead time"
     with times_in("s"):  # as sample times are set
         step = in_time(system.dt, 6)
@@ -149,32 +149,27 @@ def headline_of(system: DelayedStateSpace) -> str:
 
 
 def _sign_is_told(system: DelayedStateSpace) -> bool:
-    flagged = any(_code(flag) == "gain_not_resolved" for flag in _flags_of(system))
+    flagged = any(flag.code == "gain_not_resolved" for flag in _flags_of(system))
     return not flagged or sign_is_told(None if system.fit is None else system.fit.gain_interval)
 
 
-def _flags_of(system: DelayedStateSpace) -> tuple[Flag | str, ...]:
+def _flags_of(system: DelayedStateSpace) -> tuple[Flag, ...]:
     if system.fit is None:
         return ()
-    scanned = [JUDGEMENTS["model"]["scanned"]] * (system.fit.interval_kind == "flatness")
+    scanned = [Flag("", JUDGEMENTS["model"]["scanned"])] * (system.fit.interval_kind == "flatness")
     return (*system.fit.flags, *scanned)
 
 
-def _reasons(flags: Sequence[Flag | str]) -> tuple[str, ...]:
+def _reasons(flags: Sequence[Flag]) -> tuple[str, ...]:
     """List the flags, the worst first: those that go with wrong answers before notes."""
     wrong, late = marked("wrong_model"), marked("wrong_dead_time")
 
-    def rank(flag: Flag | str) -> tuple[bool, ...]:
-        code = _code(flag)
-        warns = isinstance(flag, Flag) and in_doubt(flag)
-        return code != _CONTRADICTED, code not in wrong, not warns, code not in late
+    def rank(flag: Flag) -> tuple[bool, ...]:
+        code = flag.code
+        return code != _CONTRADICTED, code not in wrong, not in_doubt(flag), code not in late
 
     ordered = sorted(flags, key=rank)
     return tuple(dict.fromkeys(_sentence(str(flag)) for flag in ordered))
-
-
-def _code(flag: Flag | str) -> str:
-    return flag.code if isinstance(flag, Flag) else ""
 
 
 def _sentence(text: str) -> str:
