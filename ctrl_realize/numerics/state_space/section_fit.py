@@ -27,6 +27,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -59,6 +60,11 @@ class Experiment:
     v: FloatArray
     y: FloatArray
     drift: bool = False
+
+    @cached_property
+    def known(self) -> NDArray[np.bool_]:
+        """Samples (p, T) that are not missing."""
+        return np.isfinite(self.y)
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,8 +125,7 @@ def fit_sections(
     most : int
         Largest number of steps.
     """
-    known = [np.isfinite(one.y) for one in data]
-    counts = np.sum([k.sum(axis=1) for k in known], axis=0).astype(np.float64)
+    counts = np.sum([one.known.sum(axis=1) for one in data], axis=0).astype(np.float64)
     moves = [one.y - np.nanmean(one.y, axis=1, keepdims=True) for one in data]
     spread = np.sum([np.nansum(move**2, axis=1) for move in moves], axis=0) / counts
     floor = _EXACT**2 * spread
@@ -129,10 +134,7 @@ def fit_sections(
 
     def at(candidate: Sections, weights: FloatArray) -> _Point:
         moved = tuple(motion(candidate, one.v) for one in data)
-        solved = [
-            _residual(candidate, m, one, k, weights)
-            for m, one, k in zip(moved, data, known, strict=True)
-        ]
+        solved = [_residual(candidate, m, one, weights) for m, one in zip(moved, data, strict=True)]
         left, initial, drifts = (tuple(parts) for parts in zip(*solved, strict=True))
         squares = np.sum([(r**2).sum(axis=1) for r in left], axis=0)
         variance = np.maximum(squares / counts, floor)
@@ -141,7 +143,7 @@ def fit_sections(
 
     here = at(model, 1 / spread)
     mask = model.free(feedthrough=feedthrough, poles=False)
-    gram, slope = _normal(here, data, known, 1 / spread, mask)
+    gram, slope = _normal(here, data, 1 / spread, mask)
     there = at(_stepped(model, mask, _damped_step(gram, slope, _LEAST_DAMPING)), 1 / spread)
     if there.cost < here.cost:
         here = there
@@ -150,7 +152,7 @@ def fit_sections(
     damping, done = _DAMPING, 0
     while done < most:
         weights = 1 / here.variance
-        gram, slope = _held(here.model, *_normal(here, data, known, weights, free), free)
+        gram, slope = _held(here.model, *_normal(here, data, weights, free), free)
         for _ in range(_TRIES):
             candidate = _stepped(here.model, free, _damped_step(gram, slope, damping))
             there = at(_inside(candidate, LARGEST_POLE), weights)
@@ -233,7 +235,7 @@ def _linear(model: Sections, moved: Motion, one: Experiment) -> FloatArray:
 
 
 def _basis(
-    model: Sections, moved: Motion, one: Experiment, known: NDArray[np.bool_], weights: FloatArray
+    model: Sections, moved: Motion, one: Experiment, weights: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     """Orthonormal columns (p T, k) that span the weighted responses of `_linear`.
 
@@ -241,7 +243,7 @@ def _basis(
     would square the condition number: for slow poles, whose responses are similar, the minimum
     would not be found accurately.
     """
-    columns = _linear(model, moved, one) * known[:, None]
+    columns = _linear(model, moved, one) * one.known[:, None]
     columns *= np.sqrt(weights)[:, None, None]
     wide = np.swapaxes(columns, 1, 2).reshape(-1, columns.shape[1])
     size = np.sqrt(np.einsum("tk,tk->k", wide, wide))
@@ -254,39 +256,33 @@ def _basis(
 
 
 def _residual(
-    model: Sections, moved: Motion, one: Experiment, known: NDArray[np.bool_], weights: FloatArray
+    model: Sections, moved: Motion, one: Experiment, weights: FloatArray
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Residual of the outputs with the best initial state, levels and drifts.
 
     And that state (2 q,), and the changes (p,) by the drifts.
     """
     root = np.sqrt(weights)[:, None]
-    rest = (np.where(known, one.y - moved.output(model, one.v), 0.0) * root).ravel()
-    basis, back = _basis(model, moved, one, known, weights)
+    rest = (np.where(one.known, one.y - moved.output(model, one.v), 0.0) * root).ravel()
+    basis, back = _basis(model, moved, one, weights)
     parts = rest @ basis
     left = rest - basis @ parts
     left -= basis @ (left @ basis)  # repeated, for the digits lost the first time
-    terms, p = back @ parts, len(known)
+    terms, p = back @ parts, len(one.y)
     drifts = terms[model.a.size + p :] if one.drift else np.zeros(p)
-    return np.asarray(left.reshape(known.shape) / root), terms[: model.a.size], drifts
+    return np.asarray(left.reshape(one.y.shape) / root), terms[: model.a.size], drifts
 
 
 def _normal(
-    here: _Point,
-    data: Sequence[Experiment],
-    known: Sequence[NDArray[np.bool_]],
-    weights: FloatArray,
-    mask: NDArray[np.bool_],
+    here: _Point, data: Sequence[Experiment], weights: FloatArray, mask: NDArray[np.bool_]
 ) -> tuple[FloatArray, FloatArray]:
     """Normal equations of the remaining parameters, after elimination of levels and states."""
     count = int(mask.sum())
     gram, slope, size = np.zeros((count, count)), np.zeros(count), np.zeros(count)
-    for one, rest, seen, left, initial in zip(
-        data, here.moved, known, here.left, here.initial, strict=True
-    ):
+    for one, rest, left, initial in zip(data, here.moved, here.left, here.initial, strict=True):
         moved = rest.started(here.model, initial)
         p, T = one.y.shape
-        linear = _basis(here.model, moved, one, seen, weights)[0].reshape(p, T, -1)
+        linear = _basis(here.model, moved, one, weights)[0].reshape(p, T, -1)
         sums = np.zeros((count + linear.shape[2] + 1,) * 2)
         for begin in range(0, T, _ROWS):
             part = slice(begin, begin + _ROWS)
@@ -294,8 +290,8 @@ def _normal(
                 root = np.sqrt(weights[a])
                 slopes = root * moved.slopes(here.model, one.v, a, part)[mask]
                 rows = np.concatenate([slopes, linear[a, part].T, root * left[a, None, part]])
-                if not seen[a, part].all():
-                    rows = rows[:, seen[a, part]]
+                if not one.known[a, part].all():
+                    rows = rows[:, one.known[a, part]]
                 sums += rows @ rows.T
         own, other = sums[:count, count:-1], sums[count:-1, -1]
         gram += sums[:count, :count] - own @ own.T
