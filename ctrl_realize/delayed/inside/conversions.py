@@ -14,7 +14,7 @@ from ...errors import DelayRangeError, ModelWarning, OptionError, UnsuitableSyst
 from ...numerics.arrays import BoolArray, FloatArray
 from ...numerics.internal_delays import form as forms
 from ...numerics.internal_delays.form import DelayForm
-from ...numerics.internal_delays.merging import ends_apart, paths_apart
+from ...numerics.internal_delays.merging import Paths, ends_apart, paths_apart
 from ...numerics.state_space.pade import pade_ladder
 from ...numerics.state_space.sampling import continuous_ends, sample_ends, split_dead_time
 from ..operands import plain
@@ -29,8 +29,6 @@ IN_BAND = 0.1
 
 class InsideConversions(DelayOperators):
     """Conversions of continuous systems."""
-
-    internal_delays: tuple[float, ...]
 
     def pade(self, order: int = 5) -> ct.StateSpace:
         """Replace each delay by its diagonal Pade approximant.
@@ -114,7 +112,7 @@ class InsideConversions(DelayOperators):
         names = self.input_labels, self.output_labels
         base: dict[str, Any] = {"dt": step, "time_unit": self.time_unit}
         if (paths := paths_apart(self._form())) is not None:
-            return self._joined(_paths_sampled(*paths, step), *names, **base)
+            return self._joined(_paths_sampled(paths, step), *names, **base)
         before, behind, rest = ends_apart(self._form())
         rest = _held_apart(rest)
         ends = before, behind, rest.delays
@@ -230,15 +228,9 @@ def check_logarithm(A: FloatArray) -> None:
         )
 
 
-def _paths_sampled(
-    core: DelayForm,
-    before: FloatArray,
-    behind: FloatArray,
-    left: FloatArray,
-    right: FloatArray,
-    step: float,
-) -> DelayForm:
+def _paths_sampled(paths: Paths, step: float) -> DelayForm:
     """Sample a core with a delay at each end, between gains."""
+    core, before, behind, left, right = paths
     shares = [np.array([split_dead_time(tau, step)[1] for tau in end]) for end in (before, behind)]
     if behind.size == 1 or (shares[0].any() and shares[1].any()):
         # what all outputs, or inputs, have in common may stand at the other end

@@ -6,11 +6,15 @@ alike: the same signal twice, a chain of two delays, a channel that nothing read
 
 from __future__ import annotations
 
+from typing import TypeAlias
+
 import numpy as np
 
 from ..arrays import FloatArray
 from .form import DelayForm, without_zero_delays
 
+Paths: TypeAlias = tuple[DelayForm, FloatArray, FloatArray, FloatArray, FloatArray]
+"""Core, delays at its inputs and at its outputs, gain behind it and gain before it."""
 ALIKE = 4 * np.finfo(np.float64).eps
 """Relative rounding within which two rows are multiples of one another."""
 
@@ -148,9 +152,7 @@ def _inputs_apart(form: DelayForm) -> tuple[list[float], DelayForm]:
     return before, DelayForm(form.A, B, form.C, D, form.delays).channels(keep)
 
 
-def paths_apart(
-    form: DelayForm,
-) -> tuple[DelayForm, FloatArray, FloatArray, FloatArray, FloatArray] | None:
+def paths_apart(form: DelayForm) -> Paths | None:
     """Take all delays out of a form without loops through them: left, delays, core, delays, right.
 
     A delay that reads one input and no state is one before a further input of the core, which has
