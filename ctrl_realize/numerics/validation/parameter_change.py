@@ -22,7 +22,7 @@ import numpy as np
 from scipy.signal import lfilter
 from scipy.special import fdtrc
 
-from ..arrays import FloatArray, IntArray
+from ..arrays import FloatArray, IntArray, unit_columns
 from ..constants import LEAST_FREEDOM
 from ..signals.correlation import autoregression
 
@@ -83,10 +83,8 @@ def parameter_change(
     freedom = target.size - columns.shape[1] - used_up
     if freedom < LEAST_FREEDOM:
         return None
-    scale = np.linalg.norm(columns, axis=0)
-    if not np.all(scale > 0):
-        return None
-    solution, _, rank, _ = np.linalg.lstsq(columns / scale, target, rcond=1e-9)
+    scaled, scale = unit_columns(columns)
+    solution, _, rank, _ = np.linalg.lstsq(scaled, target, rcond=1e-9)
     if rank < columns.shape[1]:
         return None
     left = target - columns @ (solution / scale)
@@ -96,7 +94,7 @@ def parameter_change(
         return None
     ratio = (float(alone @ alone) - float(left @ left)) / (3 * (used.size - 1)) / variance
     # of the columns, not of their products, whose inverse may have a negative diagonal
-    _, singular, turned = np.linalg.svd(columns / scale, full_matrices=False)
+    _, singular, turned = np.linalg.svd(scaled, full_matrices=False)
     spread = np.sum((turned / singular[:, None]) ** 2, axis=0) / scale**2
     errors = np.sqrt(variance * spread)
     found = np.linalg.lstsq(plain / scale, residual, rcond=1e-9)[0] / scale

@@ -23,7 +23,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import expm
 
-from ..arrays import ComplexArray, FloatArray
+from ..arrays import ComplexArray, FloatArray, unit_columns
 from ..constants import LEAST_FREEDOM
 from ..state_space.responses import simulate
 from ..state_space.sampling import sample_with_dead_time
@@ -83,11 +83,10 @@ def white_step(
     middle = np.append(0.5 * (response[1:] + response[:-1]), response[-1])
     by_pole = -_states(middle, a, dt, 0.0, first=float(response[0]))
     slope = -np.gradient(response) / dt
-    columns = np.column_stack([slope, by_pole, states[:, :m], own])
-    size = np.linalg.norm(columns, axis=0)
-    white, target, used_up = whitened(columns / np.where(size > 0, size, 1.0), residual)
+    columns, size = unit_columns(np.column_stack([slope, by_pole, states[:, :m], own]))
+    white, target, used_up = whitened(columns, residual)
     freedom = target.size - white.shape[1] - used_up
-    if freedom < LEAST_FREEDOM or not np.all(size > 0) or scale * dt > np.pi:
+    if freedom < LEAST_FREEDOM or scale * dt > np.pi:
         return None
     solution, _, rank, _ = np.linalg.lstsq(white, target, rcond=1e-10)
     if rank < white.shape[1]:
