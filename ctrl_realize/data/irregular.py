@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike
 from .._checks import positive
 from ..errors import DataError, OptionError, TimeAxisError
 from ..numerics.arrays import FloatArray, IntArray
-from ..numerics.signals.sample_grid import grid_rows, grid_step, regular_step, usual_step
+from ..numerics.signals.sample_grid import grid_rows, grid_step, held, regular_step, usual_step
 from .record_checks import checked_signal, increasing_stamps
 from .resampling import MAX_DENSER, MIN_SAMPLES
 
@@ -65,15 +65,16 @@ def on_one_axis(
     axis = every[0] + step * np.arange(max(int(rows[-1]) + 1, MIN_SAMPLES), dtype=np.float64)
     spread = np.full((*y.shape[:-1], axis.size), np.nan)
     spread[..., np.unique(rows)] = _means(y[..., seen], rows)
-    held = np.stack([
-        _held(moves[row], values[row], axis, step)
+    # Of several values of an input within a row the last one holds on.
+    drives = np.stack([
+        held(grid_rows(moves[row], float(axis[0]), step), values[row], np.arange(axis.size))
         for row, values in zip(known, np.atleast_2d(u), strict=True)
     ])  # fmt: skip
     measured = stamps[seen & ~np.isnan(np.atleast_2d(y)).all(axis=0)]
     apart = np.diff(measured) / step
     regular = regular_step(every) or np.mean(apart < _AS_IT_IS) > _NEXT_TO_ANOTHER
     usual = step if regular else usual_step(measured)
-    signals = axis, held[0] if u.ndim == 1 else held, spread
+    signals = axis, drives[0] if u.ndim == 1 else drives, spread
     return signals, usual if usual > _AS_IT_IS * step else step
 
 
@@ -86,11 +87,3 @@ def _means(values: FloatArray, rows: IntArray) -> FloatArray:
     sums = np.add.reduceat(np.where(known, values, 0.0), starts, axis=-1)
     counts = np.add.reduceat(known.astype(np.float64), starts, axis=-1)
     return np.asarray(np.where(counts > 0, sums / np.maximum(counts, 1), np.nan))
-
-
-def _held(stamps: FloatArray, values: FloatArray, axis: FloatArray, step: float) -> FloatArray:
-    """Last value of an input at every row of the time axis."""
-    # Of several values within a row the last one holds on.
-    rows = grid_rows(stamps, float(axis[0]), step)
-    last = np.searchsorted(rows, np.arange(axis.size), side="right") - 1
-    return np.asarray(values[np.maximum(last, 0)])

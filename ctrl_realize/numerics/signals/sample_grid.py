@@ -12,6 +12,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..arrays import FloatArray, IntArray
 from .time_axis import UNIFORM_WITHIN, without_rounding
@@ -116,7 +117,7 @@ def filled(values: FloatArray) -> FloatArray:
     return np.asarray(np.where(last < 0, np.nan, values[np.maximum(last, 0)]))
 
 
-def held(stamps: FloatArray, values: np.ndarray[Any, Any], time: FloatArray) -> FloatArray:
+def held(stamps: NDArray[Any], values: NDArray[Any], time: NDArray[Any]) -> FloatArray:
     """Last value (..., N) at every time (M,), NaN before the first stamp."""
     last = np.searchsorted(stamps, time, side="right") - 1
     return np.where(last < 0, np.nan, np.asarray(values, np.float64)[..., np.maximum(last, 0)])
