@@ -36,11 +36,6 @@ def flat_set(iae: FloatArray, delay: int, rounding: float) -> tuple[int, int]:
     return int(flat[0]), int(flat[-1])
 
 
-def local_minima(iae: FloatArray, delay: int, rounding: float) -> int:
-    """Count the separate minima of the curve within 5 % of the smallest IAE."""
-    return len(runs(iae <= FLAT * iae[delay] + rounding)[0])
-
-
 def curve_flags(iae: FloatArray, delay: int, rounding: float) -> Iterator[Flag]:
     """List the flags that follow from the curve itself."""
     last = iae.size - 1
@@ -52,7 +47,8 @@ def curve_flags(iae: FloatArray, delay: int, rounding: float) -> Iterator[Flag]:
         yield flagged("delay_at_bound.scan", best=best, max_delay=last)
     if contrast < CONTRAST:
         yield flagged("no_delay_resolved.scan", contrast=contrast, delay=delay)
-    minima = local_minima(iae, delay, rounding)
+    # separate minima within 5 % of the smallest IAE
+    minima = len(runs(iae <= FLAT * iae[delay] + rounding)[0])
     if minima > 1:
         yield flagged("several_minima", minima=minima, low=low, high=high)
 
