@@ -170,12 +170,10 @@ def _modal(zeros: ComplexArray, poles: ComplexArray, gain: float) -> Core | None
         if abs(p.imag) <= 1e-12:
             A[at, at], B[at], C[at] = p.real, 1.0, r.real
             at += 1
-        elif at + 2 <= n:
+        else:
             A[at : at + 2, at : at + 2] = [[p.real, -p.imag], [p.imag, p.real]]
             B[at], C[at : at + 2] = 1.0, [2 * r.real, -2 * r.imag]
             at += 2
-    if at != n:
-        return None
     return A, B, C, gain if zeros.size == n else 0.0
 
 
