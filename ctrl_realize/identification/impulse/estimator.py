@@ -38,8 +38,7 @@ def choose_estimate(group: tuple[Record, ...], count: int, start: str) -> Choice
     The regularized estimate is preferred unless OKID is clearly better, because its standard
     deviations are more reliable. If two thirds are too short for one method, the other is used.
     """
-    p = group[0].noutputs
-    free = ("auto",) * p
+    free = ("auto",) * group[0].noutputs
     splits = [round((1 - HELD_BACK) * record.n_samples) for record in group]
     first = tuple(
         record.between(*record.time[[0, split - 1]])

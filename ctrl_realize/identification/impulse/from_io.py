@@ -18,7 +18,7 @@ from ...data.impulse_estimate import ImpulseEstimate
 from ...errors import DataWarning
 from ...numerics.blas_threads import single_threaded
 from ...numerics.signals.onset import correlation_onset
-from .estimator import choose_estimate
+from .estimator import Choice, choose_estimate
 from .regression import PulseRegression, through_arx, with_prior, without_prior
 
 Method = Literal["auto", "regularized", "least_squares", "okid"]
@@ -141,13 +141,12 @@ def impulse_from_io(
         count = min(max(SHORTEST, 2 * _latest_onset(group, most)), most)
     else:
         count = integer(length, "length", 2)
-    chosen = choose_estimate(group, count, start) if method == "auto" else None
-    kernels: tuple[str, ...] = (kernel,) * group[0].noutputs
-    if chosen is not None and kernel == "auto":
-        kernels = chosen.kernels
+    alike = (kernel,) * group[0].noutputs
+    auto = method == "auto"
+    chosen = choose_estimate(group, count, start) if auto else Choice(method, alike, "")
+    kernels = chosen.kernels if kernel == "auto" else alike
     estimators = {"okid": through_arx, "least_squares": without_prior}
-    way = method if chosen is None else chosen.method
-    estimate = estimators.get(way, partial(with_prior, kernels=kernels))
+    estimate = estimators.get(chosen.method, partial(with_prior, kernels=kernels))
     while True:
         found = estimate(group, count, start)
         tail = _tail_flags(found)
@@ -166,7 +165,7 @@ def impulse_from_io(
         noise_std=found.noise_std,
         method=found.method,
         rows=found.rows,
-        choices=(chosen.reason,) if chosen is not None and chosen.reason else (),
+        choices=(chosen.reason,) if chosen.reason else (),
         flags=found.flags + tail,
         name=group[0].name,
     )
