@@ -16,7 +16,7 @@ from ..data import Record
 from ..errors import OptionError
 from ..numerics.arrays import FloatArray
 from .instruments import STROKE_MM, held_input, recorded
-from .motion import Motion
+from .motion import SINE_MEAN_MA, Motion
 from .truth import ValveTruth
 
 Seed: TypeAlias = np.random.Generator | int | None
@@ -30,7 +30,6 @@ _STATIC_DECIMATION = 16
 _STATIC_HOLD = 2.0
 """Time in s at each of its levels."""
 _SINE_SAMPLES = 640
-_SINE_MEAN_MA = 12.0
 _SINE_PERIODS = 4.0
 """Smallest number of periods of a sine that are recorded."""
 _SINE_ERROR_HZ = paper.STEPPED_SINE.frequency_accuracy_hz
@@ -300,19 +299,17 @@ class Valve:
         integer(repeats, "repeats", 1)
         low, high = (positive(edge, "band_hz", "frequency in Hz") for edge in band_hz)
         generator = np.random.default_rng(rng)
-        mean_mm = _REST_MM + self.truth.gain * (_SINE_MEAN_MA - paper.SETUP.current_range[0])
+        mean_mm = _REST_MM + self.truth.gain * (SINE_MEAN_MA - paper.SETUP.current_range[0])
         sweep = []
         for point, nominal in enumerate(np.geomspace(low, high, points), start=1):
             error = min(_SINE_ERROR_HZ, 0.01 * nominal)
             frequency_hz = nominal + generator.uniform(-error, error)
             time = self._sine_time(frequency_hz, settle + _SINE_PERIODS / nominal)
             omega = 2 * np.pi * frequency_hz
-            current = _SINE_MEAN_MA + self.sine_amplitude * np.sin(omega * time)
+            current = SINE_MEAN_MA + self.sine_amplitude * np.sin(omega * time)
             differing = repeats if self.dead_time_scatter else 1
             dead_times = [self._dead_time(generator) for _ in range(differing)]
-            moved = self._motion.of_sine(
-                omega, self.sine_amplitude, _SINE_MEAN_MA, time, dead_times
-            )
+            moved = self._motion.of_sine(omega, self.sine_amplitude, time, dead_times)
             records = []
             for k in range(repeats):
                 name, position = f"valve_sine_{point:03d}_{k + 1}", mean_mm + moved[k % differing]

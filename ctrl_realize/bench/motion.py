@@ -17,6 +17,7 @@ from .linear import Core, response_to_held_input, response_to_started_sine
 
 _OVERSAMPLING = 8
 """Steps within a sample for the simulation of friction."""
+SINE_MEAN_MA = 12.0
 _SINE_OVERSAMPLING = 4
 """The same for sines, of which a sample is at most a twentieth of a period."""
 
@@ -54,20 +55,15 @@ class Motion:
         return _passed(self.after, self._through(stem, fine), fine)[::_OVERSAMPLING]
 
     def of_sine(
-        self,
-        omega: float,
-        amplitude: float,
-        mean: float,
-        time: FloatArray,
-        dead_times: Sequence[float],
+        self, omega: float, amplitude: float, time: FloatArray, dead_times: Sequence[float]
     ) -> list[FloatArray]:
-        """Simulate a sine about a mean current for several dead times, in mm about the mean."""
+        """Simulate a sine about the mean current for several dead times, in mm about the mean."""
         if not self.actuator:
             return [
                 amplitude * response_to_started_sine(self.whole, omega, time, dead_time)
                 for dead_time in dead_times
             ]
-        middle = MM_PER_MA * mean
+        middle = MM_PER_MA * SINE_MEAN_MA
         fine = float(time[1]) / _SINE_OVERSAMPLING
         often = fine * np.arange(time.size * _SINE_OVERSAMPLING, dtype=np.float64)
         if self.place == "input":
