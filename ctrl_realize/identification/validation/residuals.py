@@ -12,8 +12,7 @@ from ..._checks import integer, within
 from ..._flags import Flag, flagged
 from ...data import Record
 from ...data.given import as_record
-from ...delayed import DelayedStateSpace
-from ...delayed.simulation import Start, simulate_record
+from ...delayed.simulation import Start, as_delayed, simulate_record
 from ...errors import DataError
 from ...numerics.arrays import BoolArray, FloatArray, read_only
 from ...numerics.blas_threads import single_threaded
@@ -106,7 +105,7 @@ def analyse_residuals(
     probability = np.array([whiteness(rho[1:], record.n_samples) for rho in own])
     outside = _outside(cross, bounds, level)
     # For a plant without feedthrough, a correlation at lag 0 is caused by a controller.
-    direct = _first_response(system) != 0
+    direct = as_delayed(system, record).markov(1).reshape(len(y), len(u)) != 0
     later, earlier = outside[:, :, count:].copy(), outside[:, :, : count + 1].copy()
     later[:, :, 0] &= direct
     earlier[:, :, -1] &= ~direct
@@ -145,13 +144,6 @@ def _flags(later: BoolArray, earlier: BoolArray, cross: FloatArray) -> Iterator[
         yield flagged("input_in_residual", lag=lag)
     if earlier.any():
         yield flagged("feedback.residual")
-
-
-def _first_response(system: ct.StateSpace) -> FloatArray:
-    """Return the Markov parameter at lag 0, shape (p, m), without the augmented matrices."""
-    if isinstance(system, DelayedStateSpace):
-        return system.markov(1).reshape(system.noutputs, system.ninputs)
-    return np.asarray(system.D)
 
 
 def _two_sided(residual: FloatArray, drive: FloatArray, lags: int) -> FloatArray:
