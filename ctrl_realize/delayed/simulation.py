@@ -78,15 +78,11 @@ def _unknown_starts(model: DelayedStateSpace, N: int) -> list[FloatArray]:
     n, p, m = core.nstates, core.noutputs, core.ninputs
     free = markov(core.A, np.eye(n), core.C, np.zeros((p, n)), N + 1)[:, :, 1:]
     parts = [_through_outputs(free, model)] if n else []
-    if any(model.input_delays):
+    held = [(j, *ends) for j in range(m) for ends in _pieces(min(model.input_delays[j], N))]
+    if held:
         steps = step_response(*matrices_of(core), N)
-        for j in range(m):
-            pulses = [
-                later(steps[:, [j]], first) - later(steps[:, [j]], last)
-                for first, last in _pieces(min(model.input_delays[j], N))
-            ]
-            if pulses:
-                parts.append(_through_outputs(np.concatenate(pulses, axis=1), model))
+        pulses = [later(steps[:, [j]], a) - later(steps[:, [j]], b) for j, a, b in held]
+        parts.append(_through_outputs(np.concatenate(pulses, axis=1), model))
     for i in range(p):
         for first, last in _pieces(min(model.output_delays[i], N)):
             level = np.zeros((p, N))
