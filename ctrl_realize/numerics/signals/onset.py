@@ -34,11 +34,10 @@ from .filters import moving_mean
 class CorrelationOnset:
     """Cross-correlation of the prewhitened input with the output, filtered alike.
 
-    ``onset`` is the first lag where ``|rho| > bound`` (-1 if there is none) and `peak` the lag of
-    the largest; `bound` has shape (lags + 1,).
+    ``onset`` is the first lag where the correlation exceeds its bound (-1 if there is none), and
+    `peak` the lag of the largest.
     """
 
-    bound: FloatArray
     onset: int
     peak: int
 
@@ -77,7 +76,7 @@ def correlation_onset(
     bound += [left[1 : lags + 1 - k] @ np.abs(rho[k + 1 :]) for k in range(lags + 1)]
     seen = np.flatnonzero(np.abs(rho) > bound)
     onset = int(seen[0]) if seen.size else -1
-    return CorrelationOnset(bound, onset, int(np.abs(rho).argmax()))
+    return CorrelationOnset(onset, int(np.abs(rho).argmax()))
 
 
 def phase_slope(omega: FloatArray, phase: FloatArray, share: float) -> tuple[float, float]:
