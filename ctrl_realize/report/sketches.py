@@ -127,7 +127,7 @@ def identification_sketches(
     given = () if system.fit is None else system.fit.records
     several = [one for one in given if not np.isnan(one.input).any()]
     if len(several) > 1:
-        sketches.append(_each_record(system, several))
+        sketches.append(_each_record(system, several, len(several) - MOST_BESIDE))
     sketches.append(sketch("record", plots.record_plot, record))
     return sketches + frf_sketches([system], frf, comparison)
 
@@ -156,10 +156,7 @@ def fit_sketches(system: DelayedStateSpace, step: StepResponse | None) -> list[S
     return sketches
 
 
-def _each_record(
-    system: DelayedStateSpace, records: Sequence[Record], more: int | None = None
-) -> Sketch:
-    more = len(records) - MOST_BESIDE if more is None else more
+def _each_record(system: DelayedStateSpace, records: Sequence[Record], more: int) -> Sketch:
     words = {"more": f" {more} more records are not shown." if more > 0 else ""}
     size = (6.2, 0.6 + 1.7 * each_record_rows(len(records)))
     return sketch("each_record", plots.each_record_plot, system, records, size=size, words=words)
