@@ -11,7 +11,7 @@ import numpy as np
 
 from .._checks import check_type, system_names
 from ..errors import OptionError, UnsuitableSystemError
-from ..numerics.arrays import ComplexArray, IntArray, Matrices
+from ..numerics.arrays import ComplexArray, Matrices
 from .chains import past_of
 from .deferred import DeferredMatrices
 
@@ -66,10 +66,7 @@ class CoreAndDelays(DeferredMatrices):
     @property
     def delay(self) -> Any:
         """Dead time in samples: an int, or an array (outputs, inputs) if channels differ."""
-        total: IntArray = np.add.outer(
-            np.array(self.output_delays, dtype=np.int64),
-            np.array(self.input_delays, dtype=np.int64),
-        )
+        total = np.add.outer(self.output_delays, self.input_delays).astype(np.int64)
         return int(total[0, 0]) if np.all(total == total[0, 0]) else total
 
     @property

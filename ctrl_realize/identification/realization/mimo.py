@@ -261,12 +261,12 @@ def realize_mimo(
         (way for way in models if errors[way].sum() <= enough), key=lambda w: models[w].states
     )
     pieces = models[way]
-    behind, before = (np.array(d, dtype=np.int64) for d in (pieces.outputs, pieces.inputs))
+    apart = np.add.outer(pieces.outputs, pieces.inputs)
     return pieces.system(
         data.dt,
         MimoRealization(
             delays=locked(found),
-            residual_delays=locked(np.where(known, found - np.add.outer(behind, before), 0)),
+            residual_delays=locked(np.where(known, found - apart, 0)),
             output_delays=pieces.outputs,
             input_delays=pieces.inputs,
             structure=way,
