@@ -79,11 +79,8 @@ def butterworth_group_delay(order: int, cutoff_hz: float, dt: float) -> float:
     """
     lag = np.arange(3)
     sections = butterworth(order, cutoff_hz, dt)
-    numerators, denominators = sections[:, :3], sections[:, 3:]
-    delays = numerators @ lag / numerators.sum(axis=1) - denominators @ lag / denominators.sum(
-        axis=1
-    )
-    return float(delays.sum())
+    ahead, behind = (part @ lag / part.sum(axis=1) for part in np.split(sections, 2, axis=1))
+    return float((ahead - behind).sum())
 
 
 def settling_samples(cutoff_hz: float, dt: float) -> int:
