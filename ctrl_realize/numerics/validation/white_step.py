@@ -99,16 +99,9 @@ def white_step(
     gain = numerator[0] / a[0]
     total = dead_time + (a[1] if n > 1 else 1.0) / a[0]
     total -= numerator[1] / numerator[0] if m > 1 else 0.0
-    moved = gradients @ step
+    found = np.array([dead_time, gain, total]) + gradients @ step
     errors = np.linalg.norm(gradients @ root, axis=1) * np.sqrt(float(left @ left) / freedom)
-    return WhiteStep(
-        dead_time + float(moved[0]),
-        float(errors[0]),
-        float(gain + moved[1]),
-        float(errors[1]),
-        float(total + moved[2]),
-        float(errors[2]),
-    )
+    return WhiteStep(*np.stack([found, errors], axis=1).ravel().tolist())
 
 
 def _gradients(a: FloatArray, b: FloatArray) -> FloatArray:
