@@ -56,6 +56,11 @@ class Candidate:
     bic: float
     converged: bool = False
 
+    @property
+    def structure(self) -> tuple[int, Shares, bool]:
+        """Order, delays and feedthrough."""
+        return self.order, (self.inputs, self.outputs), self.feedthrough
+
 
 def experiments(
     group: Sequence[Record], shares: Shares, most: int | None = None, *, drift: bool = False
@@ -158,29 +163,21 @@ class Search:
 
     def as_good(self, best: Candidate, within: float) -> list[Candidate]:
         """Other orders, delays and feedthroughs that are as good, up to convergence."""
-        own = best.order, best.inputs, best.outputs, best.feedthrough
-        return [
-            c
-            for c in self._compared
-            if (c.order, c.inputs, c.outputs, c.feedthrough) != own
-            and abs(c.bic - best.bic) <= within
-        ]
+        others = [c for c in self._compared if c.structure != best.structure]
+        return [c for c in others if abs(c.bic - best.bic) <= within]
 
     def _minimum(self, one: Candidate) -> Candidate:
-        shares = one.inputs, one.outputs
+        order, shares, own = one.structure
         data, model = self._experiments(shares, self._enough), one.found.model
-        fit = fit_sections(
-            data, model, feedthrough=one.feedthrough, enough=CONVERGED, most=MOST_TURNS
-        )
-        end = self._judged(fit, one.order, shares, one.feedthrough)
+        fit = fit_sections(data, model, feedthrough=own, enough=CONVERGED, most=MOST_TURNS)
+        end = self._judged(fit, order, shares, own)
         # B is estimated again first, which may lead to another minimum.
         return replace(min(one, end, key=lambda c: c.bic), converged=True)
 
     def finish(self, best: Candidate) -> Candidate:
         """Final fit to all samples."""
-        shares = best.inputs, best.outputs
-        data = self._experiments(shares)
-        found = fit_sections(data, best.found.model, feedthrough=best.feedthrough)
+        _, shares, own = best.structure
+        found = fit_sections(self._experiments(shares), best.found.model, feedthrough=own)
         return replace(best, found=found)
 
     def by_order(
@@ -209,12 +206,12 @@ class Search:
         finally the order: with the right delays a lower one may suffice.
         """
         for _ in range(FARTHEST):
-            shares = best.inputs, best.outputs
-            ways = [(moved, best.feedthrough) for moved in _neighbours(*shares) if delays]
-            ways += [(shares, not best.feedthrough)] if feedthrough else []
+            order, shares, own = best.structure
+            ways = [(moved, own) for moved in _neighbours(*shares) if delays]
+            ways += [(shares, not own)] if feedthrough else []
             tried = [
-                self.fit(best.order, moved, feedthrough=own, start=best)
-                for moved, own in ways
+                self.fit(order, moved, feedthrough=direct, start=best)
+                for moved, direct in ways
                 if max(moved[0]) + max(moved[1]) < self._markov.shape[-1] // 2
             ]
             best, *tried = self.converged([best, *tried])
