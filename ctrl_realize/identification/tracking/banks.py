@@ -39,7 +39,6 @@ class Banks:
     def __init__(
         self,
         core: Core,
-        poles: ComplexArray,
         zeros: ComplexArray,
         *,
         dt: float,
@@ -48,6 +47,7 @@ class Banks:
         fixed: bool,
     ) -> None:
         self._zeros, self._dt, self._candidates, self._span = zeros, dt, candidates, span
+        poles = np.linalg.eigvals(core[0]).astype(np.complex128)
         directions = [] if fixed else pole_directions(poles, dt)
         self.now = self._about(core, directions, np.zeros(len(directions)))
         self._next: LinearisedBank | None = None

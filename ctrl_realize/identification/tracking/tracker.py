@@ -139,10 +139,8 @@ class DelayTracker:
 
     def _begin(self) -> None:
         """Initialise for a core, without samples."""
-        poles = np.linalg.eigvals(self._start[0]).astype(np.complex128)
         self._banks = Banks(
             self._start,
-            poles,
             self._zeros,
             dt=self.dt,
             candidates=(self._low, self._high),
@@ -154,7 +152,7 @@ class DelayTracker:
         self._before, self._passed = (0.0, 0.0), (0.0, 0.0)
         # Smallest residual of the starting model over a forgetting time with a resolved delay.
         self._least = np.inf
-        slowest = float(np.abs(poles).max(initial=0.0))
+        slowest = float(np.abs(np.linalg.eigvals(self._start[0])).max(initial=0.0))
         lag = -1 / np.log(slowest) if 0 < slowest < 1 else 1.0
         # Neighbouring noise samples may be correlated, by filters and converters.
         self._lag, self._well_sampled = lag, lag >= 3 * SHARE_OF_LAG
