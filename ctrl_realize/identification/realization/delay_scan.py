@@ -12,7 +12,7 @@ from ...numerics.blas_threads import single_threaded
 from .delay_scan_result import DelayScan
 from .realize import realize
 from .result import Realization
-from .scan_curve import best_delay, curve_flags, flat_set, noise_flags
+from .scan_curve import best_delay, flat_set, scan_flags
 from .scan_surface import Surface, scan_surface
 
 
@@ -116,7 +116,6 @@ def best_of(surface: Surface, order: int) -> DelayedStateSpace:
         hankel=surface.hankel,
     )
     realization = fit_of(system, Realization)
-    last = float(surface.singular_values[delay, order - 1])
     fit = DelayScan(
         iae=read_only(iae),
         delay=delay,
@@ -128,10 +127,6 @@ def best_of(surface: Surface, order: int) -> DelayedStateSpace:
         noise_floor=surface.noise_floor,
         impulse=realization.impulse,
         realization=realization,
-        flags=(
-            *curve_flags(iae, delay, rounding),
-            *noise_flags(last, surface.noise_floor, order),
-            *realization.flags,
-        ),
+        flags=(*scan_flags(surface, order), *realization.flags),
     )
     return system.replace(fit=fit)

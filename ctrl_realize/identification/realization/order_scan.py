@@ -19,7 +19,7 @@ from ...results import Flag, Result
 from .delay_scan import best_of
 from .impulses import filter_flags
 from .order import suggest_order
-from .scan_curve import best_delay, curve_flags, flat_set, noise_flags
+from .scan_curve import best_delay, flat_set, scan_flags
 from .scan_surface import Surface, scan_surface
 
 if TYPE_CHECKING:
@@ -237,7 +237,6 @@ def scan_orders(
     delays = tuple(best_delay(row, rounding) for row in surface.iae)
     last = surface.singular_values[list(delays), np.array(surface.orders) - 1]
     chosen = suggest_order(surface, last)
-    i = surface.orders.index(chosen)
     return OrderScan(
         orders=surface.orders,
         iae=read_only(surface.iae),
@@ -250,10 +249,6 @@ def scan_orders(
         order=chosen,
         samples=surface.samples,
         impulse=surface.impulse,
-        flags=(
-            *curve_flags(surface.iae[i], delays[i], rounding),
-            *noise_flags(float(last[i]), surface.noise_floor, chosen),
-            *filter_flags(surface.impulse),
-        ),
+        flags=(*scan_flags(surface, chosen), *filter_flags(surface.impulse)),
         _surface=surface,
     )

@@ -8,6 +8,7 @@ import numpy as np
 
 from ..._flags import Flag, flagged
 from ...numerics.arrays import FloatArray, runs
+from .scan_surface import Surface
 
 FLAT = 1.05
 """IAE relative to the smallest, up to which delays count as equally good."""
@@ -36,9 +37,10 @@ def flat_set(iae: FloatArray, delay: int, rounding: float) -> tuple[int, int]:
     return int(flat[0]), int(flat[-1])
 
 
-def curve_flags(iae: FloatArray, delay: int, rounding: float) -> Iterator[Flag]:
-    """List the flags that follow from the curve itself."""
-    last = iae.size - 1
+def scan_flags(surface: Surface, order: int) -> Iterator[Flag]:
+    """List the flags that follow from the curve of one order, and from the noise."""
+    iae, rounding = surface.iae[surface.orders.index(order)], surface.rounding
+    delay, last = best_delay(iae, rounding), iae.size - 1
     least = float(iae[delay])
     contrast = float(iae[0]) / least if least > 0 else np.inf
     low, high = flat_set(iae, delay, rounding)
@@ -51,13 +53,8 @@ def curve_flags(iae: FloatArray, delay: int, rounding: float) -> Iterator[Flag]:
     minima = len(runs(iae <= FLAT * iae[delay] + rounding)[0])
     if minima > 1:
         yield flagged("several_minima", minima=minima, low=low, high=high)
-
-
-def noise_flags(singular_value: float, floor: float | None, order: int) -> Iterator[Flag]:
-    """Compare the last singular value of the model with that of pure noise."""
-    if floor is None or floor <= 0:
-        return
-    ratio = singular_value / floor
+    floor = surface.noise_floor
+    ratio = float(surface.singular_values[delay, order - 1]) / floor if floor else np.inf
     if ratio < NOISE_REFUSE:
         yield flagged("order_in_noise", order=order, ratio=ratio)
     elif ratio < NOISE_CAUTION:
