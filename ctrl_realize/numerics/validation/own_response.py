@@ -16,6 +16,7 @@ References
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from typing import NamedTuple, TypeAlias
 
 import numpy as np
@@ -179,9 +180,7 @@ def own_step_response(
     line = np.arange(n) / n  # drifts may cancel in the mean of the records
     own = own[:n]
 
-    def moved(shift: float, stretch: float) -> tuple[FloatArray, FloatArray, FloatArray]:
-        return _moved(model, n, start, shift, stretch)
-
+    moved = partial(_moved, model, n, start)
     return matched(output, moved, np.column_stack([line, own]), own, 0.2 * start + 20, dt)
 
 
