@@ -302,11 +302,10 @@ class HostResponses(HostMargins):
         self, times: FloatArray, outputs: FloatArray, drive: FloatArray, kind: str, **settings: Any
     ) -> ct.TimeResponseData:
         """Response data, one trace for each input, as python-control makes them."""
-        given = kind == "step"
         return self._data(
             times,
             outputs,
-            inputs=drive if given else None,
+            inputs=drive if kind == "step" else None,
             trace_labels=[f"From {label}" for label in self.input_labels],
             trace_types=[kind] * self.ninputs,
             plot_inputs=False,
