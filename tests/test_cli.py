@@ -80,6 +80,19 @@ def test_one_record_gives_model_report_and_figures(folder, first):
     assert str(out) in said
 
 
+def test_without_a_folder_the_model_is_told_and_nothing_is_written(
+    folder, tmp_path, monkeypatch, capsys
+):
+    monkeypatch.chdir(tmp_path)
+    step = str(folder / "step_0.csv")
+    assert main(["identify", step, *FAST]) == 0
+    direct = cr.identify(cr.read_record(step), method="scan", order=3, max_delay=80)
+    said = capsys.readouterr().out
+    assert direct.fit.report() in said
+    assert "--output FOLDER" in said
+    assert files_in(tmp_path) == set()
+
+
 def test_the_exit_code_tells_whether_a_required_verdict_is_good(folder, tmp_path, capsys):
     good = ["identify", str(folder / "step_0.csv"), "-o", str(tmp_path / "out"), "--no-report"]
     good += ["--order", "3"]
@@ -237,7 +250,7 @@ def test_nothing_is_written_where_no_record_is_usable(folder, tmp_path, capsys):
         (["identify", "{folder}/text.csv", "-o", "{out}"], "numeric columns"),
         (["identify", "{folder}/flat.csv", "-o", "{out}", "--method", "scan"], "no step"),
         (["identify", "{folder}/step_0.csv", "-o", "{folder}/frf.csv"], "is a file"),
-        (["identify", "{folder}/step_0.csv"], "output"),
+        (["identify", "{folder}/step_0.csv", "{folder}/step_1.csv"], "or --joint, got 2"),
         (["identify", "{folder}/step_0.csv", "-o", ""], "empty name"),
         (["compare", "{folder}/frf.csv", "{folder}/frf.csv", "--output="], "empty name"),
         (["identify", "{folder}/step_0.csv", "-o", "{out}", "--order", "0"], "--order"),

@@ -47,9 +47,10 @@ def run_identify(
         return told_as_json(
             json, lambda told: identified(files, folder, tuning=tuning, told=told, **given)
         )
+    code = identified(files, folder, tuning=tuning, **given)
     if folder is None:
-        raise OptionError("expected --output, the folder of the results, or --json")
-    return identified(files, folder, tuning=tuning, **given)
+        say("\nnothing was written: --output FOLDER keeps the model, a report and figures")
+    return code
 
 
 def _tuning(form: str) -> Tuning:
@@ -119,9 +120,10 @@ def identified(
     calls = calls_again(files, settings, how, run.typed, None if frf is None else (frf, response))
     sources = how.sources(files)
     task = _Task(settings, measured, frf, required, run, tuning, told)
-    if told is not None and len(sources) > 1 and not joint:
+    if (folder is None or told is not None) and len(sources) > 1 and not joint:
+        alone = "without --output" if told is None else "with --json"
         raise OptionError(
-            f"--json is for one model: expected one record or --joint, got {len(sources)}"
+            f"{alone} there is one model: expected one record or --joint, got {len(sources)}"
         )
     if folder is None:
         return _one(task, sources, None, calls)

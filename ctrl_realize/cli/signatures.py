@@ -53,16 +53,18 @@ def identify(
 ) -> None:
     """Identify a model with dead time from one record, or from many of one plant.
 
-    One record gives model.json, report.html and figures/. Several records of one plant are a
-    campaign: the output also contains a table of their delays (records.csv), a model for each
-    (models/) and a final model. A record that fails becomes a row of the table with its error. If a
-    campaign is interrupted, the finished records are kept in rows.sqlite, and the same command
-    resumes from there. With --joint, or --gains own, one model is fitted to all records together.
-    With --tune, the report also has a controller, see the command tune. With --json -, a program
-    reads the model, its verdicts and what may be done with it from stdout.
+    Model, verdicts and what leads to them are told; with --output, one record gives model.json,
+    report.html and figures/. Several records of one plant are a campaign: the output also contains
+    a table of their delays (records.csv), a model for each (models/) and a final model. A record
+    that fails becomes a row of the table with its error. If a campaign is interrupted, the finished
+    records are kept in rows.sqlite, and the same command resumes from there. With --joint, or
+    --gains own, one model is fitted to all records together. With --tune, the report also has a
+    controller, see the command tune. With --json -, a program reads the model, its verdicts and
+    what may be done with it from stdout.
 
     \b
     Examples:
+      ctrl-realize identify step.csv
       ctrl-realize identify step.csv -o results
       ctrl-realize identify valve_*.csv -o valve --method scan --jobs 2
       ctrl-realize identify log.txt -o out --time 0 --input current --output-column position
