@@ -302,7 +302,7 @@ def test_a_model_is_compared_with_a_measured_frf(folder, first, tmp_path, capsys
         "manifest.json",
     }  # fmt: skip
     assert main(["compare", model, frf]) == 0
-    assert "written" not in capsys.readouterr().out
+    assert "nothing was written" in capsys.readouterr().out
 
 
 def test_a_valve_test_gives_tables_and_a_report_and_limits_are_judged(tmp_path, capsys):
@@ -318,6 +318,10 @@ def test_a_valve_test_gives_tables_and_a_report_and_limits_are_judged(tmp_path, 
     assert main([*words, "-o", str(out)]) == 0
     said = capsys.readouterr().out
     assert "Limits not met: T86 (2 % opening), T86 (2 % closing)." in said
+    assert main(words) == 0
+    assert (
+        said.split("\nwritten to")[0] == capsys.readouterr().out.split("\nnothing was written")[0]
+    )
     metrics = pd.read_csv(out / "metrics.csv", index_col=0)
     assert metrics.loc["stroke_time_opening", "judgement"] == "met"
     # 2 lags and half a sample, from the sum in place of the integral
@@ -343,11 +347,15 @@ def test_a_loop_is_diagnosed_from_a_file_with_a_set_point(tmp_path, capsys):
     words = ["loop", str(file), "--input", "op", "--output-column", "pv",
              "--set-point", "sp", "--process", "flow", "-o"]  # fmt: skip
     assert main([*words, str(out)]) == 0
-    assert "3 of 600 samples were missing" in capsys.readouterr().out
+    said = capsys.readouterr().out
+    assert "3 of 600 samples were missing" in said
     assert pd.read_csv(out / "methods.csv", index_col=0).loc["curve_fit", "verdict"] == "stiction"
     page = (out / "report.html").read_text(encoding="utf-8")
     assert page.count("<svg ") == 4
     assert "the valve sticks" in page
+    assert main(words[:-1]) == 0
+    assert said.split("\nwritten to")[0] in capsys.readouterr().out
+    assert files_in(tmp_path) == {file.name, *(f"out/{name}" for name in files_in(out))}
     assert main(["loop", str(file), str(file), "-o", str(tmp_path / "no")]) == 2
 
 

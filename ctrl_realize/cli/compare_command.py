@@ -30,8 +30,6 @@ def run_compare(
     comparison = compare_frf(system, measured, **compared)
     say(printable(f"{model}: {system!r}"))
     say(comparison.report())
-    if folder is None:
-        return 0
     write = partial(
         write_comparison, system=system, frf=measured, comparison=comparison, files=[model, frf],
         calls=[("In a terminal", run.typed)],

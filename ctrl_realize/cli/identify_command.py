@@ -24,6 +24,7 @@ from .manifest import Run, refuse_other_results
 from .results import (
     Provenance,
     campaign_table,
+    say_not_written,
     say_written,
     write_campaign_files,
     write_record_files,
@@ -49,7 +50,7 @@ def run_identify(
         )
     code = identified(files, folder, tuning=tuning, **given)
     if folder is None:
-        say("\nnothing was written: --output FOLDER keeps the model, a report and figures")
+        say_not_written()
     return code
 
 

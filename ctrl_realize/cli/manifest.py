@@ -39,8 +39,8 @@ class Run:
     report: bool = True
 
 
-def refuse_other_results(folder: Path, run: Run) -> None:
-    """Refuse a folder with the results of another run, before any work is done.
+def refuse_other_results(folder: Path | None, run: Run) -> None:
+    """Refuse a folder, if any, with the results of another run, before any work is done.
 
     The same command may replace its own results.
 
@@ -48,7 +48,7 @@ def refuse_other_results(folder: Path, run: Run) -> None:
     ------
     OptionError
     """
-    if run.overwrite or not folder.is_dir():
+    if folder is None or run.overwrite or not folder.is_dir():
         return
     manifest = _manifest(folder)
     if manifest is not None and manifest.get("command") == run.command:

@@ -33,10 +33,9 @@ def _folder(text: str) -> Path:
 
 
 _INTO = {"parser": _folder, "metavar": "PATH"}
-Folder = Annotated[Path, _OPTION("--output", "-o", help="Output folder.", **_INTO)]
-MaybeFolder = Annotated[
+Folder = Annotated[
     Path | None,
-    _OPTION("--output", "-o", help="Output folder for table, report and figures.", **_INTO),
+    _OPTION("--output", "-o", help="Output folder for tables, report and figures.", **_INTO),
 ]
 
 # how to identify

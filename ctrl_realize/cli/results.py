@@ -76,7 +76,7 @@ def _write_files(folder: Path, write: Callable[..., Path], provenance: Provenanc
 
 
 def write_results(
-    output: Path,
+    output: Path | None,
     run: Run,
     tables: Mapping[str, tuple[pd.DataFrame, bool]],
     write: Callable[..., Path],
@@ -84,14 +84,23 @@ def write_results(
 ) -> int:
     """Write tables, by name and with or without their index, and a report, if one is wanted.
 
-    Returns the exit code; `result` names what is written even if the report fails.
+    Without a folder, nothing. Returns the exit code; `result` names what is written even if the
+    report fails.
     """
+    if output is None:
+        return say_not_written()
     with appearing(output, run) as folder:
         for name, (table, index) in tables.items():
             write_csv(folder / name, table, index=index)
         reported = run.report and _reported(folder, write, result)
     say_written(output, tables, reported)
     return 0 if reported or not run.report else 1
+
+
+def say_not_written() -> int:
+    """Say how results are kept; return the exit code."""
+    say("\nnothing was written: --output FOLDER keeps the results, a report and figures")
+    return 0
 
 
 def say_written(output: Path, names: Iterable[str], reported: bool) -> None:

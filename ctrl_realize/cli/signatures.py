@@ -36,7 +36,7 @@ def look(
 @command(".identify_command", "run_identify")
 def identify(
     files: o.Files,
-    folder: o.MaybeFolder = None,
+    folder: o.Folder = None,
     *,
     frf: o.Frf = None,
     joint: o.Joint = False,
@@ -78,7 +78,7 @@ def identify(
 @command(".identify_command", "run_tune")
 def tune(
     files: o.Files,
-    folder: o.MaybeFolder = None,
+    folder: o.Folder = None,
     *,
     entered: o.Given,
     tuned: o.Given,
@@ -108,7 +108,7 @@ def tune(
 def compare(
     model: Annotated[Path, typer.Argument(help="Model file written by identify: model.json.")],
     frf: Annotated[Path, typer.Argument(help="Measured frequency response: CSV, TSV, .mat, .npz.")],
-    folder: o.MaybeFolder = None,
+    folder: o.Folder = None,
     *,
     compared: o.Given,
     response_file: o.Given,
@@ -129,7 +129,7 @@ def compare(
 @command(".valve.command", "run_valve")
 def valve(
     files: o.Files,
-    folder: o.Folder,
+    folder: o.Folder = None,
     *,
     measured: o.Given,
     limit: o.Limit = None,
@@ -143,8 +143,8 @@ def valve(
     staircases, full strokes and ramps are found in the command; dead time, T63, T86, T98,
     overshoot, gain, dead band, resolution, hysteresis, linearity and stroke times come with 95 %
     intervals, against step size and direction. What the records cannot tell is listed with the
-    test that is missing. The output contains report.html, metrics.csv, sizes.csv, steps.csv and
-    figures/.
+    test that is missing. With --output, the folder has report.html, metrics.csv, sizes.csv,
+    steps.csv and figures/.
 
     \b
     Examples:
@@ -157,7 +157,7 @@ def valve(
 @command(".valve.loop", "run_loop")
 def loop(
     files: o.Files,
-    folder: o.Folder,
+    folder: o.Folder = None,
     *,
     diagnosed: o.Given,
     set_point: o.SetPoint = None,
@@ -168,11 +168,11 @@ def loop(
 
     The input is the controller output, the output the process value. Methods of the literature
     tell whether the loop oscillates, and whether its valve sticks; the verdict may be "cannot
-    tell". The output contains report.html, methods.csv and figures/.
+    tell". With --output, the folder has report.html, methods.csv and figures/.
 
     \b
     Examples:
-      ctrl-realize loop trend.csv -o loop
+      ctrl-realize loop trend.csv
       ctrl-realize loop trend.csv -o loop --input op --output-column pv --process flow
     """  # noqa: D301  # \b keeps the lines of the examples apart
 

@@ -18,7 +18,7 @@ from ..terminal import printable, say
 
 def run_valve(
     files: list[Path],
-    folder: Path,
+    folder: Path | None,
     *,
     measured: Mapping[str, Any],
     limit: Sequence[str] | None,
@@ -26,7 +26,7 @@ def run_valve(
     record: Mapping[str, Any],
     run: Run,
 ) -> int:
-    """Measure, write the results, and return the exit code."""
+    """Measure, write the results if a folder is given, and return the exit code."""
     how = Reading(record, tests)
     bounds = _limits(limit or ())
     options = {**measured, **({"limits": bounds} if bounds else {})}

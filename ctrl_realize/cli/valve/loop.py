@@ -20,14 +20,14 @@ from ..terminal import printable, say
 
 def run_loop(
     files: list[Path],
-    folder: Path,
+    folder: Path | None,
     *,
     diagnosed: Mapping[str, Any],
     set_point: str | None,
     trend: Mapping[str, Any],
     run: Run,
 ) -> int:
-    """Diagnose, write the results, and return the exit code."""
+    """Diagnose, write the results if a folder is given, and return the exit code."""
     if len(files) != 1:
         raise OptionError(f"{len(files)} files; expected one record of operation")
     # the longest complete part is judged
