@@ -238,18 +238,25 @@ def _free_columns(decay: Any, poles: ComplexArray) -> FloatArray:
     parts = (decay.real, decay.imag) if np.iscomplexobj(decay) else (decay,)
     over = np.max([np.abs(part).max(axis=1, initial=0.0) for part in parts], axis=0) < ROUNDING
     if n % 2:
-        free[:, :, 0] = np.where(over[:, :1], 0.0, decay[:, :, 0].real)
+        free[:, :, 0] = decay[:, :, 0].real
     for i in range(n % 2, n, 2):
         first, second = decay[:, :, i], decay[:, :, i + 1]
         gap = poles[:, i] - poles[:, i + 1]
         free[:, :, i] = (first + second).real / 2
-        apart = ((first - second) / gap[:, None]).real
-        free[:, :, i + 1] = np.where(over[:, i : i + 2].any(axis=1)[:, None], 0.0, apart)
+        free[:, :, i + 1] = ((first - second) / gap[:, None]).real
+    if over.any():
+        early, late = over[:, n % 2 :: 2], over[:, n % 2 + 1 :: 2]
+        late |= early
+        early[:] = False
+        np.copyto(free, 0.0, where=over[:, None])
     return free
 
 
 def _with_a_row_for_zeros(terms: FloatArray) -> FloatArray:
     """Terms (B, m, f); where some are zero, in more rows, so that these take none of the data."""
+    # Most have an end that is not zero, which need not be looked for.
+    if np.all((terms[:, 0] != 0) | (terms[:, -1] != 0)):
+        return terms
     empty = np.asarray(~terms.any(axis=1))
     if not empty.any():
         return terms
