@@ -101,7 +101,7 @@ def test_an_input_in_the_residual_is_told_by_its_lag(direct, shift, told):
     y = cr.DelayedStateSpace(plant).simulate(u) + 0.1 * rng.standard_normal(1002)
     # what is left follows the input of `shift` samples before: 0.1 of it, sigma is 0.03
     y = (y + 0.03 * np.roll(u, shift))[1:-1]
-    for system in (plant, cr.DelayedStateSpace(plant)):
+    for system in (plant, ct.tf(plant), cr.DelayedStateSpace(plant)):
         check = cr.validation.analyse_residuals(system, cr.Record(DT * np.arange(1000), u[1:-1], y))
         assert [flag.code for flag in check.flags] == [told]
         assert check.independent == (told == "feedback")
