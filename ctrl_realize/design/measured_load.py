@@ -17,6 +17,10 @@ from ..results import Result
 from .models.process_model import ProcessModel
 from .models.reduction import reduce_fopdt
 
+_LAGS, _ROUNDING = 5, 1e-9
+"""Lags of both paths within which the largest deviation is looked for, and part of the response to
+the load that is rounding."""
+
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Feedforward(Result):
@@ -68,10 +72,12 @@ class Feedforward(Result):
             ("lead", in_time(self.lead)),
             ("lag", f"{in_time(self.lag)}{late}"),
         ]
-        if self.uncovered:
+        if self.peak:
             left = f"up to {self.peak:.3g} of the output for each unit of the load"
-            early = f"the load acts {in_time(self.uncovered)} before the plant input can"
-            rows.append(("what it leaves", f"{early}: {left}"))
+            why = "the dead times differ by a part of a sample"
+            if self.uncovered:
+                why = f"the load acts {in_time(self.uncovered)} before the plant input can"
+            rows.append(("what it leaves", f"{why}: {left}"))
         return rows
 
     def __repr__(self) -> str:
@@ -103,9 +109,9 @@ def feedforward(plant: Any, disturbance: Any, *, dt: float | None = None) -> Fee
     -----
     The compensator is ``-G_load / G_plant`` [1]_ of the first-order models, sampled, with the
     difference of the dead times in whole samples: for models of first order whose dead times are
-    whole samples it cancels the load at every sample. A negative difference cannot be
-    realized: the delay is then zero, and a deviation of ``gain_load (1 - exp(-t / lag_load))``, t
-    the missing time, is left, which then decays with the lag of the load.
+    whole samples it cancels the load at every sample, otherwise `peak` is left. A negative
+    difference cannot be realized: the delay is then zero, and a deviation of ``gain_load (1 -
+    exp(-t / lag_load))``, t the missing time, is left, which then decays with the lag of the load.
 
     References
     ----------
@@ -143,8 +149,15 @@ def feedforward(plant: Any, disturbance: Any, *, dt: float | None = None) -> Fee
     share = gain * (1 - poles[1]) / (1 - poles[0])
     lead_lag = ct.tf(share * np.array([1.0, -poles[0]]), [1.0, -poles[1]], step)
     missing = max(-late, 0.0)
+    made = delayed_ss(lead_lag, whole, name="feedforward", inputs="load", outputs="u")
+    alone = second.system(step)
+    count = 2 + int((first.dead_time + second.dead_time + _LAGS * (first.lag + second.lag)) / step)
+    caused = float(np.abs(alone.step(count)).max())
+    left = float(np.abs((first.system(step) * made + alone).step(count)).max())
+    # the response to a unit step of the load after the missing time, which may be no sample
+    left = max(left, float(abs(second.step(np.array([second.dead_time + missing]))[0])))
     return Feedforward(
-        system=delayed_ss(lead_lag, whole, name="feedforward", inputs="load", outputs="u"),
+        system=made,
         plant_model=first,
         load_model=second,
         gain=gain,
@@ -152,6 +165,5 @@ def feedforward(plant: Any, disturbance: Any, *, dt: float | None = None) -> Fee
         lag=second.lag,
         delay=whole * step,
         uncovered=missing,
-        # the response to a unit step of the load after the missing time
-        peak=float(abs(second.step(np.array([second.dead_time + missing]))[0])),
+        peak=left if left > _ROUNDING * caused else 0.0,
     )

@@ -51,3 +51,15 @@ def test_paths_of_different_kinds_and_models_without_time_are_refused():
         cr.design.feedforward(PLANT, ramp, dt=1.0)
     with pytest.raises(cr.errors.UnsuitableSystemError, match="give dt"):
         cr.design.feedforward(PLANT, PLANT)
+
+
+def test_what_parts_of_a_sample_leave_of_the_load_is_told():
+    plant = cr.design.ProcessModel(gain=2.0, lag=3.0, dead_time=3.4)
+    load = cr.design.ProcessModel(gain=-1.2, lag=3.0, dead_time=4.0)
+    made = cr.design.feedforward(plant, load, dt=1.0)
+    # the load acts 0.6 s after the plant input, which waits for a whole sample
+    assert (made.delay, made.uncovered) == (1.0, 0.0)
+    time = np.arange(0.0, 40.0)
+    left = load.step(time) + 0.6 * plant.step(time - 1.0)
+    assert made.peak == pytest.approx(np.abs(left).max(), rel=1e-12)
+    assert "a part of a sample: up to 0.123" in made.report()
