@@ -68,8 +68,10 @@ def simulate_loop(
     system : DelayedStateSpace
         Plant with one input and one output, and at least one sample of delay from input to output.
     controller : PIDAlgorithm, PIDController, or a discrete system from error to plant input
-        A `PIDController` runs as its `algorithm`, which has anti-windup; other systems are only
-        limited at their output. The bias of an algorithm is the operating point.
+        A `PIDController` runs as its `algorithm`, which has anti-windup, with the derivative of
+        the error, as its transfer function has it; ``pid.algorithm()`` itself has that of the
+        measured value, as exported programs do. Other systems are only limited at their output. The
+        bias of an algorithm is the operating point.
     count : int
         Number of samples.
     setpoint_step, load_step : float
