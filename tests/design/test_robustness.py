@@ -88,6 +88,17 @@ def test_phase_is_that_of_a_fine_grid_on_any_grid(valve, delay):
     np.testing.assert_allclose(found, expected[some], rtol=1e-9, atol=1e-9)
 
 
+def test_the_phase_of_a_continuous_system_has_its_delay_at_any_frequency():
+    lag, omega = ct.tf([1], [0.1, 1]), np.array([1.0, 100.0, 1e3, 1e5])
+    exact = -0.3 * omega - np.arctan(0.1 * omega)
+    for system in (lag * cr.delay(0.3), cr.delay(0.3) * lag):
+        np.testing.assert_allclose(cr.design.unwrapped_phase(system, omega), exact, rtol=1e-12)
+    # the second path is a twentieth of the first: its phase never leads by half a turn
+    paths = lag * cr.delay(0.3) + 0.05 * (lag * cr.delay(0.5))
+    expected = exact + np.angle(1 + 0.05 * np.exp(-0.2j * omega))
+    np.testing.assert_allclose(cr.design.unwrapped_phase(paths, omega), expected, rtol=1e-12)
+
+
 @pytest.mark.parametrize("delay", [37, 300])
 def test_sixty_measured_points_are_unwrapped_without_being_told_the_delay(valve, delay):
     omega = 2 * np.pi * np.geomspace(0.1, 50, 60)

@@ -9,10 +9,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..._checks import numbers, real
+from ...delayed import DelaySystem
 from ...delayed.parts import check_single
 from ...errors import DataError, OptionError
 from ...numerics.arrays import FloatArray
-from ...numerics.loops.crossings import follow
+from ...numerics.loops.crossings import follow, frequency_grid
 from ...numerics.rational.phase import dead_time_from_phase, unwrap_with_dead_time
 from .loop import Loop, open_loop
 
@@ -78,7 +79,12 @@ def unwrapped_phase(
         grid = numbers(omega, "omega")
         if grid.ndim != 1 or np.any(grid < 0) or not np.all(np.isfinite(grid)):
             raise DataError("omega must be a one-dimensional array of frequencies >= 0 in rad/s")
-        phase = _of_loop(open_loop(system, dead_time=dead_time or 0.0), grid)
+        wait = dead_time or 0.0
+        loop = open_loop(system, dead_time=wait)
+        if isinstance(system, DelaySystem) and not loop.dt:
+            rest, own = system.delay_apart()
+            loop = open_loop(rest, dead_time=wait + own)
+        phase = _of_loop(loop, grid)
     return np.degrees(phase) if deg else phase
 
 
@@ -95,7 +101,12 @@ def _of_data(data: ct.FrequencyResponseData, dead_time: float | None) -> FloatAr
 
 def _of_loop(loop: Loop, omega: FloatArray) -> FloatArray:
     # A few points per turn of the rest suffice: between them the phase is known modulo one turn.
-    nodes, values = follow(loop.delay_free, loop.grid())
+    grid, top = loop.grid(), float(omega.max(initial=0.0))
+    if not loop.dt and top > grid[-1]:
+        features = np.concatenate([part.features for part in loop.factors])
+        inside = loop.turn_time - loop.delay
+        grid = np.append(grid[:-1], frequency_grid(float(grid[-1]), top, features, inside))
+    nodes, values = follow(loop.delay_free, grid)
     course = np.unwrap(np.angle(values))
     expected = -np.pi / 2 * loop.integrators()
     # Between half a turn below and a quarter above: a negative gain starts 180 deg lower.
