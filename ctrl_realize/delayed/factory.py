@@ -13,7 +13,7 @@ from .._checks import check_type, positive, real
 from ..errors import DelayRangeError, OptionError, UnsuitableSystemError
 from ..numerics.state_space.sampling import sample_with_dead_time, split_dead_time
 from ..results import ModelFit
-from .operands import check_proper
+from .operands import check_proper, in_state_space
 from .parts import MAX_DELAY, check_core, matrices_of, signals_of
 from .system import DelayedStateSpace
 
@@ -87,7 +87,7 @@ def delayed_ss(
         raise OptionError(f"delay={delay!r} and dead_time={dead_time!r}: expected one of them")
     if isinstance(core, ct.TransferFunction):
         check_proper(core, "a model with dead time")
-    system = core if isinstance(core, ct.StateSpace) else ct.ss(core)
+    system = core if isinstance(core, ct.StateSpace) else in_state_space(core)
     made = partial(
         DelayedStateSpace, output_delay=output_delay, fit=fit, name=name, inputs=inputs,
         outputs=outputs, time_unit=time_unit,

@@ -15,7 +15,7 @@ from ..numerics.internal_delays import form as forms
 from ..numerics.internal_delays.form import DelayForm
 from ..numerics.internal_delays.merging import ends_apart
 from .deferred import DeferredMatrices
-from .parts import check_entries
+from .parts import check_entries, signals_of
 
 Numbers = (int, float, np.number)
 
@@ -53,11 +53,30 @@ def form_of(system: Any) -> DelayForm:
     check_entries(system)
     if isinstance(system, ct.TransferFunction):
         check_proper(system, "an interconnection")
-        system = ct.ss(system)
+        system = in_state_space(system)
     if isinstance(system, ct.StateSpace):
         A, B, C, D = (np.asarray(M, np.float64) for M in (system.A, system.B, system.C, system.D))
         return DelayForm(A, B, C, D)
     return forms.static(np.atleast_2d(np.asarray(system, dtype=np.float64)))
+
+
+def in_state_space(system: Any) -> ct.StateSpace:
+    """Convert a linear system, a transfer function with all of its zeros.
+
+    The conversion of SciPy leaves out leading coefficients of a numerator that are 1e-14 of the
+    denominator's and less, as those of lags of hours are: the numerator is scaled, by a power of
+    two, and the output matrices back.
+    """
+    if not isinstance(system, ct.TransferFunction) or not system.issiso():
+        return ct.ss(system)
+    num, den = (np.trim_zeros(part[0][0], "f") for part in (system.num, system.den))
+    if not num.size:
+        return ct.ss(system)
+    scale = np.exp2(np.round(np.log2(np.abs(num[0] / den[0]))))
+    names = {"name": system.name, **signals_of(system)}
+    found = ct.ss(ct.TransferFunction(num / scale, den, system.dt, **names))
+    found.C, found.D = scale * found.C, scale * found.D
+    return found
 
 
 def check_proper(system: ct.TransferFunction, purpose: str) -> None:

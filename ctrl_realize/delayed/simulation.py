@@ -16,6 +16,7 @@ from ..numerics.arrays import FloatArray, later, unit_columns
 from ..numerics.state_space.responses import markov, step_response
 from . import DelayedStateSpace
 from .inside.conversions import continuous
+from .operands import in_state_space
 from .parts import matrices_of
 
 Start = Literal["estimate", "rest"]
@@ -106,7 +107,7 @@ def as_delayed(system: Any, record: Record, *, stable: bool = True) -> DelayedSt
     """Check that a system fits a record; add zero delays if it has none."""
     kinds, expected = (ct.StateSpace, ct.TransferFunction), "a discrete control.StateSpace"
     check_type(system, kinds, "system", expected, UnsuitableSystemError)
-    model = system if isinstance(system, ct.StateSpace) else ct.ss(system)
+    model = system if isinstance(system, ct.StateSpace) else in_state_space(system)
     if not model.isdtime(strict=True) or model.dt is True:
         raise UnsuitableSystemError(
             "the system is not discrete with a sample time; sample it with "

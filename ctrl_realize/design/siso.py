@@ -10,7 +10,7 @@ import numpy as np
 from .._checks import band
 from ..data.shown_units import unit_among
 from ..delayed import DelayedStateSpace, DelaySystem
-from ..delayed.operands import check_proper
+from ..delayed.operands import check_proper, in_state_space
 from ..delayed.parts import check_entries, check_single
 from ..errors import OptionError, UnsuitableSystemError
 
@@ -104,7 +104,7 @@ def proper_ss(system: Any, purpose: str) -> ct.StateSpace:
     if isinstance(system, ct.TransferFunction):
         check_entries(system)
         check_proper(system, purpose)
-        return ct.ss(system)
+        return in_state_space(system)
     raise UnsuitableSystemError(f"{purpose} needs a linear system; got a {type(system).__name__}")
 
 

@@ -368,3 +368,30 @@ def test_cards_of_a_loop_in_minutes_have_no_seconds():
         assert not re.search(r"[1-9]\d* s\b", card.report()), card
     for card in (plant, ct.feedback(plant * pid), predictor):
         assert "5 min" in card._repr_html_(), card
+
+
+@pytest.mark.parametrize(
+    ("lag", "gain"), [(86400.0, 1e-5), (7200.0, 1e-4), (86400.0, 1.0), (1.0, 1e9)]
+)
+def test_margins_do_not_depend_on_the_units_of_time_and_gain(lag, gain):
+    """SciPy's conversion to state space leaves out the zero of the first three plants."""
+
+    def plant(T, K):
+        return ct.tf([-2 * T * K, K], (np.poly1d([T, 1]) ** 4).c)
+
+    slow, plain = plant(lag, gain), plant(1.0, 1.0)
+    omega = np.array([0.1, 1.0, 3.0])
+    exact = slow(1j * omega / lag) * np.exp(-0.1j * omega)
+    late = slow * cr.delay(0.1 * lag)
+    sampled = cr.delayed_ss(slow, dead_time=0.1 * lag, dt=0.01 * lag)
+    np.testing.assert_allclose(late(1j * omega / lag), exact, rtol=1e-12)
+    # behind a hold; what is folded back falls with the third power of (3 / 628)
+    held = exact * (1 - np.exp(-0.01j * omega)) / (0.01j * omega)
+    np.testing.assert_allclose(sampled(np.exp(0.01j * omega)), held, rtol=1e-5)
+    found = [
+        cr.design.margins(G, cr.design.pid(G * cr.delay(L)), dead_time=L)
+        for G, L in ((slow, 0.1 * lag), (plain, 0.1))
+    ]
+    # a rule is applied to the plant sampled finely, which costs digits: 7e-4
+    assert found[0].modulus_margin == pytest.approx(found[1].modulus_margin, rel=2e-3)
+    assert found[0].delay_margin / lag == pytest.approx(found[1].delay_margin, rel=2e-3)

@@ -11,6 +11,7 @@ from scipy.optimize import least_squares
 
 from ..._checks import one_of
 from ...delayed import DelayedStateSpace
+from ...delayed.operands import in_state_space
 from ...delayed.parts import check_single
 from ...errors import UnsuitableSystemError
 from ...numerics.arrays import FloatArray
@@ -126,7 +127,7 @@ def reduce_sopdt(
 def _reduce(system: Any, method: str, dead_time: float | None, order: int) -> ProcessModel:
     method = one_of(method, "method", METHODS)
     if isinstance(system, ProcessModel):
-        core = ct.ss(system.transfer_function())
+        core = in_state_space(system.transfer_function())
         resolution = max(system.lag + system.second_lag, system.dead_time) / 500
         system = ContinuousModel(core, (system.dead_time,), (0.0,), resolution)
     continuous, plant = both_forms(system, dead_time)

@@ -5,10 +5,9 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any
 
-import control as ct
-
 from ..._parameters import gain_unit
 from ...delayed import DelayedStateSpace, DelaySystem, delay
+from ...delayed.operands import in_state_space
 from ...errors import OptionError
 from ..models.conversions import to_discrete
 from ..models.process_model import ProcessModel
@@ -29,7 +28,7 @@ def reference_plant(
     has no effect.
     """
     if isinstance(system, ProcessModel):
-        system = DelaySystem(ct.ss(system.transfer_function())) * delay(system.dead_time)
+        system = DelaySystem(in_state_space(system.transfer_function())) * delay(system.dead_time)
     if is_continuous(system):
         core, dead_time = core_and_dead_time(system, purpose)
         if dt is not None:

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
-import control as ct
 import numpy as np
 
 from ..._wording import chosen, interval_in_time
 from ...delayed import DelayedStateSpace, delayed_ss
+from ...delayed.operands import in_state_space
 from ...numerics.output_error.result import OutputErrorEstimate
 from ..plausible import continuous_core
 from .result import FOLLOWED_LESS, OutputErrorFit
@@ -20,7 +20,7 @@ def fitted_model(result: OutputErrorFit, known: Any = None) -> DelayedStateSpace
     """Make the model of a fit, with the names of the first record, and a known part behind it."""
     first, core = result.records[0], continuous_core(result.estimate.numerator, result.poles)
     if known is not None:
-        core = ct.ss(known) * core
+        core = in_state_space(known) * core
     return delayed_ss(
         core,
         dead_time=result.dead_time,
