@@ -32,7 +32,7 @@ class TrackPoint(ModelFit):
         In s: dead times with a probability of 95 %, and the change of the delay during the last
         forgetting time, because the estimate lags a moving delay by about that.
     delay_interval : tuple of int
-        The same in samples.
+        The same in whole samples, each of which stands for the dead times within half of one.
     lost : bool
         The residual is much larger than that of the model: the delay is outside of the candidates,
         the dynamics have changed too much, or another disturbance acts on the output.
@@ -59,7 +59,7 @@ class TrackPoint(ModelFit):
     ...     tracker.update(*sample)
     >>> now = tracker.estimate()
     >>> print(now.delay, now.delay_interval, now.interval, round(now.gain_ratio, 3))
-    7 (6, 7) (0.06, 0.07) 0.996
+    7 (6, 7) (0.055, 0.075) 0.996
     """
 
     time: float
@@ -97,9 +97,10 @@ class TrackPoint(ModelFit):
 
     @property
     def interval(self) -> tuple[float, float]:
-        """Interval of the dead time in s; it may end between two whole delays."""
-        low, high = (delay * self.dt for delay in self.delay_interval)
-        return min(low, self.dead_time), max(high, self.dead_time)
+        """Interval of the dead time in s; a whole delay stands for those within half a sample."""
+        low, high = self.delay_interval
+        low_end, high_end = max(low - 0.5, 0.0) * self.dt, (high + 0.5) * self.dt
+        return min(low_end, self.dead_time), max(high_end, self.dead_time)
 
     @property
     def dead_time_interval(self) -> tuple[float, float] | None:
