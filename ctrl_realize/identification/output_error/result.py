@@ -15,6 +15,7 @@ from ..._wording import (
     plainly,
     poles_in_words,
     time_within,
+    times_in,
 )
 from ...data import Record
 from ...numerics.arrays import ComplexArray, FloatArray, locked
@@ -387,7 +388,8 @@ class OutputErrorFit(FractionalDelayFit):
         if not self.estimate.plausible:
             return ()
         own = PlausibleModel(self.dead_time, self._plain_poles, self.estimate.numerator)
-        return verdicts(self, own, self.estimate.plausible)
+        with times_in(self.time_unit):
+            return verdicts(self, own, self.estimate.plausible)
 
     def __repr__(self) -> str:
         low, high = self.interval
