@@ -177,7 +177,7 @@ def _chosen(
     codes = {flag.code for flag in kept}
     own_flags = [flag for flag in modes.flags if flag.code not in codes]
     flags, notes = [*cut, *own_flags, *kept], list[str]()
-    if len(modes.checks) == 1 and all(flag.code != "feedback" for flag in flags):
+    if len(modes.checks) == 1 and not {"feedback", "late_input"} & {flag.code for flag in flags}:
         check = modes.checks[0]
         output, drive = np.ravel(check.record.output), np.ravel(check.record.input)
         shown, total = Shown(output, np.ravel(check.simulated), drive), _total_delay(system)

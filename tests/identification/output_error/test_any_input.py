@@ -8,7 +8,7 @@ from scipy.signal import cont2discrete, lfilter
 
 import ctrl_realize as cr
 from ctrl_realize.errors import DataError
-from tests.rigs import R1, lag, pair
+from tests.rigs import R1, codes, lag, pair
 
 DT = 0.01
 DELAY = 12.4
@@ -98,6 +98,21 @@ def test_an_output_that_responds_within_the_sample_is_told_by_how_much_its_input
     assert fit.interval[0] == 0.0
     # what is over within a sample may begin anywhere in it; ends are laid beside the next one
     assert fit.interval[1] == pytest.approx(1, abs=0.05)
+
+
+@pytest.mark.parametrize(("lag", "delay"), [(0.0, 1), (0.5, 0)])
+def test_an_input_that_is_stored_a_sample_late_gives_no_good_answer(lag, delay):
+    rng = np.random.default_rng(0)
+    u = np.repeat(rng.choice([-1.0, 1.0], 60), 10)
+    y = cr.delayed_ss(ct.tf([2.0], [lag, 1]), delay=delay, dt=1.0).simulate(u)
+    y += 0.01 * rng.standard_normal(u.size)
+    late = cr.identify(cr.Record(np.arange(599.0), u[:-1], y[1:])).fit
+    assert "late_input" in codes(late)
+    assert {one.level for one in late.verdicts} == {"no"}
+    # as the flag says
+    fit = cr.identify(cr.Record(np.arange(598.0), u[1:-1], y[1:-1])).fit
+    assert "late_input" not in codes(fit)
+    assert fit.gain == pytest.approx(2, rel=0.01)
 
 
 def test_all_samples_of_a_long_record_count():
