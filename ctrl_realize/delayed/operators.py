@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from functools import wraps
+from inspect import cleandoc
 from typing import Any, ClassVar
 
 import control as ct
@@ -229,6 +230,8 @@ def with_delays(original: Call) -> Call:
             return getattr(_delayed(self, other), original.__name__)(other, *more, **settings)
         return original(self, other, *more, **settings)
 
+    # The text of python-control ends in two blank lines, at which the pages of the site stop.
+    method.__doc__ = f"{cleandoc(original.__doc__ or '')}\n"
     return method
 
 
