@@ -107,7 +107,7 @@ class LocalTerms:
         self._poles, self._weight = poles, root_weight
         decay, self.slope = _decay(segments, poles)
         columns = _columns(segments, decay, poles) * root_weight[:, None]
-        self._terms = [_with_a_row_for_zeros(columns[:, rows]) for rows in self._rows]
+        self._terms = [_with_rows_for_all(columns[:, rows]) for rows in self._rows]
 
     @cached_property
     def _bases(self) -> list[tuple[FloatArray, FloatArray, FloatArray]]:
@@ -252,8 +252,11 @@ def _free_columns(decay: Any, poles: ComplexArray) -> FloatArray:
     return free
 
 
-def _with_a_row_for_zeros(terms: FloatArray) -> FloatArray:
-    """Terms (B, m, f); where some are zero, in more rows, so that these take none of the data."""
+def _with_rows_for_all(terms: FloatArray) -> FloatArray:
+    """Terms (B, m, f), in no fewer rows; zero ones have another row, and take none of the data."""
+    short = terms.shape[2] - terms.shape[1]
+    if short > 0:
+        terms = np.pad(terms, ((0, 0), (0, short), (0, 0)))
     # Most have an end that is not zero, which need not be looked for.
     if np.all((terms[:, 0] != 0) | (terms[:, -1] != 0)):
         return terms

@@ -152,9 +152,9 @@ def continues(rest: FloatArray, later: FloatArray, as_large: float) -> bool:
     which may be `as_large` as those at rest. A misfit has a slower residual than the noise at rest.
     Ablation: louder noise that goes on.
     """
-    centred = rest - rest.mean()
-    if not centred.any() or rest.size < _SAMPLES_PER_LAG:
+    if rest.size < _SAMPLES_PER_LAG or not np.ptp(rest):
         return False
+    centred = rest - rest.mean()
     pole = float(later[1:] @ later[:-1]) / max(float(later @ later), SMALLEST)
     known = float(centred[1:] @ centred[:-1]) / float(centred @ centred)
     error = Z_95 * np.sqrt(max(1.0 - pole**2, 0.0) / rest.size)

@@ -52,6 +52,17 @@ def test_a_free_response_that_is_over_before_the_first_row_takes_nothing_away(la
     assert_allclose(without[1], without[0], atol=1e-12)
 
 
+def test_terms_of_a_stretch_with_fewer_samples_than_terms_take_all_of_it():
+    poles, turned = poles_from_parameters(np.array([THETA["three"]]))
+    rows = np.r_[0:70, 70:73]  # five terms and three samples
+    own = LocalTerms(Segments(np.array([0, 70, 73]), CLOCK[rows], SHAPES[rows]), np.ones(73), poles)
+    data = np.random.default_rng(0).normal(size=(1, 73, 1))
+    left = own.without(data)[0, :, 0]
+    assert_allclose(left[70:], 0.0, atol=1e-12)
+    assert np.abs(left[:70]).max() > 1
+    assert np.isfinite(own.moved(data[:, :, 0], turned)).all()
+
+
 def test_nothing_else_disappears_and_records_do_not_mix():
     poles, _ = poles_from_parameters(np.array([THETA["three"]]))
     own = LocalTerms(STRETCHES, np.ones(180), poles)

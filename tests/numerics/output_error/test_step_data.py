@@ -10,6 +10,7 @@ from ctrl_realize.numerics.engine.problem import KnownFactor
 from ctrl_realize.numerics.engine.profile import profile_limits
 from ctrl_realize.numerics.engine.responses import SampledInput
 from ctrl_realize.numerics.output_error.any_input.condensed import MOST_LAGS, condensed
+from ctrl_realize.numerics.output_error.any_input.data import cut
 from ctrl_realize.numerics.output_error.step_data import (
     StepData,
     fixed_regressors,
@@ -113,6 +114,13 @@ def test_a_slope_before_the_step_has_three_explanations():
         (True, False), (False, True), (False, False),
     ]  # fmt: skip
     assert len(step_data(white(1000), 1.0 * (k >= 100), 1.0, [(100, 1)]).explanations()) == 1
+
+
+def test_at_most_half_of_what_was_measured_waits_for_a_dead_time():
+    output = white(100)
+    output[40:] = np.nan
+    data = cut((output,), (white(100, 1),), 1.0, 1, KnownFactor())
+    assert [data.after(late).counts for late in (5.0, 90.0)] == [[32], [20]]
 
 
 def test_profile_limits_are_where_a_parabola_crosses():

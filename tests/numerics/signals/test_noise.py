@@ -263,6 +263,7 @@ def test_noise_of_a_short_rest_goes_on_and_a_misfit_is_none():
         noise = 0.004 * white(310, seed)
         assert not continues(noise[:60], noise[60:] + misfit, 1.3)
     assert not continues(np.zeros(60), misfit, 1.3)
+    assert not continues(misfit[:0], misfit, 1.3)
     assert not continues(slow(15, 0), slow(250, 1), 1.3)
 
 

@@ -149,7 +149,8 @@ class SampledData:
     def after(self, dead_time: float) -> SampledData:
         """Leave out what may depend on the input before the records; at most half of each."""
         late = int(np.ceil(BEYOND * dead_time / self.step))
-        return replace(self, starts=tuple(min(late, y.size // 2) for y in self.outputs))
+        seen = [np.flatnonzero(~np.isnan(y)) for y in self.outputs]
+        return replace(self, starts=tuple(min(late, int(i[i.size // 2])) for i in seen))
 
     @property
     def longest(self) -> float:
