@@ -155,6 +155,19 @@ def test_a_response_that_settles_has_no_plateau():
         assert not codes(fit) & {"may_be_at_limit", "output_at_limit"}
 
 
+@pytest.mark.parametrize("seed", [1, 8])
+def test_several_steps_that_a_linear_plant_explains_reach_no_limit(seed):
+    # Between two levels the output settles at the same value again and again.
+    rng = np.random.default_rng(seed)
+    u = np.repeat(rng.choice([-1.0, 1.0], 20), 15)
+    plant = cr.design.ProcessModel(gain=2.0, lag=12.0, dead_time=4.0).system(1.0)
+    y = np.ravel(plant.simulate(u)) + rng.normal(0, 0.03, u.size)
+    fit = cr.identify(cr.Record(np.arange(240.0), u[60:], y[60:])).fit
+    assert fit.at_noise_level
+    assert "may_be_at_limit" not in codes(fit)
+    assert fit.gain_interval[0] <= 2.0 <= fit.gain_interval[1]
+
+
 @pytest.mark.parametrize("seed", [0, 1, 11])
 def test_an_output_that_a_controller_holds_is_at_no_limit(seed):
     # A lag of 20 samples behind 12 under a gain of 0.5: it rises as if to twice its level, and is

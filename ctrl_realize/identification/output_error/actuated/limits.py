@@ -230,7 +230,8 @@ def _without_plateaus(record: Record, linear: OutputErrorFit, fit: Fit) -> Outpu
     """Fit a record without plateaus, if that and a limit explain it better than a linear plant.
 
     If they do not, a plateau is told all the same: in noise a response that a limit ends looks like
-    one that settles. The intervals of gain and total delay of a step are those of both then.
+    one that settles. The intervals of gain and total delay of a step are those of both then. Not so
+    where a linear plant explains several steps: of 57 records without a limit 17 had the doubt.
     """
     stepped = bool(np.isfinite(linear.onset))
     if linear.at_noise_level and not stepped:
@@ -242,12 +243,14 @@ def _without_plateaus(record: Record, linear: OutputErrorFit, fit: Fit) -> Outpu
     # A controller holds the output as well, and a model of it alone leaves much to explain.
     if not record.n_missing and any(feedback_flags((record,), linear.delay)):
         return linear
-    if stepped:  # any other input may leave the output where it is
+    # Any other input may leave the output where it is.
+    doubted = stepped and not (linear.at_noise_level and len(linear.data.edges) > 1)
+    if doubted:
         when = in_time(record.time[np.argmax(held)])
         doubt = flagged("may_be_at_limit", limits=_levels(output, held), when=when)
         linear = replace(linear, flags=(*linear.flags, doubt))
     told = evidence >= STRONG
-    if not (told or stepped) or np.count_nonzero(record.seen & ~held) < FEWEST_SAMPLES:
+    if not (told or doubted) or np.count_nonzero(record.seen & ~held) < FEWEST_SAMPLES:
         return linear
     rows = _rows(record, linear)
     try:
@@ -263,7 +266,7 @@ def _without_plateaus(record: Record, linear: OutputErrorFit, fit: Fit) -> Outpu
     load = linear.estimate.load
     loaded = load is not None and not load.early
     if not (told and clips(output[rows], linear.fitted, beyond[rows], held[rows], loaded=loaded)):
-        estimate = replace(linear.estimate, beyond=found.estimate) if stepped else linear.estimate
+        estimate = replace(linear.estimate, beyond=found.estimate) if doubted else linear.estimate
         return replace(linear, estimate=estimate)
     count, levels = np.count_nonzero(held), _levels(output, held)
     flag = flagged("output_at_limit.plateau", count=count, limits=levels)
