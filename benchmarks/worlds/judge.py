@@ -19,6 +19,7 @@ MODEL = frozenset(
         "structured_misfit",
         "input_in_residual",
         "feedback",
+        "late_input",
         "not_linear",
         "time_varying",
         "earlier_input",
