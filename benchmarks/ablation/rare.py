@@ -109,6 +109,20 @@ def pulse_before(rng: Rng) -> Case:
     return plant.case(record(u[before:], y[before:]))
 
 
+def moved_before(rng: Rng) -> Case:
+    """A step 0.3 to 0.9 s before the record, one after 0.1 to 0.6 s, up to five later; 1 % noise.
+
+    All are of any height, and the earlier one begins to show before the record does.
+    """
+    plant, before = drawn(rng, ((0.1, 0.4),), (0.1, 0.28)), int(rng.integers(30, 90))
+    first, count = int(rng.integers(10, 60)), int(rng.integers(0, 6))
+    u = np.zeros(before + 400)
+    for at in (20, before + first, *(before + rng.integers(first + 40, 380, count))):
+        u[at:] += rng.choice([-1.0, 1.0]) * rng.uniform(0.5, 1.5)
+    y = noisy(rng, stepped(rng, plant, u), 0.01)
+    return plant.case(record(u[before:], y[before:]))
+
+
 def little_step_in_noise(rng: Rng) -> Case:
     """Noise of 40 to 80 % of the step."""
     plant, u = drawn(rng), step(1500, 300)
@@ -329,6 +343,7 @@ MADE_FOR = {
     Rule.MEANS: little_step_in_noise,
     Rule.EXPONENTIAL: settling_in_a_long_rest,
     Rule.BEND: pulse_before,
+    Rule.BRIEF_REST: moved_before,
     Rule.HUM: humming,
     Rule.LOAD: steps.load_moves,
     Rule.COARSE: steps_of_a_converter,

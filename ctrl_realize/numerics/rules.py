@@ -90,6 +90,7 @@ class Rule(Enum):
     HOLDS = "holds beneath noise"
     LOOP = "loop without its set point"
     PAST = "past outputs tell a controller"
+    BRIEF_REST = "rest shorter than the response"
     SLOW_TURN = "first turn in slow noise"
     LOOP_ROUNDED = "controller behind rounding"
     RECORD_NOISE = "records weighted by their noise"

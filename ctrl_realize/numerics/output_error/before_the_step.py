@@ -22,7 +22,7 @@ from ..constants import STRONG, VERY_STRONG
 from ..engine.eliminate import evaluate
 from ..engine.modal import respond
 from ..engine.problem import Structure
-from ..engine.structures import SIMPLE_STRUCTURES, needless_parameters
+from ..engine.structures import SIMPLE_STRUCTURES, Candidate, needless_parameters
 from ..engine.window_fit import WindowFit
 from ..rules import Rule
 from .step_data import StepData
@@ -40,15 +40,25 @@ to 0.7 for simulated pulses just before the record, 1.7 for a heater in a box.""
 
 
 def fitted_from_rest(
-    data: StepData, fit: Callable[..., WindowFit], structures: tuple[Structure, ...]
+    data: StepData,
+    fit: Callable[..., WindowFit],
+    structures: tuple[Structure, ...],
+    is_noise: Callable[[StepData, WindowFit, Candidate], bool],
 ) -> tuple[StepData, WindowFit]:
     """Fit structures with the model of the samples before the step that has the most evidence.
 
-    None is taken that takes the place of the response to the step.
+    None is taken that takes the place of the response to the step, nor one of a motion that is not
+    seen, where without it the residual `is_noise`.
     """
-    ways = data.explanations()
+    ways, unseen = data.explanations(), not (data.drift or data.bend)
+    if len(ways) > 1 and unseen:
+        fits = fit(data, data.output.size, structures)
+        if is_noise(data, fits, fits.best):
+            return data, fits
     if len(ways) > 1:
-        few = SIMPLE_STRUCTURES if len(structures) > len(SIMPLE_STRUCTURES) else structures
+        # A structure that is given may want an unseen motion for what it misses.
+        simple = unseen or len(structures) > len(SIMPLE_STRUCTURES)
+        few = SIMPLE_STRUCTURES if simple else structures
         data = _most_evident([(way, fit(way, way.output.size, few)) for way in ways])
     fits = fit(data, data.output.size, structures)
     if _takes_the_gain(data, fits):

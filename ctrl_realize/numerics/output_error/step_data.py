@@ -145,13 +145,16 @@ class StepData:
         """Models of a motion before the step: drift, hum, free response of the plant, or none.
 
         A drift continues to the end, and so does hum. A baseline that bends or swings is no drift,
-        and its noise is that about the motion if it is a free response.
+        and its noise is that about the motion if it is a free response. In a short rest a free
+        response need not show.
         """
         if self.bend:
             ways = [replace(self, relaxing=True, hum=[], sigma=self.bend, colour=1.0), self]
         elif self.drift:
             still = replace(self, drift=0.0)
             ways = [self, replace(still, relaxing=True), still]
+        elif briefly_at_rest(self):
+            ways = [replace(self, relaxing=True), self]
         else:
             return [self]
         ways = [way for way in ways if not way.relaxing or Rule.FREE_RESPONSE.on]
@@ -243,6 +246,21 @@ def stop_at(data: StepData, part: float) -> int:
     return min(n, max(first, onset + 10, crossing + 3))
 
 
+def _rise(data: StepData, stop: int) -> int:
+    """Samples from the step until 63 % of the response, or until output `stop`."""
+    return int(data.rows[min(stop, stop_at(data, 0.63)) - 1]) + 1 - data.edges[0][0]
+
+
+def briefly_at_rest(data: StepData) -> bool:
+    """Whether the output was seen for less time before the step than it takes to rise.
+
+    Nothing tells then that the plant was at rest, nor how a motion would go on without the step,
+    from which the visible onset is counted. Ablation: rest shorter than the response.
+    """
+    brief = data.motion is not None and data.edges[0][0] < _rise(data, data.output.size)
+    return brief and Rule.BRIEF_REST.on
+
+
 def settled_at(data: StepData) -> int:
     """Output from which on a response has settled: twice the rise to 95 % after the step."""
     step, stop = data.edges[0][0], stop_at(data, 0.95)
@@ -294,11 +312,10 @@ def step_scales(
     assert data.motion is not None
     motion, dt = data.motion, data.dt
     end = int(data.rows[stop - 1]) + 1
-    risen = int(data.rows[min(stop, stop_at(data, 0.63)) - 1]) + 1
-    since = risen - data.edges[0][0]
+    since = _rise(data, stop)
     rise = since - motion.onset
     last = (motion.crossing + max(1.0, 0.05 * motion.crossing)) * dt
-    if data.relaxing and data.bend:
+    if data.relaxing and (data.bend or briefly_at_rest(data)):
         # Beside a motion that goes on, that of the response is not visible before it is large.
         last = max(last, since * dt)
     if latest is None:

@@ -32,7 +32,8 @@ The rule:
    time), without the lowest: a fit that fails takes dead time for lag. It contains the visible
    onset, and reaches as far on both sides as the time that the model takes to move by what it
    misses of the output.
-5. No dead time is later than the visible onset of the output.
+5. No dead time is later than the visible onset of the output, or than 63 % of the response where
+   the output may have been moving before, and was seen at rest for less time than that.
 6. Of a slow pole that leaves the gain undetermined, the fastest value that is not ruled out is
    taken, so that the model extrapolates little.
 
@@ -128,7 +129,7 @@ def fit_step_record(
     requested = requested or Requested()
     fit = partial(_fit_until, requested=requested)
     given, structures = data, requested.structures
-    data, fits = fitted_from_rest(data, fit, structures or ALL_STRUCTURES)
+    data, fits = fitted_from_rest(data, fit, structures or ALL_STRUCTURES, _is_noise)
     free = cache(partial(fit, data, data.output.size, ALL_STRUCTURES))
     loaded = None if data.load is not None else load_of(data, fits, fit, free, _is_noise)
     if loaded is not None and not loaded[0].early:

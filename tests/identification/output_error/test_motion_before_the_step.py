@@ -55,6 +55,31 @@ def test_an_input_that_moves_just_before_the_record_leaves_a_dead_time_that_is_n
     assert abs(fit.dead_time - dead_time) < 0.05
 
 
+# The record begins so late after one step that it moves, and so early before another that neither
+# a line nor an exponential through its rest goes on as it does. Not one of these dead times was
+# within its interval: none was sought after the moment at which the output left that line.
+@pytest.mark.parametrize("seed", [14, 84])
+@pytest.mark.parametrize("more", [0, 2])
+def test_a_short_rest_in_motion_does_not_say_when_the_response_begins(seed, more):
+    rng = np.random.default_rng(seed)
+    dead_time, lag, rest = (
+        rng.uniform(8.0, 24.0),
+        rng.uniform(15.0, 40.0),
+        int(rng.integers(10, 30)),
+    )
+    t, at = np.arange(400.0), [-40, rest, *rng.integers(rest + 40, 380, more)]
+    heights = rng.choice([-1.0, 1.0], 2 + more) * rng.uniform(0.5, 1.5, 2 + more)
+    edges = [(start, high) for start, high in zip(at, heights, strict=True)]
+    u = sum(high * (t >= start) for start, high in edges)
+    y = sum(
+        -2 * high * np.expm1(-np.maximum(t - start - dead_time, 0) / lag) for start, high in edges
+    )
+    fit = cr.identify(cr.Record(t, u, y + rng.normal(0, 0.01 * np.std(y), t.size))).fit
+    assert "not_at_rest" in codes(fit)
+    assert covers(fit, dead_time)
+    assert fit.gain == pytest.approx(2.0, rel=0.02)
+
+
 def test_an_arm_that_still_swings_is_fitted_with_its_free_response():
     dt, frequency = 0.01, 9.0
     plant = ct.tf([2 * frequency**2], [1, 0.04 * frequency, frequency**2])
