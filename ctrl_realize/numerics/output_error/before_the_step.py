@@ -47,14 +47,17 @@ def fitted_from_rest(
 ) -> tuple[StepData, WindowFit]:
     """Fit structures with the model of the samples before the step that has the most evidence.
 
-    None is taken that takes the place of the response to the step, nor one of a motion that is not
-    seen, where without it the residual `is_noise`.
+    None is taken that takes the place of the response to the step. Where no motion is seen, and
+    the residual `is_noise` without one, it needs its evidence in the best structure or few lags.
     """
     ways, unseen = data.explanations(), not (data.drift or data.bend)
     if len(ways) > 1 and unseen:
         fits = fit(data, data.output.size, structures)
         if is_noise(data, fits, fits.best):
-            return data, fits
+            tried = {fits.best.structure, *(s for s in structures if s.order <= 2 and not s.zeros)}
+            moving = fit(ways[0], data.output.size, tuple(tried))
+            if _most_evident([(data, fits), (ways[0], moving)]) is data:
+                return data, fits
     if len(ways) > 1:
         # A structure that is given may want an unseen motion for what it misses.
         simple = unseen or len(structures) > len(SIMPLE_STRUCTURES)

@@ -80,6 +80,21 @@ def test_a_short_rest_in_motion_does_not_say_when_the_response_begins(seed, more
     assert fit.gain == pytest.approx(2.0, rel=0.02)
 
 
+@pytest.mark.parametrize("seed", [0, 5])
+def test_an_earlier_step_that_is_nearly_over_does_not_count_for_the_gain(seed):
+    # In 13 samples at rest it does not show, and the gain was 2.11 to 2.14 or 2.14 to 2.16, "good".
+    t = np.arange(400.0)
+
+    def moved(at):
+        return -2 * np.expm1(-np.maximum(t - at - 20.0, 0) / 40)
+
+    noise = np.random.default_rng(seed).normal(0, 0.02, t.size)
+    fit = cr.identify(cr.Record(t, t >= 13, 0.9 * moved(-112) + moved(13) + noise)).fit
+    assert "not_at_rest" in codes(fit)
+    assert covers(fit, 20.0)
+    assert fit.gain_interval[0] <= 2.0 <= fit.gain_interval[1]
+
+
 def test_an_arm_that_still_swings_is_fitted_with_its_free_response():
     dt, frequency = 0.01, 9.0
     plant = ct.tf([2 * frequency**2], [1, 0.04 * frequency, frequency**2])
