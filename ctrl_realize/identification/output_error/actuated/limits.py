@@ -231,7 +231,7 @@ def _without_plateaus(record: Record, linear: OutputErrorFit, fit: Fit) -> Outpu
 
     If they do not, a plateau is told all the same: in noise a response that a limit ends looks like
     one that settles. The intervals of gain and total delay of a step are those of both then. Not so
-    where a linear plant explains several steps: of 57 records without a limit 17 had the doubt.
+    where a linear plant explains several steps: of 56 records without a limit 17 had the doubt.
     """
     stepped = bool(np.isfinite(linear.onset))
     if linear.at_noise_level and not stepped:
