@@ -254,6 +254,12 @@ def drive_with_friction(rng: Rng) -> Case:
     return Case(record(*rigs.drive_with_friction(rng, dead_time, friction, 0.05)), DT * dead_time)
 
 
+def faster_than_a_sample(rng: Rng) -> Case:
+    """One lag of a fifth to four fifths of a sample, 1 % noise."""
+    plant, u = drawn(rng, ((0.002, 0.008),), (0.05, 0.3)), step(400, 150)
+    return plant.case(record(u, noisy(rng, stepped(rng, plant, u), 0.01)))
+
+
 def long_ramp(rng: Rng) -> Case:
     """An integrator and a lag of 3 to 10 samples, 4000 samples; noise of 0.1 % of 10 s of ramp."""
     plant, u = drawn(rng, ((0.03, 0.1),), (0.12, 0.4)), step(4000, 200)
@@ -333,6 +339,7 @@ MADE_FOR = {
     Rule.CHAINS: tanks_in_a_row,
     Rule.IMPROVING: tanks_in_a_row,
     Rule.DIFFUSION: steps.wall,
+    Rule.SLOWER: faster_than_a_sample,
     Rule.MEANS: little_step_in_noise,
     Rule.EXPONENTIAL: settling_in_a_long_rest,
     Rule.BEND: pulse_before,

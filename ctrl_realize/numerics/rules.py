@@ -27,6 +27,7 @@ class Rule(Enum):
     NEEDLESS = "needless parameters"
     LEAST_CHARGE = "least charge"
     RESOLVED = "resolved gain first"
+    SLOWER = "slower poles beside zeros"
     INTEGRATOR = "integrator beside a lag of any ratio"
     CHAINS = "chains of equal lags"
     IMPROVING = "chains that still improve"

@@ -41,9 +41,10 @@ SLOWEST = 1e-4
 """Smallest pole, over the length of the record: stands for an integrator."""
 _DAMPING = 20.0
 """Largest damping of a pair: two lags with a ratio of 1600."""
-FASTEST = 40.0
+FASTEST, SLOWER_WITH_ZEROS = 40.0, 2.0
 """Largest pole, in 1/samples. A response that jumps from one sample to the next needs it: with a
-lag of half a sample at least, its dead time would be known better than to the sample."""
+lag of half a sample at least, its dead time would be known better than to the sample. Ablation:
+slower poles beside zeros."""
 
 _ROUGHLY = 0.25  # variances by which an iteration lowers the cost where a search ends: time
 _ENDS, _SAME_END = 5, 0.02  # of a search that are followed, and parts by which two are one: time
@@ -175,13 +176,19 @@ def _worth_a_search(
 
 
 def parameter_bounds(structure: Structure, scales: Scales) -> Bounds:
-    """Bounds for dead time and poles: time constants up to (nearly) an integrator."""
+    """Bounds for dead time and poles: time constants up to (nearly) an integrator.
+
+    With zeros they are at least half a sample: with more freedom such a model imitates an
+    oscillation that was sampled too coarsely, as that of a measured circuit does at 0.93 of the
+    Nyquist frequency.
+    """
     if isinstance(structure, Family):
         return structure.bounds
     order = structure.order
     if scales.bounds is not None:
         return scales.bounds(order)
-    fast = np.log(FASTEST / scales.dt)
+    slower = structure.zeros and Rule.SLOWER.on
+    fast = np.log((SLOWER_WITH_ZEROS if slower else FASTEST) / scales.dt)
     slow = np.log(max(SLOWEST / scales.length, scales.slowest))
     slow_pair = np.log(max(SLOWEST_PAIR / scales.length, scales.slowest))
     low, high = [scales.earliest], [scales.latest]
