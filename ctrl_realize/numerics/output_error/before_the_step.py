@@ -13,8 +13,9 @@ References
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 
@@ -47,18 +48,11 @@ def fitted_from_rest(
 ) -> tuple[StepData, WindowFit]:
     """Fit structures with the model of the samples before the step that has the most evidence.
 
-    None is taken that takes the place of the response to the step. Where no motion is seen, and
-    the residual `is_noise` without one, it needs its evidence in the best structure or few lags.
+    None is taken that takes the place of the response to the step.
     """
     ways, unseen = data.explanations(), not (data.drift or data.bend)
-    if len(ways) > 1 and unseen:
-        fits = fit(data, data.output.size, structures)
-        if is_noise(data, fits, fits.best):
-            tried = {fits.best.structure, *(s for s in structures if s.order <= 2 and not s.zeros)}
-            moving = fit(ways[0], data.output.size, tuple(tried))
-            if _most_evident([(data, fits), (ways[0], moving)]) is data:
-                return data, fits
-    if len(ways) > 1:
+    fit = cache(fit)  # what a plant at rest explains is asked for twice
+    if len(ways) > 1 and not (unseen and _rests(ways, fit, structures, is_noise)):
         # A structure that is given may want an unseen motion for what it misses.
         simple = unseen or len(structures) > len(SIMPLE_STRUCTURES)
         few = SIMPLE_STRUCTURES if simple else structures
@@ -69,6 +63,26 @@ def fitted_from_rest(
         data = replace(ways[-1], drift=0.0, relaxing=False)
         fits = fit(data, data.output.size, structures)
     return data, fits
+
+
+def _rests(
+    ways: Sequence[StepData],
+    fit: Callable[..., WindowFit],
+    structures: tuple[Structure, ...],
+    is_noise: Callable[[StepData, WindowFit, Candidate], bool],
+) -> bool:
+    """Whether a plant at rest explains a record, and no motion has evidence that was not seen.
+
+    The motion is tried with the structure that is best at rest, and with one and two lags, which
+    may take the place of a richer one.
+    """
+    moving, still = ways
+    fits = fit(still, still.output.size, structures)
+    if not is_noise(still, fits, fits.best):
+        return False
+    tried = {fits.best.structure, *(s for s in structures if s.order <= 2 and not s.zeros)}
+    other = fit(moving, moving.output.size, tuple(tried))
+    return _most_evident([(moving, other), (still, fits)]) is still
 
 
 def _most_evident(ways: list[tuple[StepData, WindowFit]]) -> StepData:

@@ -62,14 +62,11 @@ def test_an_input_that_moves_just_before_the_record_leaves_a_dead_time_that_is_n
 @pytest.mark.parametrize("more", [0, 2])
 def test_a_short_rest_in_motion_does_not_say_when_the_response_begins(seed, more):
     rng = np.random.default_rng(seed)
-    dead_time, lag, rest = (
-        rng.uniform(8.0, 24.0),
-        rng.uniform(15.0, 40.0),
-        int(rng.integers(10, 30)),
-    )
+    dead_time, lag = rng.uniform(8.0, 24.0), rng.uniform(15.0, 40.0)
+    rest = int(rng.integers(10, 30))
     t, at = np.arange(400.0), [-40, rest, *rng.integers(rest + 40, 380, more)]
     heights = rng.choice([-1.0, 1.0], 2 + more) * rng.uniform(0.5, 1.5, 2 + more)
-    edges = [(start, high) for start, high in zip(at, heights, strict=True)]
+    edges = list(zip(at, heights, strict=True))
     u = sum(high * (t >= start) for start, high in edges)
     y = sum(
         -2 * high * np.expm1(-np.maximum(t - start - dead_time, 0) / lag) for start, high in edges
@@ -77,12 +74,12 @@ def test_a_short_rest_in_motion_does_not_say_when_the_response_begins(seed, more
     fit = cr.identify(cr.Record(t, u, y + rng.normal(0, 0.01 * np.std(y), t.size))).fit
     assert "not_at_rest" in codes(fit)
     assert covers(fit, dead_time)
-    assert fit.gain == pytest.approx(2.0, rel=0.02)
+    assert fit.gain == pytest.approx(2.0, rel=0.02)  # beside noise of 1 %
 
 
 @pytest.mark.parametrize("seed", [0, 5])
 def test_an_earlier_step_that_is_nearly_over_does_not_count_for_the_gain(seed):
-    # In 13 samples at rest it does not show, and the gain was 2.11 to 2.14 or 2.14 to 2.16, "good".
+    # In 13 samples at rest it does not show, and the gain was 2.14 to 2.16 or 2.12 to 2.14, "good".
     t = np.arange(400.0)
 
     def moved(at):

@@ -58,7 +58,7 @@ def test_terms_of_a_stretch_with_fewer_samples_than_terms_take_all_of_it():
     own = LocalTerms(Segments(np.array([0, 70, 73]), CLOCK[rows], SHAPES[rows]), np.ones(73), poles)
     data = np.random.default_rng(0).normal(size=(1, 73, 1))
     left = own.without(data)[0, :, 0]
-    assert_allclose(left[70:], 0.0, atol=1e-12)
+    assert_allclose(left[70:], 0.0, atol=1e-12)  # rounding, of numbers of 1
     assert np.abs(left[:70]).max() > 1
     assert np.isfinite(own.moved(data[:, :, 0], turned)).all()
 

@@ -243,7 +243,7 @@ def _without_plateaus(record: Record, linear: OutputErrorFit, fit: Fit) -> Outpu
     # A controller holds the output as well, and a model of it alone leaves much to explain.
     if not record.n_missing and any(feedback_flags((record,), linear.delay)):
         return linear
-    # Any other input may leave the output where it is.
+    # Inputs other than steps may leave the output where it is.
     doubted = stepped and not (linear.at_noise_level and len(linear.data.edges) > 1)
     if doubted:
         when = in_time(record.time[np.argmax(held)])
