@@ -202,12 +202,13 @@ def campaign_sketches(campaign: Campaign, *, truth: float | None = None) -> list
 def _from_a_step(fit: ModelFit | None) -> bool:
     """Whether there is a baseline before a single step, whose response is in every sample.
 
-    Beside samples that only repeat the last update a model looks early.
+    Beside samples that only repeat the last update a model looks early, and beside the rest of the
+    response to an earlier input, too small or too large.
     """
     if fit is None:
         return True
-    repeats = "repeats_left_out" in {flag.code for flag in fit.flags}
-    return not repeats and (fit.onset is None or not np.isnan(fit.onset))
+    others = {"repeats_left_out", "not_at_rest"} & {flag.code for flag in fit.flags}
+    return not others and (fit.onset is None or not np.isnan(fit.onset))
 
 
 def _step_of(record: Record) -> StepResponse | None:

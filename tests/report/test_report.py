@@ -171,16 +171,17 @@ def test_several_records_stand_each_beside_the_model_with_the_scatter_of_their_g
     assert verdict_of(system, comparison=comparison).level == "poor"
 
 
-@pytest.mark.parametrize("every", [1, 10])
-def test_the_start_of_a_response_is_drawn_where_every_sample_is_an_update(tmp_path, every):
+@pytest.mark.parametrize(("every", "moving"), [(1, 0.0), (10, 0.0), (1, 1.0)])
+def test_the_start_is_drawn_where_all_samples_are_of_one_response(tmp_path, every, moving):
     t = np.arange(400.0)
     noise = 0.01 * np.random.default_rng(3).standard_normal(400)
     y = np.where(t > 72, -2 * np.expm1(-np.clip(t - 72, 0, None) / 20), 0.0) + noise
+    y += moving * np.exp(-t / 20)
     record = cr.Record(t, np.where(t < 60, 0.0, 1.0), y[(np.arange(400) // every) * every])
     model = cr.identify(record, structures=["FOPDT"])
     page = report.write_identification(tmp_path / "report.html", model, record)
     drawn = "Start of the response" in page.read_text(encoding="utf-8")
-    assert drawn == (every == 1)
+    assert drawn == (every == 1 and not moving)
 
 
 def test_hostile_names_stay_text(tmp_path, record, fitted):
