@@ -20,6 +20,7 @@ MODEL = frozenset(
         "input_in_residual",
         "feedback",
         "late_input",
+        "not_exciting",
         "not_linear",
         "time_varying",
         "earlier_input",

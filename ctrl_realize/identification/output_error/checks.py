@@ -19,6 +19,7 @@ from ...numerics.validation.innovations import RARE, REGRESSED, nonlinear_chance
 from ...numerics.validation.parameter_change import ParameterChange, parameter_change
 from .loop_flags import (
     coloured_flags,
+    excitation_flags,
     feedback_flags,
     generalised_step,
     in_automatic,
@@ -66,6 +67,8 @@ def checked(fit: OutputErrorFit, *, alone: bool = True) -> OutputErrorFit:
     if complete and not stepped:
         flags += feedback_flags(complete, fit.delay_interval[1])
     in_loop = bool(flags)
+    if complete and not stepped:
+        flags += excitation_flags(fit)
     if not complete and "closed_loop" not in codes and any(map(in_automatic, fit.records)):
         flags.append(flagged("feedback.gaps"))
     # A stable model that leaves noise excludes an unstable plant, unless noise took what it misses

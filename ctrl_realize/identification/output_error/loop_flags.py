@@ -15,7 +15,7 @@ from ...numerics.constants import Z_95
 from ...numerics.engine.plausible_models import PlausibleModel
 from ...numerics.loops.relay import switched_by_relay
 from ...numerics.rules import Rule
-from ...numerics.signals.excitation import lively_start
+from ...numerics.signals.excitation import beyond_order_two, lively_start
 from ...numerics.validation.innovations import (
     RARE,
     REGRESSED,
@@ -37,6 +37,9 @@ _CERTAIN = 0.9
 was 97 to 100 % where an input was late to a lag of two samples at most, and 60 to 66 % in loops,
 whose answers held."""
 _STRETCH = 20  # samples of a stretch in manual that is worth a word
+_EXCITING = 1e-5
+"""Part of the moves of an input beyond order 2 from which on it is exciting: as much as a sinusoid
+with noise of 0.03 % has, and twice that of a ramp behind a rest of a hundredth of its record."""
 
 
 def in_automatic(record: Record) -> bool:
@@ -139,6 +142,14 @@ def late_input(records: Sequence[Record]) -> Flag | None:
     if part > _CERTAIN:
         return flagged("late_input", samples=samples, part=100 * part)
     return flagged("feedback.late", samples=samples, part=100 * part) if samples else None
+
+
+def excitation_flags(fit: OutputErrorFit) -> Iterator[Flag]:
+    """Report inputs that tell less of a plant than its model has parameters."""
+    form, inputs = fit.estimate.process.form, [np.ravel(one.input) for one in fit.records]
+    known = form is not None and len(form.names) - len(form.fixed) - (not form.dead_time) <= 2
+    if not known and beyond_order_two(inputs) < _EXCITING:
+        yield flagged("not_exciting")
 
 
 def _regulates(record: Record) -> bool:

@@ -115,6 +115,35 @@ def test_an_input_that_is_stored_a_sample_late_gives_no_good_answer(lag, delay):
     assert fit.gain == pytest.approx(2, rel=0.01)
 
 
+def sinusoids(*omegas, start=-200.0, seed=0):
+    """Gain 2, lags of 3 and 1 s, dead time 1.2 s; sinusoids of rad/s since `start`, in s."""
+    t = 0.1 * np.arange(-2000, 1200)
+    u = np.where(t < start, 0.0, sum(np.sin(w * t) for w in omegas))
+    plant = ct.tf([2.0], [3.0, 1.0]) * ct.tf([1.0], [1.0, 1.0])
+    y = cr.delayed_ss(plant, dead_time=1.2, dt=0.1).simulate(u)
+    y += 0.02 * np.random.default_rng(seed).standard_normal(t.size)
+    return cr.Record(t[2000:], u[2000:], y[2000:])
+
+
+@pytest.mark.parametrize("omega", [0.3, 1.0, 3.0])
+def test_a_single_sinusoid_tells_two_numbers_only(omega):
+    # at 1 rad/s a gain of -0.44 was called good
+    fit = cr.identify(sinusoids(omega)).fit
+    assert "not_exciting" in codes(fit)
+    assert {one.level for one in fit.verdicts} == {"no"}
+    # two numbers are enough for two parameters
+    known = cr.identification.ProcessStructure("P1D", fixed={"gain": 2.0})
+    assert "not_exciting" not in codes(cr.identify(sinusoids(omega), structures=known).fit)
+
+
+@pytest.mark.parametrize("record", [sinusoids(0.3, 1.1), sinusoids(1.0, start=20.0)])
+def test_two_sinusoids_or_the_beginning_of_one_tell_more(record):
+    fit = cr.identify(record).fit
+    assert "not_exciting" not in codes(fit)
+    assert fit.interval[0] <= 1.2 <= fit.interval[1]
+    assert fit.gain_interval[0] <= 2 <= fit.gain_interval[1]
+
+
 def test_all_samples_of_a_long_record_count():
     colour = 0.9
     rng = np.random.default_rng(2)
