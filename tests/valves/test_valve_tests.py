@@ -314,6 +314,17 @@ def test_noise_makes_no_overshoot_larger(damping, noise):
     assert sum(hits) >= 6
 
 
+@pytest.mark.parametrize(("dt", "lag", "dead_time"), [(0.1, 2.0, 1.0), (0.01, 0.3, 0.2)])
+def test_the_noise_of_many_small_steps_is_no_overshoot(dt, lag, dead_time):
+    # in 16 of 20 and 7 of 10 such tests the worst of 67 steps had 4 to 12 %, above its interval
+    plan = valves.valve_test_plan(dead_time=dead_time, time_constant=lag, dt=dt)
+    stem = stem_of(plan.command, dt=dt, dead_time=dead_time, lag=lag)
+    for seed in range(4):
+        noisy = stem + 0.03 * np.random.default_rng(seed).standard_normal(stem.size)
+        result = plan.evaluate(plan.record(noisy, units={"u": "%", "y": "%"}), fit=False)
+        assert result.metric("overshoot").interval.low == 0.0
+
+
 def test_the_interval_of_a_settling_time_lies_within_the_hold():
     """One error of 27 s beside three of 0.3 s made 2.3 s (-10.9 to 15.5 s)."""
     report = valves.valve_report(repeated(ringing, 8.0, 0.05), **QUICK)

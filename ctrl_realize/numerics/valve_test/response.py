@@ -16,6 +16,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.special import ndtri
 
 from ..arrays import FloatArray
 from ..constants import Z_95
@@ -33,6 +34,8 @@ _REST = 8
 """Samples before a step from which `first_motion` takes the level before it."""
 _PEAK = 4
 """Degree of the polynomial through a peak: a parabola is 1.6 % of the overshoot too low."""
+_BY_CHANCE = 1e-4
+"""Of the peak of a step being noise: a test has some hundred steps, and the worst of them counts."""
 _T86 = 1 - float(np.exp(-2))
 
 
@@ -131,10 +134,11 @@ class UnitResponse:
         """Height of the peak above the final level; 0 if it is within the noise."""
         top = int(np.argmax(self.smooth))
         error = float(np.hypot(self.noise.of_mean(self.width), self.after))
-        # The largest of m independent values exceeds their mean by sqrt(2 ln m) deviations.
-        alike = max(self.smooth.size / (self.width * self.noise.correlation), 2.0)
-        least = error * (float(np.sqrt(2 * np.log(alike))) + 1.0)
+        # Bonferroni's bound for the largest of all samples.
+        least = -float(ndtri(_BY_CHANCE / self.smooth.size)) * error
         peak = float(self.smooth[top]) - 1
+        if peak <= max(least, 0.5 * self.noise.quantum):
+            return Estimate(0.0, error)
         # The largest of noisy samples is too large: a polynomial through the upper half of the peak
         # is taken, in whose middle the error is 15/8 of that of a mean.
         below = np.flatnonzero(self.smooth <= 1 + 0.5 * peak)
@@ -145,7 +149,7 @@ class UnitResponse:
             along = np.linspace(-1, 1, part.size)
             peak = float(np.max(np.polyval(np.polyfit(along, part, _PEAK), along))) - 1
             error = float(np.hypot(15 / 8 * self.noise.of_mean(part.size), self.after))
-        return Estimate(peak if peak > max(least, 0.5 * self.noise.quantum) else 0.0, error)
+        return Estimate(peak, error)
 
     def first_motion(self) -> Estimate:
         """Visible onset: the rise through one and three thresholds, extrapolated to the baseline.
