@@ -183,6 +183,15 @@ def test_a_robust_closed_loop_time_is_as_long_as_the_data_ask_for():
         cr.design.pid(truth, "amigo", closed_loop_time="robust")
 
 
+@pytest.mark.parametrize("rule", ["simc", "imc"])
+def test_a_robust_closed_loop_time_is_found_where_the_usual_one_is_unstable(rule):
+    # of a lightly damped pair, 8^2 s^2 + 1.76 s + 1: the usual time was taken for robust
+    pair = cr.delayed_ss(ct.tf([2.0], [64.0, 1.76, 1.0]), dead_time=8.4, dt=1.0)
+    with pytest.raises(cr.errors.UnsuitableSystemError, match="does not stabilize"):
+        cr.design.pid(pair, rule)
+    assert cr.design.pid(pair, rule, closed_loop_time="robust").check.margins.ms <= 2
+
+
 def test_cohen_and_coon_have_no_pd_beyond_three_lags():
     with pytest.raises(cr.errors.UnsuitableSystemError, match="below 3 lags; this model has 5"):
         cr.design.pid(cr.design.ProcessModel(1, 1, 5), "cohen_coon", "PD")

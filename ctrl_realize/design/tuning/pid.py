@@ -252,7 +252,7 @@ def _robust(system: Any, options: TuningOptions) -> TuningOptions:
         changed = replace(options, closed_loop_time=time)
         made, plant = tuned(system, changed)
         check = loop_check(plant, made)
-        if not check.flags:
+        if check.stable and not check.flags:
             return changed
         worst = np.inf if check.worst is None else check.worst.ms
         tried.append((max(check.margins.ms if check.stable else np.inf, worst), changed))
