@@ -39,7 +39,7 @@ class ControlExtension:
                 for held in [key for key, value in vars(module).items() if value is original]:
                     self._change(module, held, changed)
         for owner in (ct.TransferFunction, ct.StateSpace):
-            for name in ("__mul__", "__add__", "__sub__"):
+            for name in ("__mul__", "__add__", "__sub__", "__truediv__"):
                 self._change(owner, name, left_to_the_other(vars(owner)[name]))
             for name in ("feedback", "append"):
                 self._change(owner, name, with_delays(vars(owner)[name]))
@@ -71,8 +71,8 @@ def extend_control() -> ControlExtension:
 
     Python-control forms matrices with one state for each sample of dead time, or polynomials of
     that degree, and refuses dead times in continuous time. While the extension is in force,
-    products, sums, ``feedback`` and ``append`` that begin with a plain system or a transfer
-    function, ``ct.interconnect``, ``ct.step_response``, ``ct.impulse_response``,
+    products, quotients, sums, ``feedback`` and ``append`` that begin with a plain system or a
+    transfer function, ``ct.interconnect``, ``ct.step_response``, ``ct.impulse_response``,
     ``ct.initial_response``, ``ct.forced_response``, ``ct.step_info``, ``ct.root_locus_map``,
     ``ct.root_locus`` and ``ct.gangof4`` do for a `DelaySystem` or `DelayedStateSpace` what the
     methods and functions of this package do. ``ct.exp(-tau * s)`` and ``numpy.exp(-tau * s)`` are

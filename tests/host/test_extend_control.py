@@ -30,6 +30,10 @@ def test_operators_that_begin_with_a_plain_system_are_exact(plant, controller):
             "difference": (controller - plant, CONTROLLER - EXACT),
             "parallel": (ct.parallel(controller, plant), CONTROLLER + EXACT),
             "feedback": (ct.feedback(controller, plant), CONTROLLER / (1 + CONTROLLER * EXACT)),
+            "quotient": (
+                controller / (1 + controller * plant),
+                CONTROLLER / (1 + CONTROLLER * EXACT),
+            ),
             "sensitivity": (ct.feedback(1, controller * plant), 1 / (1 + CONTROLLER * EXACT)),
         }
         both = ct.append(controller, plant)
