@@ -1,8 +1,8 @@
 """Counters and angles that start again at the end of their range, and clocks that are set.
 
-Our own rule: all jumps are longer than half of the range, all other steps are short, and beside
-each jump the signal moves the other way, as a counter does that falls from its end to its start.
-`numpy.unwrap` joins the turns. A clock is set for summer time where, of regular stamps, one step is
+Our own rule: all jumps are longer than half of the range, all other steps are short, and each jump
+is the range of an angle or a register but for a step like others, or the signal moves the other way
+beside it, as a counter does that falls from its end to its start. `numpy.unwrap` joins the turns. A clock is set for summer time where, of regular stamps, one step is
 an hour too short or too long, in the first hours of a Sunday of the months in which clocks are set.
 """
 
@@ -17,6 +17,7 @@ from ..arrays import FloatArray
 _JUMP, _STEP = 0.5, 0.2
 """Parts of the range: a jump is at least so long, another step at most. A first-order lag whose
 sample time is a third of it moves by 0.28 of its response in a sample."""
+_SLOW = 0.05  # of a turn: the longest step of a signal of which noise may turn the way
 _FEWEST = 30  # samples of which a tenth at most are jumps
 _SEVERAL = 4  # jumps of a counter of another range; one jump of a noisy step may look alike
 _ANGLES = (2 * np.pi, 360.0)
@@ -68,12 +69,19 @@ def counter_period(values: FloatArray) -> float | None:
         return None
     others = np.delete(steps, jumps)
     quick = float(np.abs(others).max())
+    counts = bool(np.all(known == np.round(known)))
+    sizes = np.abs(steps[jumps])
+    usual = min(_ANGLES + counts * _BITS, key=lambda one: abs(one - float(np.median(sizes))))
+    # Noise may turn the steps beside a jump, which is a whole turn but for a step like others. A
+    # signal from one end of its range to the other does not move on when the jumps are joined.
+    like_others = np.abs(sizes - usual).max() <= max(quick, 1.0 * counts) <= _SLOW * usual
+    if like_others and reach < usual and np.ptp(np.unwrap(known, period=usual)) > _STEP * usual:
+        return float(usual)
     inner = jumps[(jumps > 0) & (jumps < steps.size - 1)]
     beside = np.stack([steps[inner - 1], steps[inner + 1]])
     if not inner.size or quick > _STEP * reach or np.any(beside * steps[inner] >= 0):
         return None
     period = float(np.median(np.abs(steps[inner]) + np.abs(beside).mean(axis=0)))
-    counts = bool(np.all(known == np.round(known)))
     usual = min(_ANGLES + counts * _BITS, key=lambda one: abs(one - period))
     # the step that a jump hides lies between those beside it, or near them
     slack = float(np.abs(np.diff(beside, axis=0)).max()) / np.sqrt(inner.size) + counts

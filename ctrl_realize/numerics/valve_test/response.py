@@ -35,7 +35,7 @@ _REST = 8
 _PEAK = 4
 """Degree of the polynomial through a peak: a parabola is 1.6 % of the overshoot too low."""
 _BY_CHANCE = 1e-4
-"""Of the peak of a step being noise: a test has some hundred steps, and the worst of them counts."""
+"""Of the peak of a step being noise: a test has some fifty steps, and the worst of them counts."""
 _T86 = 1 - float(np.exp(-2))
 
 
