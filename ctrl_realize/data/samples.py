@@ -140,13 +140,16 @@ class Samples:
         return input
 
     def _late(self) -> str:
-        """What an input that moved in a gap of a row or so means; empty if it did not."""
+        """What an input that moved in a gap of a row or so means; empty if it did not.
+
+        Where samples are regular an input moves at one of them; at others anywhere between them.
+        """
         steps = np.diff(self.time)
-        late = np.where(np.abs(np.diff(self.input)) > 0, steps, 0.0) - np.median(steps)
-        late = np.atleast_2d(late).max(axis=0)
-        if not (late > (_GAP - 1) * np.median(steps)).any():
-            return ""
+        usual = regular_step(np.unique(self.time))
+        late = np.where(np.abs(np.diff(np.atleast_2d(self.input))) > 0, steps - usual, 0.0).max(0)
         row = int(np.argmax(late))
+        if late[row] <= (_GAP - 1) * usual:
+            return ""
         return (
             f"; the input moved in the gap before {self.place(row + 1)}, up to {late[row]:g} s "
             "before the sample from which it counts: a dead time may be as much longer"

@@ -83,6 +83,10 @@ def test_a_gap_in_which_the_input_moved_is_refused_and_others_are_kept_and_told(
     with pytest.warns(DataWarning) as told:
         cr.read_record(wrote(np.where(t < 40, 0.0, 1.0)))
     assert "moved" not in str(told[0].message)
+    # of irregular stamps nobody can tell when it moved between two of them
+    t = np.r_[0:20.0, 20.3:60.0]
+    with pytest.warns(DataWarning, match="moved in the gap before line 42, up to 1 s before the"):
+        cr.read_record(wrote(np.where(t < 40, 0.0, 1.0)))
 
 
 @pytest.mark.parametrize(
