@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -120,3 +120,16 @@ def check_complete(record: Record, task: str) -> None:
             "identify(record) and fit_output_error use the samples that there are; otherwise "
             "select a complete part with record.between(t0, t1), or interpolate"
         )
+
+
+def check_inputs_move(records: Sequence[Record]) -> None:
+    """Refuse records in which an input is constant.
+
+    Raises
+    ------
+    DataError
+    """
+    ranges = np.max([np.ptp(np.atleast_2d(one.input), axis=1) for one in records], axis=0)
+    if not ranges.all():
+        name = records[0].input_labels[int(np.argmin(ranges))]
+        raise DataError(f"the input {name!r} is constant; leave it out of the record")

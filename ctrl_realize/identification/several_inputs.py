@@ -26,7 +26,7 @@ import numpy as np
 from scipy.signal import lfilter
 
 from ..data import Record
-from ..data.given import as_records
+from ..data.given import as_records, check_inputs_move
 from ..data.shown_units import in_shown_units
 from ..delayed import DelayedStateSpace, fit_of
 from ..delayed.parts import signals_of
@@ -140,10 +140,8 @@ def _checked(records: tuple[Record, ...]) -> Record:
             "outputs; process models of several inputs need one record with one output. Without "
             "structures= all channels are fitted by fit_state_space"
         )
+    check_inputs_move(records)
     moves = np.diff(record.input)
-    if not (moving := moves.any(axis=1)).all():
-        name = record.input_labels[int(np.argmin(moving))]
-        raise DataError(f"the input {name!r} is constant; leave it out of the record")
     size = np.maximum(np.abs(moves).max(axis=1, keepdims=True), SMALLEST)
     if np.linalg.matrix_rank(moves / size) < len(moves):
         raise DataError(

@@ -215,6 +215,9 @@ def _parsed_dates(
             dates = Dates(_durations(cells), "0 days 00:00:00")
         else:
             dates = stamps_of(cells, time_format)
+            if dates.form.startswith("%I"):  # a clock alone
+                since = dates.stamps - dates.stamps.astype("datetime64[D]")
+                dates = dates._replace(stamps=_in_turns(since, np.timedelta64(1, "D")))
     except (DataError, OptionError) as error:
         raise type(error)(f"{table.at(index)}: {error}") from error
     bad = np.isnat(dates.stamps)
@@ -255,7 +258,10 @@ def _times_of_day(cells: list[str], unit: str, place: str) -> np.ndarray[Any, An
         )
     ends = ("", "") if not any(shorts) else ("00:", "") if first == "min" else ("", ":00")
     stamps = _durations([ends[0] + cell + ends[1] for cell in cells])
-    # a clock that falls back by most of a day has passed midnight, or a full hour
-    turn = np.timedelta64(3600 if ends[0] else 86400, "s")
+    return _in_turns(stamps, np.timedelta64(1, "h" if ends[0] else "D"))
+
+
+def _in_turns(stamps: np.ndarray[Any, Any], turn: np.timedelta64) -> np.ndarray[Any, Any]:
+    """Times of a clock that falls back by most of a turn where a day, or a full hour, begins."""
     turns = np.cumsum(np.diff(stamps) < -turn / 2)
     return np.asarray(stamps + np.concatenate([[0], turns]) * turn)

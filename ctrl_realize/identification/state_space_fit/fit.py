@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from ..._checks import integers
 from ..._wording import chosen, in_time
 from ...data import Record
-from ...data.given import as_records, records_alike
+from ...data.given import as_records, check_inputs_move, records_alike
 from ...data.shown_units import in_shown_units
 from ...delayed import DelayedStateSpace, fit_of
 from ...delayed.simulation import as_delayed
@@ -189,6 +189,7 @@ def _check_signals(group: Sequence[Record], feedthrough: bool | None) -> None:
                 f"record {i} has missing samples in its input; use the parts between the gaps "
                 "as records, or impulse_from_io"
             )
+    check_inputs_move(group)
     for name in ("input", "output"):
         known = [np.atleast_2d(getattr(record, name)) for record in group]
         # Without a copy of a long record: the largest magnitude is at an end of the range.

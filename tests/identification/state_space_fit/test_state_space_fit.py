@@ -138,7 +138,8 @@ def test_an_integrator_beside_a_lag_that_is_left_out_is_told_with_what_finds_it(
 def test_inputs_that_do_not_excite_are_refused(constant):
     first = record()
     u = np.ones_like(first.input) if constant else np.stack([first.input[0]] * 2)
-    with pytest.raises(DataError, match="does not excite"):
+    why = r"the input 'u\[0\]' is constant" if constant else "does not excite"
+    with pytest.raises(DataError, match=why):
         cr.fit_state_space(cr.Record(first.time, u, first.output))
 
 
