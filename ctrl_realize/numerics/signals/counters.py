@@ -2,8 +2,9 @@
 
 Our own rule: all jumps are longer than half of the range, all other steps are short, and each jump
 is the range of an angle or a register but for a step like others, or the signal moves the other way
-beside it, as a counter does that falls from its end to its start. `numpy.unwrap` joins the turns. A clock is set for summer time where, of regular stamps, one step is
-an hour too short or too long, in the first hours of a Sunday of the months in which clocks are set.
+beside it, as a counter does that falls from its end to its start. `numpy.unwrap` joins the turns. A
+clock is set for summer time where, of regular stamps, one step is an hour too short or too long, in
+the first hours of a Sunday of the months in which clocks are set.
 """
 
 from __future__ import annotations
