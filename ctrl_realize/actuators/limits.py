@@ -41,7 +41,9 @@ class SlewRateLimit(_OfTwoSamples):
     """Motion at no more than a given rate, as of a piston that is filled through an orifice.
 
     A step of height h takes h / rate. A lag behind it then looks like dead time that grows with
-    the step.
+    the step. Positions are those at the end of each sample. Between them the actuator moves on a
+    line: held over the samples they are half a sample early, and those of the middle, each minus
+    half of the move in its sample, are not.
 
     Parameters
     ----------
