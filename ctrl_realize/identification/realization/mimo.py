@@ -33,7 +33,8 @@ class MimoRealization(ModelFit):
     """Result of a MIMO realization.
 
     ``delays[i, j] == output_delays[i] + input_delays[j] + residual_delays[i, j]``, where
-    `residual_delays` are inside the core; entries without response have the delay -1.
+    `residual_delays` are inside the core; entries without response have the delay -1. Delays are
+    those of `delay_matrix`, or one sample more where the fractions of dead times make D.
     `relative_iae` is the IAE of each entry divided by the sum of its absolute Markov parameters.
 
     Attributes
@@ -180,7 +181,9 @@ def realize_mimo(
     The delays are split into those of inputs and of outputs, the data are aligned accordingly, and
     realized with one A. If no split aligns all channels, the result is compared with separate
     models for every output (or every input) with tapped delay lines: among those that explain the
-    data about as well as the best, the one with the fewest states is returned.
+    data about as well as the best, the one with the fewest states is returned. All delays are one
+    sample longer where that explains them better: then the first values are a feedthrough D, as of
+    dead times that are no whole numbers of samples.
 
     Parameters
     ----------
@@ -243,6 +246,36 @@ def realize_mimo(
     known = found >= 0
     if not known.any():
         raise DataError("no channel has a response; check that the input is connected")
+    way, pieces, errors = _assembled(data, count, found, choice, samples)
+    later = np.where(known, found + 1, -1)
+    if errors.sum() > EXACT * data.noutputs and later.max() + 2 * count < data.n_samples:
+        # A dead time that is no whole number of samples has its fraction in B and D.
+        direct = _assembled(data, count, later, choice, samples)
+        if ALIKE * direct[2].sum() < errors.sum():
+            found, (way, pieces, errors) = later, direct
+    apart = np.add.outer(pieces.outputs, pieces.inputs)
+    return pieces.system(
+        data.dt,
+        MimoRealization(
+            delays=locked(found),
+            residual_delays=locked(np.where(known, found - apart, 0)),
+            output_delays=pieces.outputs,
+            input_delays=pieces.inputs,
+            structure=way,
+            orders=pieces.orders,
+            states=pieces.states,
+            relative_iae=read_only(errors),
+            impulse=data,
+            flags=pieces.flags,
+        ),
+    )
+
+
+def _assembled(
+    data: ImpulseResponse, count: int, found: IntArray, choice: Structure, samples: int | None
+) -> tuple[str, Assembly, FloatArray]:
+    """Structure, model and relative IAE (p, m) for the delays of all channels."""
+    known = found >= 0
     splits = split_delays(found, known)
     if choice == "auto" and not np.any(known & (found != np.add.outer(*splits[0]))):
         choice = "common"
@@ -260,20 +293,4 @@ def realize_mimo(
     way = min(
         (way for way in models if errors[way].sum() <= enough), key=lambda w: models[w].states
     )
-    pieces = models[way]
-    apart = np.add.outer(pieces.outputs, pieces.inputs)
-    return pieces.system(
-        data.dt,
-        MimoRealization(
-            delays=locked(found),
-            residual_delays=locked(np.where(known, found - apart, 0)),
-            output_delays=pieces.outputs,
-            input_delays=pieces.inputs,
-            structure=way,
-            orders=pieces.orders,
-            states=pieces.states,
-            relative_iae=read_only(errors[way]),
-            impulse=data,
-            flags=pieces.flags,
-        ),
-    )
+    return way, models[way], errors[way]

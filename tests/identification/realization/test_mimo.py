@@ -122,3 +122,28 @@ def test_delays_between_two_ears_are_those_of_a_sphere():
     error = np.array(found) - sphere
     assert np.sqrt(np.mean(error**2)) <= 1.0  # sample; 0.82 when this was written
     assert np.abs(error).max() < 2.5
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.002])
+def test_fractions_of_dead_times_make_a_feedthrough(noise):
+    # a lag and 5.3 samples: 19 % off with order 1, whose D was 0
+    lags, dead_times = ((0.5, 1.0), (0.8, 0.4)), ((0.53, 1.27), (0.31, 0.84))
+    entries = [
+        [cr.delayed_ss(ct.tf([1], [lag, 1]), dead_time=tau, dt=0.1).markov(160) for lag, tau in row]
+        for row in (zip(*pair, strict=True) for pair in zip(lags, dead_times, strict=True))
+    ]
+    g = np.array(entries)
+    measured = g + noise * g.max() * np.random.default_rng(0).standard_normal(g.shape)
+    found = cr.identification.realize_mimo(measured, 2, dt=0.1)
+    # the largest of 640 values of noise is 3.2 standard deviations
+    assert np.abs(found.markov(160) - g).max() <= max(1e-12, 3.2 * noise) * g.max()
+    assert found.fit.delays.tolist() == [[6, 13], [4, 9]]
+
+
+def test_a_feedthrough_behind_the_delays_is_no_response_of_the_next_sample():
+    D = [[1, 0.5], [0.3, 2]]
+    core = ct.ss([[0.8, 0.1], [0, 0.5]], [[1, 0], [1, 1]], [[1, 0], [1, 1]], D, 0.1)
+    g = cr.DelayedStateSpace(core, (3, 6), output_delay=(0, 9)).markov(200)
+    found = cr.identification.realize_mimo(g, 2, level=0, dt=0.1)
+    np.testing.assert_allclose(found.markov(200), g, rtol=0, atol=1e-12)
+    assert found.nstates == 2 + 3 + 6 + 9
