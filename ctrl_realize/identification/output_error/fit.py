@@ -145,7 +145,8 @@ def fit_output_error(
         No lag of the plant is faster, in s: stated by the user, not found in the data. Short lags
         can take the place of dead time; without them its interval is narrower, and it holds if the
         statement does. Real poles of all structures are no faster, nor is 1 / omega of a pair
-        shorter. A flag says whether the data contradict the statement.
+        shorter. A flag says whether the data contradict the statement. A process model by name has
+        bounds of its own instead.
     dead_time : (low, high), optional
         Range in s of the dead time, stated by the user. Where the best dead time is at an end of
         it, a flag says whether the data contradict the statement.

@@ -47,14 +47,17 @@ def bounded(plain: Requested, stated: Stated) -> Requested:
     Raises
     ------
     OptionError
-        A process model, which has bounds of its own.
+        A process model whose lags or dead time have bounds of their own.
     """
     earliest, latest = stated.dead_time or (plain.earliest, plain.latest)
-    if plain.forms:
-        raise OptionError(
-            f"structures={plain.forms[0].name!r} with fastest_lag or dead_time; expected "
-            "bounds of a ProcessStructure"
-        )
+    for form in plain.forms:
+        own = not form.dead_time or "dead_time" in {**form.fixed, **form.bounds}
+        if stated.fastest_lag is not None or own:
+            name = "dead_time" if stated.fastest_lag is None else "fastest_lag"
+            raise OptionError(
+                f"structures={form.name!r} with {name}; expected an order, or bounds of a "
+                "ProcessStructure alone, such as {'lag_1': (2, inf)}"
+            )
     return replace(plain, earliest=earliest, latest=latest, fastest=stated.fastest_lag)
 
 

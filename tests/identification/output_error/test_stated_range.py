@@ -110,6 +110,7 @@ def test_statements_hold_for_any_input_and_for_a_frequency_response():
         ({"dead_time": 3.0}, "expected two numbers"),
         ({"fastest_lag": -1.0}, "expected a positive time in s"),
         ({"fastest_lag": 1.0, "structures": "P2D"}, "bounds of a ProcessStructure"),
+        ({"dead_time": (1.0, 2.0), "structures": "P1"}, "'P1' with dead_time; expected an order"),
         ({"dead_time": (1.0, 2.0), "max_delay": 3}, "max_delay with"),
         ({"dead_time": (1.0, 2.0), "actuator": "auto"}, "actuator with"),
         ({"dead_time": (1.0, 2.0), "method": "scan"}, "not an argument of method='scan'"),
@@ -118,6 +119,17 @@ def test_statements_hold_for_any_input_and_for_a_frequency_response():
 def test_wrong_statements(record, options, said):
     with pytest.raises(OptionError, match=said):
         cr.identify(record, **options)
+
+
+@pytest.mark.parametrize("ends", [(4.0, 5.0), (6.0, 8.0)])
+def test_a_process_model_takes_a_range_as_its_own_bounds(record, ends):
+    stated = cr.identify(record, structures="P2D", dead_time=ends).fit
+    bounded = cr.identification.ProcessStructure("P2D", bounds={"dead_time": ends})
+    fit = cr.identify(record, structures=bounded).fit
+    # a bound of a form is laid on a model that was chosen without it, whose outliers are others
+    assert stated.dead_time == pytest.approx(fit.dead_time, abs=0.02 * fit.dt)
+    assert stated.gain == pytest.approx(fit.gain, rel=2e-3)
+    assert ends[0] <= stated.interval[0] <= stated.interval[1] <= ends[1]
 
 
 def test_a_campaign_passes_statements_on(record):
