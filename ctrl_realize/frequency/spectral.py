@@ -36,7 +36,7 @@ def spectral_frf(
     Parameters
     ----------
     records : Record or iterable of Record
-        Any number of inputs and outputs (with `method` "H1"). An iterable is read once and never
+        Any number of inputs and outputs (with `method` "H1" and without `period`). An iterable is read once and never
         held in memory, so it may be a generator that reads a long file piece by piece. No segment
         crosses the boundary of a record.
     method : {"H1", "H2", "Hv"}

@@ -17,11 +17,14 @@ _GROUPS = {"": "", ",": ",", ".": r"\.", "'": "['’]", " ": "[ \xa0\u202f]"}
 """Thousands separators, as patterns."""
 
 
+_SIGN = "[+\u2212-]?"  # the minus of a typesetter, too
+
+
 def _number(decimal: str, group: str) -> re.Pattern[str]:
     """Pattern of a number; each text matches in one way only, or time grows with its length."""
     whole = rf"(?:\d{{1,3}}(?:{group}\d{{3}})+|\d+)" if group else r"\d+"
     ends = r"\.\d*" if decimal == "." else r",\d+"
-    return re.compile(rf"[+-]?({whole}({ends})?|[{decimal}]\d+)([eE][+-]?\d+)?")
+    return re.compile(rf"{_SIGN}({whole}({ends})?|[{decimal}]\d+)([eE]{_SIGN}\d+)?")
 
 
 NUMBER = {
@@ -35,8 +38,10 @@ _CLOCK = r"\d{1,3}:\d{2}(:\d{2})?([.,]\d+)?( ?[AaPp]\.?[Mm]\.?)?( ?(Z|UTC|[+-]\d
 _MONTH = r"[^\W\d_]{3,9}\.?"
 _DATE = rf"(\d{{1,4}}[-/.]\d{{1,2}}[-/.]\d{{1,4}}\.?|\d{{1,2}}[-/. ]{_MONTH}[-/. ]\d{{2,4}})"
 _TIME = re.compile(rf"{_CLOCK}|{_DATE}([ T]+{_CLOCK})?")
-_MEASURED = re.compile(r"([+-]?[\d.,]+(?:[eE][+-]?\d+)?)[ \xa0]?([^\W\d]\S{0,7}|[%°]\S{0,3})")
-_THOUSANDS = re.compile(r"[+-]?[1-9]\d{0,2}[.,]\d{3}")
+_MEASURED = re.compile(
+    rf"({_SIGN}[\d.,]+(?:[eE]{_SIGN}\d+)?)[ \xa0]?([^\W\d]\S{{0,7}}|[%°]\S{{0,3}})"
+)
+_THOUSANDS = re.compile(rf"{_SIGN}[1-9]\d{{0,2}}[.,]\d{{3}}")
 _WORDS = facts("io/words.toml")
 MISSING = frozenset(_WORDS["cells"]["missing"])
 BAD_VALUES = frozenset(_WORDS["cells"]["bad"])
@@ -103,7 +108,7 @@ def number_of(text: str, notation: str) -> float:
     if not NUMBER[notation].fullmatch(text):
         return math.nan
     plain = "".join(text.split()).replace("’", "'").replace(notation[1:] or " ", "")
-    return float(plain.replace(",", "."))
+    return float(plain.replace(",", ".").replace("\u2212", "-"))
 
 
 def complex_of(text: str, notation: str) -> complex:

@@ -182,3 +182,12 @@ def test_numbers_that_are_no_clock_in_seconds_nor_since_1970_are_asked_about(tmp
     with pytest.raises(OptionError, match=r"no clock in s; give time_unit='ms'.* or time_format="):
         cr.read_record(path)
     assert cr.read_record(path, time_unit="ns").dt == 1.0
+
+
+@pytest.mark.parametrize("decimal", [".", ","])
+def test_a_typesetter_s_minus_is_one(tmp_path, decimal):
+    y = np.linspace(-20, 13, 100).round(2)
+    cells = [f"{value:.2f}".replace("-", "\u2212").replace(".", decimal) for value in y]
+    rows = [f"{k};{int(k > 20)};{cell}" for k, cell in enumerate(cells)]
+    (tmp_path / "a.csv").write_text("\n".join(["time_s;OP;PV", *rows]) + "\n", encoding="utf-8")
+    np.testing.assert_array_equal(cr.read_record(tmp_path / "a.csv").output, y)
