@@ -36,9 +36,9 @@ def spectral_frf(
     Parameters
     ----------
     records : Record or iterable of Record
-        Any number of inputs and outputs (with `method` "H1" and without `period`). An iterable is read once and never
-        held in memory, so it may be a generator that reads a long file piece by piece. No segment
-        crosses the boundary of a record.
+        Any number of inputs and outputs (with `method` "H1", and without `period`). An iterable is
+        read once and never held in memory, so it may be a generator that reads a long file piece by
+        piece. No segment crosses the boundary of a record.
     method : {"H1", "H2", "Hv"}
         "H1" for noise on the output, "H2" for noise on the input, "Hv" is their geometric mean. For
         periodic records all three are the ratio of the mean spectra.
