@@ -19,14 +19,12 @@ References
 from __future__ import annotations
 
 import numpy as np
-from scipy.linalg import block_diag
 
 from ..arrays import ComplexArray, FloatArray
 from ..engine.eliminate import eliminate
 from ..engine.poles import parameters_from_poles
 from ..engine.problem import Structure
 from ..engine.structures import Candidate, parameter_bounds
-from ..signals.sines import stacked_parts
 from .frf_data import FRFData
 from .phase import phase_roughness
 
@@ -44,9 +42,9 @@ def trial_poles(low: float, high: float, order: int, *, resonant: bool) -> Compl
 
 
 def relocate_poles(
-    s: ComplexArray, response: ComplexArray, weight: FloatArray, poles: ComplexArray
+    s: ComplexArray, responses: ComplexArray, weight: FloatArray, poles: ComplexArray
 ) -> ComplexArray:
-    """Move poles towards those of the response: one step of vector fitting.
+    """Move poles towards those of responses: one step of vector fitting, of each on its own.
 
     The linear problem ``N(s) - sigma(s) H(s) = H(s)`` is that of Sanathanan and Koerner, written
     in partial fractions (Gustavsen and Semlyen 1999); the zeros of ``1 + sigma`` are the new
@@ -54,33 +52,49 @@ def relocate_poles(
 
     Parameters
     ----------
-    s, response : ndarray, shape (K,)
+    s : ndarray, shape (K,)
+    responses : ndarray, shape (B, K)
     weight : ndarray, shape (K,)
-    poles : ndarray, shape (n,)
-        Stable; conjugates need not be adjacent.
+    poles : ndarray, shape (B, n)
+        Stable; conjugates are neighbours, an odd one comes first.
 
     Returns
     -------
-    ndarray, shape (n,)
+    ndarray, shape (B, n)
+        In the same order.
     """
-    real, upper = poles[poles.imag == 0].real, poles[poles.imag > 0]
-    A = block_diag(*real, *([[p.real, p.imag], [-p.imag, p.real]] for p in upper))
-    b = np.append(np.ones(real.size), np.tile([2.0, 0.0], upper.size))
-    single, first, second = (1 / (s[:, None] - p) for p in (real, upper, upper.conj()))
-    pairs = np.stack([first + second, 1j * first - 1j * second], axis=2).reshape(s.size, -1)
-    fractions = np.hstack([single, pairs])
-    design = np.hstack([fractions, -response[:, None] * fractions]) * weight[:, None]
-    stacked = stacked_parts(design)
-    scale = np.linalg.norm(stacked, axis=0)
-    solution = np.linalg.lstsq(
-        stacked / scale, stacked_parts((weight * response)[:, None])[:, 0], rcond=1e-12
-    )[0]
-    sigma = (solution / scale)[poles.size :]
+    batch, n = poles.shape
+    first = np.arange(n % 2, n, 2)
+    p, q = poles[:, first], poles[:, first + 1]
+    mean, root, size = (p + q).real / 2, ((p - q) ** 2).real / 4, np.abs(p)
+    # (s - mean) and size, over (s - p) (s - q): real coefficients of both kinds of pairs.
+    A, b = np.zeros((batch, n, n)), np.ones(n)
+    A[:, first, first] = A[:, first + 1, first + 1] = mean
+    A[:, first, first + 1], A[:, first + 1, first], b[first + 1] = root / size, size, 0.0
+    fractions = np.empty((batch, s.size, n), dtype=np.complex128)
+    from_mean = s[:, None] - mean[:, None]
+    bottom = from_mean**2 - root[:, None]
+    fractions[:, :, first], fractions[:, :, first + 1] = from_mean / bottom, size[:, None] / bottom
+    if n % 2:
+        A[:, 0, 0] = poles[:, 0].real
+        fractions[:, :, 0] = 1 / (s - A[:, :1, 0])
+    design = np.concatenate([fractions, -responses[:, :, None] * fractions], axis=2)
+    columns = np.append(design, responses[:, :, None], axis=2) * weight[:, None]
+    stacked = np.concatenate([columns.real, columns.imag], axis=1)
+    scale = np.linalg.norm(stacked[:, :, :-1], axis=1)
+    inverse = np.linalg.pinv(stacked[:, :, :-1] / scale[:, None], rcond=1e-12)
+    sigma = ((inverse @ stacked[:, :, -1:])[:, :, 0] / scale)[:, n:]
     # New poles: eigenvalues of A - b c' (Gustavsen and Semlyen, appendix on zeros of sigma).
-    moved = np.linalg.eigvals(A - np.outer(b, sigma)).astype(np.complex128)
+    moved = np.linalg.eigvals(A - b[:, None] * sigma[:, None]).astype(np.complex128)
     # Keep a distance from the axis: a pole on it would make the next problem singular.
     floor = 1e-4 * np.abs(moved) + 1e-12 * np.abs(s).max()
-    return np.asarray(-np.maximum(np.abs(moved.real), floor) + 1j * moved.imag)
+    return _in_pairs(-np.maximum(np.abs(moved.real), floor) + 1j * moved.imag)
+
+
+def _in_pairs(poles: ComplexArray) -> ComplexArray:
+    """Poles (B, n) in an order in which conjugates are neighbours, real ones first."""
+    order = np.lexsort((poles.imag, np.abs(poles.imag), poles.real, poles.imag != 0), axis=1)
+    return np.take_along_axis(poles, order, axis=1)
 
 
 _RELOCATIONS = 8  # time; of 220 starts for a valve and a motor 165 had converged before
@@ -154,17 +168,24 @@ def starting_points(data: FRFData, order: int, delays: FloatArray) -> list[Float
     maximum-likelihood fit needs no initial guess either.
     """
     low, high = data.omega.min(), data.omega.max()
-    found: list[FloatArray] = []
-    for delay in delays:
-        turned = data.response * np.exp(data.s * delay)
-        for resonant in (False, True)[: max(order, 1)]:
-            poles = trial_poles(low, high, order, resonant=resonant)
-            for _ in range(_RELOCATIONS * min(order, 1)):
-                before, poles = poles, relocate_poles(data.s, turned, data.weight, poles)
-                moved = np.sort_complex(poles) - np.sort_complex(before)
-                if np.max(np.abs(moved) / np.abs(poles)) < 1e-3:
-                    break
-            found.append(np.append(delay, parameters_from_poles(poles)))
+    turned = data.response * np.exp(np.multiply.outer(delays, data.s))
+    kinds = []
+    for resonant in (False, True)[: max(order, 1)]:
+        trial = trial_poles(low, high, order, resonant=resonant)
+        poles = _in_pairs(np.tile(trial, (delays.size, 1)))
+        moving = np.arange(delays.size * min(order, 1))
+        for _ in range(_RELOCATIONS):
+            if not moving.size:
+                break
+            new = relocate_poles(data.s, turned[moving], data.weight, poles[moving])
+            change = np.abs(np.sort(new, axis=1) - np.sort(poles[moving], axis=1)) / np.abs(new)
+            poles[moving], moving = new, moving[change.max(axis=1) >= 1e-3]
+        kinds.append(poles)
+    found = [
+        np.append(delay, parameters_from_poles(poles[k]))
+        for k, delay in enumerate(delays)
+        for poles in kinds
+    ]
     starts, cost = _costs(data, order, found)
     # Two for each dead time, from lags and from resonances; one for a single pole.
     both = cost.reshape(delays.size, -1)
