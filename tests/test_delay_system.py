@@ -356,3 +356,10 @@ def test_a_gain_without_a_time_base_stays_one(tmp_path):
     assert (back.dt, back.D.tolist()) == (None, [[2.0]])
     with pytest.raises(UnsuitableSystemError, match="expected a sample time"):
         cr.DelaySystem(ct.ss([], [], [], np.ones((2, 2))), [1.0])
+
+
+@pytest.mark.parametrize("system", [cr.delay(0.5), cr.delayed_ss(ct.tf([1], [2, 1]), 5, dt=0.1)])
+@pytest.mark.parametrize("key", [(0, 1), (5, 5)])
+def test_channels_that_are_not_there_are_refused(system, key):
+    with pytest.raises(cr.errors.OptionError, match="there are 1 outputs and 1 inputs"):
+        system[key]

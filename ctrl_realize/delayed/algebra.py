@@ -6,10 +6,9 @@ from typing import Any, Self
 
 import control as ct
 
-from ..errors import OptionError
 from ..numerics.internal_delays.form import DelayForm, delayed_ends
 from .operators import DelayOperators
-from .parts import CoreAndDelays, matrices_of, named, signals_of
+from .parts import CoreAndDelays, matrices_of, named, selected, signals_of
 
 _ENDS = ("prefix", "suffix")
 
@@ -31,17 +30,7 @@ class DelayedAlgebra(CoreAndDelays, DelayOperators):
 
     def __getitem__(self, key: Any) -> Self:
         """Select channels, by number or name; each keeps its delay."""
-        # python-control names the selection, and refuses invalid keys.
-        try:
-            chosen = self.delay_free[key]
-            empty = not (chosen.noutputs and chosen.ninputs)
-        except ct.ControlDimension:
-            empty = True
-        if empty:
-            raise OptionError(
-                f"{key!r} selects no output or no input; there are {self.noutputs} outputs "
-                f"and {self.ninputs} inputs, counted from 0"
-            )
+        chosen = selected(self.delay_free, key)
         inputs = [self.input_index[name] for name in chosen.input_labels]
         outputs = [self.output_index[name] for name in chosen.output_labels]
         prefix, suffix = (ct.config.defaults[f"iosys.indexed_system_name_{end}"] for end in _ENDS)

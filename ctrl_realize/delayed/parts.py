@@ -86,6 +86,28 @@ def stand_in(system: Any) -> ct.StateSpace:
     return ct.StateSpace([], [], [], ends, system.dt, name=system.name, **signals_of(system))
 
 
+def selected(system: ct.StateSpace, key: Any) -> ct.StateSpace:
+    """Select channels of a plain system, by number or name.
+
+    Raises
+    ------
+    OptionError
+        There is no output or input of them.
+    """
+    # python-control names the selection, and refuses invalid keys.
+    try:
+        chosen = system[key]
+        empty = not (chosen.noutputs and chosen.ninputs)
+    except ct.ControlDimension:
+        empty = True
+    if empty:
+        raise OptionError(
+            f"{key!r} selects no output or no input; there are {system.noutputs} outputs "
+            f"and {system.ninputs} inputs, counted from 0"
+        )
+    return chosen
+
+
 def named(
     core: ct.StateSpace,
     inputs: Sequence[str],

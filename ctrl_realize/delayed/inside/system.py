@@ -20,7 +20,16 @@ from ...numerics.internal_delays.merging import ends_apart
 from ..chains import past_of
 from ..operands import plain, time_base
 from ..operators import INSIDE, DelayOperators, solvable
-from ..parts import matrices_of, named, parts_of, signal_names, signals_of, stand_in, with_core
+from ..parts import (
+    matrices_of,
+    named,
+    parts_of,
+    selected,
+    signal_names,
+    signals_of,
+    stand_in,
+    with_core,
+)
 from .cards import InsideCards
 from .checks import check_core, check_delays, not_rational
 from .conversions import InsideConversions
@@ -176,7 +185,7 @@ class DelaySystem(InsideResponses, InsideConversions, InsideCards, DelayOperator
 
     def __getitem__(self, key: Any) -> Self:
         """Select channels, by number or name."""
-        chosen = stand_in(self)[key]
+        chosen = selected(stand_in(self), key)
         left = np.eye(self.noutputs)[[self.output_index[name] for name in chosen.output_labels]]
         right = np.eye(self.ninputs)[:, [self.input_index[name] for name in chosen.input_labels]]
         form = through(self._form(), left, right)
