@@ -111,3 +111,18 @@ def test_a_weight_on_the_input_is_above_zero(price):
     plant = cr.delayed_ss(ct.tf([2.0], [40.0, 1.0]), dead_time=6.0, dt=1.0)
     with pytest.raises(cr.errors.OptionError, match=r"R has an eigenvalue .*expected all of them"):
         cr.design.predictor_lqr(plant, 1.0, price)
+
+
+def test_a_regulator_of_states_is_not_judged_by_outputs_of_other_models():
+    # with them in the place of the weighted states the loop of a negative plant was "unstable"
+    plant = cr.design.ProcessModel(gain=2.0, lag=30.0, second_lag=6.0, dead_time=8.5).system(0.75)
+    t = 0.75 * np.arange(500)
+    u = np.where(t < 37.5, 0.0, 10.0)
+    y = plant.simulate(u) + 0.1 * np.random.default_rng(0).standard_normal(t.size)
+    checks = [
+        cr.design.predictor_lqr(cr.identify(cr.Record(t, u, sign * y)), np.eye(2), 1.0).check
+        for sign in (1, -1)
+    ]
+    assert checks[0].worst.ms == pytest.approx(checks[1].worst.ms, rel=1e-6)
+    assert max(check.worst.ms for check in checks) < 1.1  # 1.016 to 1.026 on models of its order
+    assert all(check.stable_within_interval for check in checks)

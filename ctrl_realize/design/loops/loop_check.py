@@ -147,13 +147,16 @@ class LoopCheck(Result):
 
 
 @in_shown_units
-def loop_check(plant: Any, controller: Any) -> LoopCheck:
+def loop_check(plant: Any, controller: Any, *, models: bool = True) -> LoopCheck:
     """Check the closed loop with the model, and over its interval of dead times if it has one.
 
     Parameters
     ----------
     plant : DelayedStateSpace, or a continuous system
     controller : system of the same time base
+    models : bool, optional
+        Whether the loop is closed by the output of the plant, which the models that its data do not
+        rule out have as well. States of the core they have not: the intervals are tried instead.
     """
     loop = open_loop(plant, controller)
     found = loop_margins(loop)
@@ -165,17 +168,18 @@ def loop_check(plant: Any, controller: Any) -> LoopCheck:
         return LoopCheck(found, flags=flags)
     interval = interval_of_dead_time(plant, None)
     robust = None if interval is None else over_interval(plant, loop, found, interval, TRIED)
-    corners = _corners(plant, fit, loop, found, robust)
-    made = LoopCheck(found, robust, corners, by_models=fit.plausible_models is not None)
+    models = models and fit.plausible_models is not None
+    corners = _corners(plant, fit, loop, found, robust, models=models)
+    made = LoopCheck(found, robust, corners, by_models=models)
     return replace(made, flags=(*flags, *_left_open(made)))
 
 
 def _corners(
     plant: DelayedStateSpace, fit: ModelFit, loop: Loop, found: Margins,
-    robust: DelayRobustness | None,
+    robust: DelayRobustness | None, *, models: bool,
 ) -> tuple[Corner, ...]:  # fmt: skip
     """Ms at the ends of the intervals of dead time and gain; the gain scales the whole loop."""
-    if fit.plausible_models is not None:
+    if models and fit.plausible_models is not None:
         return _of_models(loop, fit.plausible_models, fit.integrators)
     gains = _gains(fit)
     if robust is None and not gains:
@@ -258,15 +262,16 @@ def _left_open(made: LoopCheck) -> tuple[Flag, ...]:
 
 
 def verified(
-    plant: Any, controller: Any, what: str, to_stabilize: str, more_robust: str
-) -> LoopCheck:
+    plant: Any, controller: Any, what: str, to_stabilize: str, more_robust: str,
+    *, models: bool = True,
+) -> LoopCheck:  # fmt: skip
     """Check a loop; refuse one that is unstable, and warn of one that is not robust.
 
     Raises
     ------
     UnsuitableSystemError
     """
-    check = loop_check(plant, controller)
+    check = loop_check(plant, controller, models=models)
     refuse_unstable(check, what, to_stabilize)
     warn_of(check, more_robust)
     return check
