@@ -363,3 +363,19 @@ def test_a_gain_without_a_time_base_stays_one(tmp_path):
 def test_channels_that_are_not_there_are_refused(system, key):
     with pytest.raises(cr.errors.OptionError, match="there are 1 outputs and 1 inputs"):
         system[key]
+
+
+@pytest.mark.parametrize("scale", [1.0, 1e-7, 1e-12, 1e9])
+def test_the_unit_of_a_signal_does_not_close_an_algebraic_loop(scale):
+    # a plant in m/V with a controller of 1.9e8 V/m was refused, though it acts after 3 s
+    s = ct.tf("s")
+    plant = ct.ss(scale / (10 * s + 1)) * cr.delay(3.0)
+    controller = ct.ss((1.9 + 0.2 / s + 2 * s / (0.2 * s + 1)) / scale)
+    points = 1j * np.geomspace(1e-3, 10, 20)
+    loop = plant(points) * controller(points)
+    closed = plant.feedback(controller)
+    assert_allclose(closed(points), plant(points) / (1 + loop), rtol=1e-9)
+    assert_allclose(cr.design.gang_of_four(plant, controller)(points)[0, 0], loop / (1 + loop))
+    answers_itself = ct.ss([], [], [], [[1 / scale]])
+    with pytest.raises(UnsuitableSystemError, match="algebraic loop"):
+        (plant + scale).feedback(answers_itself, sign=1)

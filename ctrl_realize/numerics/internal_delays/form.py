@@ -15,6 +15,8 @@ References
 ----------
 .. [1] P. Gahinet and L. F. Shampine, Software for modeling and analysis of linear systems with
    delays, Proc. American Control Conf. 2004, 5600-5605, section 2, doi:10.23919/ACC.2004.1384746.
+.. [2] B. N. Parlett and C. Reinsch, Balancing a matrix for calculation of eigenvalues and
+   eigenvectors, Numer. Math. 13 (1969) 293-304, doi:10.1007/BF02165404.
 """
 
 from __future__ import annotations
@@ -24,6 +26,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from scipy.linalg import matrix_balance
+from scipy.sparse.csgraph import connected_components
 
 from ..arrays import FloatArray
 
@@ -139,9 +143,9 @@ def closed(form: DelayForm, gain: FloatArray) -> DelayForm:
     """
     m, p = form.inputs, form.outputs
     D1 = form.D[:p]
-    loop = np.eye(p) - D1[:, :m] @ gain
-    _check_regular(loop)
-    seen = np.linalg.solve(loop, np.hstack([form.C[:p], D1]))
+    loop = D1[:, :m] @ gain
+    _check_loops(loop)
+    seen = np.linalg.solve(np.eye(p) - loop, np.hstack([form.C[:p], D1]))
     back = gain @ seen
     n = form.states
     # u = v + back [x; v; w]
@@ -235,3 +239,16 @@ def without_zero_delays(form: DelayForm) -> DelayForm:
 def _check_regular(matrix: FloatArray) -> None:
     if matrix.size and not 1 / np.linalg.cond(matrix) > SINGULAR:
         raise np.linalg.LinAlgError
+
+
+def _check_loops(gains: FloatArray) -> None:
+    """Refuse gains M for which I - M is singular, whatever the units of the signals are.
+
+    Its determinant is the product of those of the signals that are in loops with one another, and
+    the same for other units of these: they are balanced [2]_.
+    """
+    count, label = connected_components(gains != 0, connection="strong")
+    for k in range(count):
+        (at,) = np.nonzero(label == k)
+        alike, _ = matrix_balance(gains[np.ix_(at, at)], permute=False)
+        _check_regular(np.eye(at.size) - alike)
