@@ -44,6 +44,16 @@ def test_the_ultimate_point_of_one_lag_solves_its_phase_condition():
         assert found.period == pytest.approx(2 * np.pi / omega, rel=1e-9)
 
 
+@pytest.mark.parametrize("unit", [1e-12, 1e9, 1e12])
+def test_the_ultimate_gain_has_no_unit_of_time(unit):
+    # a pole of 1e-10 rad/s counted as an integrator: gain -15.9 for 5.89
+    one, other = (
+        design.ultimate(ct.tf([1], [10 * time, 1]) * cr.delay(3 * time)) for time in (1.0, unit)
+    )
+    assert other.gain == pytest.approx(one.gain, rel=1e-9)
+    assert other.period == pytest.approx(unit * one.period, rel=1e-9)
+
+
 @pytest.mark.parametrize(
     ("plant", "words"),
     [

@@ -110,7 +110,7 @@ class Loop:
     def integrators(self) -> int:
         """Count the poles at z = 1 (s = 0)."""
         origin = 1.0 if self.dt else 0.0
-        scale = 1e-7 if self.dt else 1e-9 * max(1.0, float(np.abs(self.poles).max(initial=0.0)))
+        scale = 1e-7 if self.dt else 1e-9 * self.rate
         return int(np.sum(np.abs(self.poles - origin) < scale))
 
     def sign(self) -> float:
