@@ -314,6 +314,16 @@ def test_achieved_beside_predicted():
     assert more.by_noise == pytest.approx(np.sqrt(5), rel=0.15)
 
 
+def test_what_was_fitted_as_a_loop_has_its_own_error():
+    # the pattern of a relay looks like the answer of one: 2.2 times the error, called 1.0 times
+    plant = cr.design.ProcessModel(gain=1.2, lag=10.0, second_lag=4.0, dead_time=3.0)
+    plan = cr.experiment.plan(plant, time=120, amplitude=5, rate=2, noise=0.05).using("relay")
+    output = plant.system(plan.dt).simulate(plan.command - plan.level)
+    output += 0.05 * np.random.default_rng(200).standard_normal(output.size)
+    found = cr.experiment.achieved(plan, plan.record(output), structures="SOPDT")
+    assert found.std >= found.fit.std_given_structure
+
+
 def test_missing_samples_tell_nothing():
     # Of white noise every fourth sample has a quarter of the information of all.
     command = np.tile(np.repeat([0.0, 1.0], 60), 4)

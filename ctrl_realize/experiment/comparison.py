@@ -28,7 +28,7 @@ class Achieved(Result):
         Of the record.
     std : float
         Standard error for the structure of the fit, from its model, the input as recorded, and the
-        noise of the residual.
+        noise of the residual; of a fit as of a loop that of the fit itself, if it is larger.
     by_noise : float
         Factor of the prediction that is due to the noise: that of the plan's model and input in the
         noise of the record, over the prediction.
@@ -134,7 +134,10 @@ def achieved(plan: ExperimentPlan, record: Record, **options: Any) -> Achieved:
     fit = fitted(as_record(record), options)
     known = known_from_fit(fit)
     own, before = Bound(known.model, fit.dt), Bound(plan.model, plan.dt)
-    std = own.errors(known.tests, own.gradient([plan.want]))[0]
+    std = float(own.errors(known.tests, own.gradient([plan.want]))[0])
+    if fit.estimate.averaged:  # as of a loop, which is not efficient
+        errors = {"dead_time": fit.std_given_structure, "gain": fit.gain_std_given_structure}
+        std = max(std, errors.get(plan.want) or 0.0)
     as_planned = [Experiment(plan.chosen.input, test.noise) for test in known.tests]
     noisy = before.errors(as_planned, before.gradient([plan.want]))[0]
-    return Achieved(plan, fit, float(std), float(noisy) / plan.std)
+    return Achieved(plan, fit, std, float(noisy) / plan.std)
