@@ -47,9 +47,9 @@ def compare_delay_estimates(
     """Estimate a delay by all methods that the data allow, and compare.
 
     From a record: output-error fit (`fit_output_error`), the paper's scan (`estimate_delay`, from
-    the differentiated step or from `impulse_from_io`), visible onset after a step, and onset of the
-    cross-correlation with the prewhitened input. From an FRF: fit with continuous dead time
-    (`fit_frf`) and slope of the phase at the upper end of the band.
+    the differentiated step or from `impulse_from_io`), visible onset after a step from rest, and
+    onset of the cross-correlation with the prewhitened input. From an FRF: fit with continuous dead
+    time (`fit_frf`) and slope of the phase at the upper end of the band.
 
     Parameters
     ----------
@@ -138,7 +138,7 @@ def _from_record(
     else:
         yield DelayEstimate("output error", "record", "dead time", fit.dead_time, *fit.interval)
         stepped = bool(np.isfinite(fit.onset))
-        if stepped:
+        if stepped and not fit.data.relaxing:
             # Back to the last sample at the baseline; the motion started within the sample before.
             first = max(fit.onset, 0.0)
             yield DelayEstimate("onset", "record", "upper bound", first, 0.0, first + dt)

@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 
+import control as ct
 import numpy as np
 import pytest
 
@@ -130,3 +131,13 @@ def test_only_pairs_that_rule_each_other_out_are_in_conflict():
     # the interval of an upper bound begins where nothing is said: only its end counts
     check = DelayComparison((A, view("r", 3.5, 6.0, "upper bound")), 0.5)
     assert (check.common, check.conflicts) == ((1.0, 3.0), ())
+
+
+def test_a_visible_onset_bounds_no_dead_time_where_the_output_moved_before():
+    # 1.8 to 5 s was common to all of them, and 6.5 s true
+    plant = cr.delayed_ss(ct.tf([2], [8, 1]) * ct.tf([1], [3, 1]), dead_time=6.5, dt=1.0)
+    u = np.repeat(np.random.default_rng(0).choice([-1.0, 1.0], 40), 15)[:500]
+    y = plant.simulate(u) + 0.2 * np.random.default_rng(1).standard_normal(500)
+    found = cr.validation.compare_delay_estimates(cr.Record(np.arange(500.0), u, y))
+    assert found.common[0] <= 6.5 <= found.common[1]
+    assert "onset" not in [one.method for one in found.estimates]
