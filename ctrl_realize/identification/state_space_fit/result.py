@@ -193,7 +193,8 @@ def fitted_system(
     loop: tuple[Flag, ...] = ()
     neighbours = max((float(c.autocorrelation[:, 1].max()) for c in checks), default=0.0)
     longest = max(r.n_samples for r in group)
-    slow = longest * (1 - float(np.abs(core.poles()).max(initial=0.0))) < INTEGRATES
+    largest = float(np.abs(core.poles()).max(initial=0.0))
+    slow = longest * (1 - largest) < INTEGRATES
     # With their drifts, which the test has as well: beside slow poles those of a fit are huge.
     whole = tuple(r for r in group if not r.n_missing)
     if whole and (slow or neighbours > COLOURED):
@@ -201,7 +202,17 @@ def fitted_system(
         loop = tuple(unstable_flags(whole, latest, imitated=imitated))
     if neighbours > COLOURED:
         advice = "compare with a lower order on other data"
-        if slow and group[0].issiso():
+        if slow:
+            share = 100 * largest**longest
+            seen["not_died_away"] = flagged(
+                "not_died_away", largest=largest, share=share, samples=longest
+            )
+        if group[0].ninputs > 1 == group[0].noutputs:
+            advice = (
+                "process models of several inputs and one output count the colour of the noise: "
+                "identify(record, structures='FOPDT')"
+            )
+        elif slow and group[0].issiso():
             advice = (
                 "the slowest time constant is longer than the record, as of an integrator: "
                 "use fit_output_error (or identify), which fits integrators for one input "

@@ -184,3 +184,21 @@ def test_slow_poles_that_imitate_an_unstable_plant_are_told(pole, order, seed):
     y = lfilter([0, 0, 0, 0, 0.05], [1, -pole], u) + 0.02 * rng.standard_normal(400)
     found = cr.fit_state_space(cr.Record(0.1 * np.arange(400), u, y), order)
     assert ("unstable" in [flag.code for flag in found.fit.flags]) == (pole > 1)
+
+
+def test_gains_that_slow_noise_made_are_named_with_what_tells_them():
+    # -1.3e4 and -6.9e4 for gains of 2 and -1.2, beside the word that the order may be too high
+    rng = np.random.default_rng(7)
+    u = np.repeat(rng.choice([-1.0, 1.0], (2, 40)), 20, axis=1)
+    plants = (2.0, 20.0, 5), (-1.2, 30.0, 3)
+    y = sum(
+        cr.delayed_ss(ct.tf([gain], [lag, 1]), delay, dt=1.0).simulate(own)
+        for (gain, lag, delay), own in zip(plants, u, strict=True)
+    )
+    y = y + 0.3 * lfilter([np.sqrt(1 - 0.81)], [1, -0.9], rng.standard_normal(800))
+    record = cr.Record(np.arange(800.0), u, y)
+    flags = {flag.code: str(flag) for flag in cr.identify(record).fit.flags}
+    assert "data end too early to determine the gain" in flags["not_died_away"]
+    assert "identify(record, structures='FOPDT')" in flags["coloured_residual"]
+    gains = cr.identify(record, structures="FOPDT").dcgain().ravel()
+    np.testing.assert_allclose(gains, [2, -1.2], rtol=0.1)
