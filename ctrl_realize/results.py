@@ -7,6 +7,7 @@ chosen automatically and why, and `flags`, warnings about the result.
 
 from __future__ import annotations
 
+from functools import wraps
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -97,6 +98,18 @@ class Result(Drawable):
         choices = ()
         flags = ()
     _heading = ""
+
+    def __init_subclass__(cls, **settings: Any) -> None:
+        """Write times in the unit of the result in one line as on its card."""
+        super().__init_subclass__(**settings)
+        if own := vars(cls).get("__repr__"):
+
+            @wraps(own)
+            def shown(self: Result) -> str:
+                with times_in(getattr(self, "time_unit", None)):
+                    return str(own(self))
+
+            cls.__repr__ = shown  # type: ignore[method-assign, assignment]
 
     def _title(self) -> str:
         return self._heading or type(self).__name__

@@ -1,5 +1,7 @@
 """PID forms against the equations of their documents, the algorithm against the linear loop."""
 
+import re
+
 import control as ct
 import numpy as np
 import pytest
@@ -266,3 +268,10 @@ def test_a_continuous_controller_has_no_algorithm_and_print_says_what_to_type():
     table = cr.design.pid(plant).forms(measured_range=(0, 400)).set_index("form")["enter"]
     assert table["rockwell_pide_dependent"].startswith("PGain (Kc) = ")
     assert len(table) == len(cr.design.pid_forms())
+
+
+def test_an_algorithm_is_written_in_the_units_of_its_controller():
+    made = cr.design.PIDController(2.0, 600.0, dt=6.0, gain_unit="%/K", time_unit="min").algorithm()
+    for text in (made.report(), repr(made)):
+        assert re.search(r"kp +2 %/K", text)
+        assert re.search(r"ti +10 min", text)

@@ -89,6 +89,8 @@ class PIDAlgorithm(Result):
     bias : float
         Output at the operating point, at zero error.
     name : str
+    gain_unit, time_unit : str
+        In which the card writes kp and times.
 
     Attributes
     ----------
@@ -123,6 +125,8 @@ class PIDAlgorithm(Result):
     tracking_time: float | None = None
     bias: float = 0.0
     name: str = "PID"
+    gain_unit: str = ""
+    time_unit: str = "s"
 
     def __post_init__(self) -> None:
         positive(self.dt, "dt", "sample time in s")
@@ -217,7 +221,7 @@ class PIDAlgorithm(Result):
         return f"PID algorithm {self.name}"
 
     def _rows(self) -> list[tuple[str, str]]:
-        rows = [("kp", in_digits(self.kp))]
+        rows = [("kp", f"{in_digits(self.kp)} {self.gain_unit}".rstrip())]
         if self.ti < INF:
             rows.append(("ti", in_time(self.ti, 4)))
         if self.td:

@@ -389,4 +389,6 @@ class PIDController(ShownSystem, BesideDelays):
             tracking_time,
             bias,
             str(self.name),
+            self.gain_unit,
+            self.time_unit,
         )
