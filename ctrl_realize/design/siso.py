@@ -27,8 +27,10 @@ def delayed_system(system: Any, purpose: str, *, siso: bool = True) -> DelayedSt
         Not a linear system, a continuous one, or several channels if one is needed.
     """
     if not isinstance(system, (ct.StateSpace, ct.TransferFunction)):
+        advice = "; its system(dt) is one" if callable(getattr(system, "system", None)) else ""
         raise UnsuitableSystemError(
-            f"{purpose} needs a discrete system; got a {type(system).__name__}"
+            f"{purpose} needs a linear system, a StateSpace or TransferFunction; got a "
+            f"{type(system).__name__}{advice}"
         )
     if siso:
         check_single(system, purpose)
