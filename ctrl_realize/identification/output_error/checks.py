@@ -67,7 +67,7 @@ def checked(fit: OutputErrorFit, *, alone: bool = True) -> OutputErrorFit:
     if complete and not stepped:
         flags += feedback_flags(complete, fit.delay_interval[1])
     in_loop = bool(flags)
-    if complete and not stepped:
+    if not stepped:
         flags += excitation_flags(fit)
     if not complete and "closed_loop" not in codes and any(map(in_automatic, fit.records)):
         flags.append(flagged("feedback.gaps"))

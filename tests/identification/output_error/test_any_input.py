@@ -128,12 +128,18 @@ def sinusoids(*omegas, start=-200.0, seed=0):
 @pytest.mark.parametrize("omega", [0.3, 1.0, 3.0])
 def test_a_single_sinusoid_tells_two_numbers_only(omega):
     # at 1 rad/s a gain of -0.44 was called good
-    fit = cr.identify(sinusoids(omega)).fit
+    record = sinusoids(omega)
+    hidden = np.arange(record.n_samples) % 50 == 7
+    fit = cr.identify(record).fit
     assert "not_exciting" in codes(fit)
     assert {one.level for one in fit.verdicts} == {"no"}
+    gaps = cr.Record(
+        record.time, record.input, np.where(hidden, np.nan, record.output), missing="keep"
+    )
+    assert "not_exciting" in codes(cr.identify(gaps, structures="FOPDT").fit)
     # two numbers are enough for two parameters
     known = cr.identification.ProcessStructure("P1D", fixed={"gain": 2.0})
-    assert "not_exciting" not in codes(cr.identify(sinusoids(omega), structures=known).fit)
+    assert "not_exciting" not in codes(cr.identify(record, structures=known).fit)
 
 
 @pytest.mark.parametrize("record", [sinusoids(0.3, 1.1), sinusoids(1.0, start=20.0)])
