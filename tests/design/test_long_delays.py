@@ -122,3 +122,10 @@ def test_an_unstable_core_behind_a_very_long_dead_time_is_refused():
     plant = cr.delayed_ss(ct.ss([[1.02]], [[1.0]], [[0.1]], [[0.0]], 0.01), 100_000)
     with pytest.raises(UnsuitableSystemError, match="overflows within the delay of 100000 samples"):
         cr.design.lqg(plant, 1.0, 1.0, 1.0, 1.0)
+
+
+@pytest.mark.parametrize("rule", ["amigo", "imc", "optimal"])
+def test_a_dead_time_in_another_unit_is_refused_before_memory_ends(rule):
+    # a lag in s, a dead time in us: an array of 102 GiB was asked for
+    with pytest.raises(cr.errors.UnsuitableSystemError, match="units of its times"):
+        cr.design.pid(cr.design.ProcessModel(1.0, 1e-3, 1e6), rule, "PI")

@@ -26,6 +26,9 @@ from ...numerics.arrays import ComplexArray, FloatArray
 from ...numerics.loops.crossings import frequency_grid
 from .factors import Factor, factor
 
+MOST_TURNED = 5e7
+"""Phase in rad up to which a dead time is followed: 16 points a turn then take some 10 GB."""
+
 
 @dataclass(frozen=True)
 class Loop:
@@ -126,7 +129,15 @@ class Loop:
             return frequency_grid(self._start(), np.pi / self.dt, features, self.turn_time)
         sizes, dead_time = self._sizes(), self.turn_time
         top = 20 / dead_time if dead_time else 1e3 * (sizes.max(initial=0.0) or 1.0)
-        return frequency_grid(self._start(), self._end(top, sizes), features, dead_time)
+        top = self._end(top, sizes)
+        if dead_time * top > MOST_TURNED:
+            turns = dead_time * top / (2 * np.pi)
+            raise UnsuitableSystemError(
+                f"the dead time of {dead_time:g} s turns the loop {turns:.2g} times up to "
+                f"{top:.3g} rad/s, where its gain ends: too often to be followed. Check the units "
+                "of its times"
+            )
+        return frequency_grid(self._start(), top, features, dead_time)
 
     def _sizes(self) -> FloatArray:
         sizes = np.abs(np.concatenate([part.features for part in self.factors]))
