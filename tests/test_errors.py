@@ -122,7 +122,7 @@ ERRORS = {
         (lambda: cr.design.margins(LAG, DISCRETE), "time bases"),
         (lambda: cr.design.margins(ct.tf([1], [1, 0.5], True)), "dt=True"),
         (lambda: cr.design.margins(ct.tf([1, 1, 1], [1, 1])), "improper"),
-        (lambda: cr.design.pid("plant"), "discrete system; got a str"),
+        (lambda: cr.design.pid("plant"), "linear system, .*; got a str"),
         (lambda: cr.design.pid(ct.tf([1, 1], [1])), "PID controller needs a proper system"),
         (lambda: cr.delayed_ss(ct.tf([1, 1], [1]), dt=0.1), "needs a proper system"),
         (lambda: cr.design.pid(GROWING), "unstable"),
