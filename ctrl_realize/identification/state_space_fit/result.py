@@ -207,7 +207,7 @@ def fitted_system(
             seen["not_died_away"] = flagged(
                 "not_died_away", largest=largest, share=share, samples=longest
             )
-        if group[0].ninputs > 1 == group[0].noutputs:
+        if group[0].noutputs == 1 and group[0].ninputs > 1:
             advice = (
                 "process models of several inputs and one output count the colour of the noise: "
                 "identify(record, structures='FOPDT')"

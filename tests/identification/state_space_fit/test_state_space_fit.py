@@ -201,4 +201,5 @@ def test_gains_that_slow_noise_made_are_named_with_what_tells_them():
     assert "data end too early to determine the gain" in flags["not_died_away"]
     assert "identify(record, structures='FOPDT')" in flags["coloured_residual"]
     gains = cr.identify(record, structures="FOPDT").dcgain().ravel()
-    np.testing.assert_allclose(gains, [2, -1.2], rtol=0.1)
+    # half widths of their 95 % intervals: 0.10 and 0.13
+    np.testing.assert_allclose(gains, [2, -1.2], rtol=0, atol=0.13)
