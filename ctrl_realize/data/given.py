@@ -131,5 +131,5 @@ def check_inputs_move(records: Sequence[Record]) -> None:
     """
     ranges = np.max([np.ptp(np.atleast_2d(one.input), axis=1) for one in records], axis=0)
     if not ranges.all():
-        name = records[0].input_labels[int(np.argmin(ranges))]
-        raise DataError(f"the input {name!r} is constant; leave it out of the record")
+        way = "; leave it out of the record" if ranges.any() else ": there is nothing to fit"
+        raise DataError(f"the input {records[0].input_labels[ranges.argmin()]!r} is constant{way}")
