@@ -235,8 +235,8 @@ def test_the_apparent_dead_time_of_an_approximation_may_be_later_than_the_visibl
 
 
 @pytest.mark.parametrize("seed", [305, 329, 331])
-def test_the_interval_of_a_lead_beside_lags_is_that_of_its_likelihood(seed):
-    # lags that are found equal did not part along it: 16.4 was outside of 18.4 to 22
+def test_the_interval_of_a_lead_beside_lags_holds_it_where_lags_are_found_equal(seed):
+    # they did not part along the likelihood: 16.4 was outside of 18.4 to 22
     t = np.arange(400.0)
     u = np.select([t < 60, t < 120, t < 180], [0, 1.0, -1.0], 0.0)
     rng = np.random.default_rng(seed)

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 
 from ctrl_realize.numerics.signals.edges import despike, difference_noise, find_edges
-from ctrl_realize.numerics.signals.excitation import lively_start
+from ctrl_realize.numerics.signals.excitation import beyond_order_two, lively_start
 from ctrl_realize.numerics.signals.step_sequence import input_moves
 
 
@@ -121,3 +121,17 @@ def test_the_part_that_is_fitted_begins_where_the_inputs_move(level):
     short, late = np.r_[zeros(300), moving(100)], np.r_[zeros(999), 1.0]
     assert lively_start(level + short[None], 400) == 0
     assert lively_start(level + late[None], 300) == 700
+
+
+def test_what_obeys_a_recurrence_of_second_order_has_nothing_beyond_it():
+    t = np.arange(1000.0)
+    for signal in (np.sin(t / 7) + 3, 2 * t - 5, np.exp(-t / 300), np.sin(t / 200)):
+        assert beyond_order_two([signal]) == pytest.approx(0, abs=1e-12)
+    # as its docstring says
+    assert beyond_order_two([np.clip(t - 100, 0, None)]) == pytest.approx(0.003, abs=5e-4)
+    binary = np.repeat(np.random.default_rng(0).choice([-1.0, 1.0], 50), 20)
+    assert beyond_order_two([binary]) > 0.8
+    # two records of a sinusoid each: the moves over 7 samples of the slower one are beyond
+    fast, slow = (np.sin(7 * omega / 2) ** 2 for omega in (1 / 7, 1 / 30))
+    both = beyond_order_two([np.sin(t / 7), np.sin(t / 30)])
+    assert both == pytest.approx(slow / (fast + slow), rel=0.05)  # over no whole number of periods
