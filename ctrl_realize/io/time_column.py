@@ -172,8 +172,10 @@ def _since_first(
                 "time_zone= says otherwise, such as 'UTC'"
             )
             stamps = stamps - (np.arange(stamps.size) >= row)[::order] * np.timedelta64(hours, "h")
-    seconds = np.asarray((stamps - stamps[0]) / np.timedelta64(1, "ns") / 1e9, dtype=np.float64)
-    return TimeAxis(seconds, stamps[0] if stamps.dtype.kind == "M" else None, zone=zone)
+    dated = stamps.dtype.kind == "M"
+    since = stamps - (stamps[0] if dated else min(stamps[0], stamps[-1]))
+    seconds = np.asarray(since / np.timedelta64(1, "ns") / 1e9, dtype=np.float64)
+    return TimeAxis(seconds, stamps[0] if dated else None, zone=zone)
 
 
 def _refuse_other_clock(table: Table, index: int, dates: Dates, zone: str | None) -> None:
@@ -262,6 +264,12 @@ def _times_of_day(cells: list[str], unit: str, place: str) -> np.ndarray[Any, An
 
 
 def _in_turns(stamps: np.ndarray[Any, Any], turn: np.timedelta64) -> np.ndarray[Any, Any]:
-    """Times of a clock that falls back by most of a turn where a day, or a full hour, begins."""
-    turns = np.cumsum(np.diff(stamps) < -turn / 2)
-    return np.asarray(stamps + np.concatenate([[0], turns]) * turn)
+    """Times of a clock that falls back by most of a turn where a day, or a full hour, begins.
+
+    The newest sample may come first: then most steps are back, and it jumps ahead there.
+    """
+    steps = 2 * np.diff(stamps)
+    back = np.sum((-turn < steps) & (steps < 0 * turn)) + np.sum(steps > turn)
+    way = -1 if back > steps.size / 2 else 1
+    turns = np.cumsum(2 * np.diff(stamps[::way]) < -turn)
+    return np.asarray((stamps[::way] + np.concatenate([[0], turns]) * turn)[::way])

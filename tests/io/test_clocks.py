@@ -331,13 +331,18 @@ def test_the_zone_of_universal_time_may_be_in_words(tmp_path, form):
     np.testing.assert_array_equal(cr.read_record(path, time_zone="Europe/Berlin").time, t)
 
 
+@pytest.mark.parametrize("begin", ["2026-03-04 23:55", "2026-03-04 09:00"])
+@pytest.mark.parametrize("newest_first", [False, True])
 @pytest.mark.parametrize("form", ["%H:%M:%S", "%I:%M:%S %p", "%I:%M:%S.%f %p"])
-def test_times_of_day_go_on_across_midnight(tmp_path, form):
+def test_times_of_day_go_on_across_midnight(tmp_path, form, newest_first, begin):
     t = 2.0 * np.arange(300)
-    stamps = pd.Timestamp("2026-03-04 23:55") + pd.to_timedelta(t, unit="s")
+    stamps = pd.Timestamp(begin) + pd.to_timedelta(t, unit="s")
     rows = [f"{at},{k % 7},{k}" for k, at in enumerate(stamps.strftime(form))]
+    rows = rows[::-1] if newest_first else rows
     (tmp_path / "a.csv").write_text("\n".join(["Time,OP,PV", *rows]) + "\n")
-    np.testing.assert_array_equal(cr.read_record(tmp_path / "a.csv").time, t)
+    record = cr.read_record(tmp_path / "a.csv")
+    np.testing.assert_array_equal(record.time, t)
+    np.testing.assert_array_equal(record.output, np.arange(300))
 
 
 @pytest.mark.parametrize("start", ["0 s", "1 days 23:59:30", "-2 days"])
