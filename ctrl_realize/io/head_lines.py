@@ -8,7 +8,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ..errors import FileFormatError
-from .cells import DELIMITERS
+from .cells import DELIMITERS, kind_of
+from .units import is_units_line
 
 HEAD_BYTES = 1 << 18
 MAX_HEAD_LINES = 1000
@@ -33,8 +34,16 @@ class Line:
 
 
 def holds_cells(line: str, comment: str | None) -> bool:
-    """Whether a line is neither blank nor a comment."""
-    return bool(line.strip()) and not (comment and line.lstrip().startswith(comment))
+    """Whether a line is neither blank nor a comment.
+
+    A line that begins with the cell ``#N/A`` of Excel is none, nor one of units that begins with %.
+    """
+    text = line.strip()
+    if not text or not comment or not text.startswith(comment):
+        return bool(text)
+    first, between, _ = re.split(rf"([{_BETWEEN}])", f"{text}\t", maxsplit=1)
+    units = first == "%" and is_units_line(text.split(between))
+    return kind_of(first.strip(), ".") == "missing" or units
 
 
 def head_lines(path: Path, head: bytes, encoding: str, skip: int) -> list[Line]:

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from ...errors import FileFormatError, warn_caller
-from ..cells import ENDS, NUMBER, number_of, split_line
+from ..cells import ENDS, NUMBER, kind_of, number_of, split_line
 from ..head_lines import holds_cells
 from ..tables import Column, Table
 from ..text_options import TextOptions
@@ -62,13 +62,19 @@ def _parse(source: TextSource, layout: TextLayout) -> Any:
 
     path, head = source.path, layout.head
     separator = r"\s+" if head.delimiter == " " else head.delimiter
-    keywords: dict[str, Any] = {"low_memory": False}
+    keywords: dict[str, Any] = {"low_memory": False, "comment": head.comment}
     if not (head.delimiter + (head.comment or "")).isascii():
         # the faster parser accepts delimiters of one byte only
-        keywords = {"engine": "python"}
+        keywords = {"engine": "python", "comment": head.comment}
     elif tuple(map(int, pd.__version__.split(".")[:2])) < (3, 1):
         # the default of later versions; without it, the last digit could be wrong
         keywords["float_precision"] = "round_trip"
+    within = (cell for row in head.cells[layout.first :] for cell in row)
+    if head.comment and any(
+        cell.startswith(head.comment) and kind_of(cell, ".") == "missing" for cell in within
+    ):
+        # the parser would take what stands behind #N/A for a comment
+        keywords["comment"] = None
     try:
         with source.open(layout.encoding, newline="") as file:
             # Not by skiprows: the parser counts lines differently, and would leave out more.
@@ -78,7 +84,6 @@ def _parse(source: TextSource, layout: TextLayout) -> Any:
                 sep=separator,
                 decimal=head.decimal[0],
                 header=None,
-                comment=head.comment,
                 # numbers are ASCII in all encodings here; a wrong character in a name is harmless
                 skipinitialspace=True,
                 # an empty cell or "NaN" makes its column text, and is reported there

@@ -34,9 +34,6 @@ _SAMPLE_LINES = 60
 _FEWEST_NUMBERS = 0.3
 """Smallest fraction of the cells of a table that are numbers or times."""
 
-_CLEAR = 0.8
-"""Fraction above which another delimiter than blanks is clear."""
-
 _BOMS = (
     (codecs.BOM_UTF8, "utf-8-sig"),
     # before that of UTF-16, which is its beginning
@@ -129,8 +126,11 @@ def _encoding(path: Path, head: bytes) -> str:
 
 
 def _comment(lines: list[str]) -> str | None:
-    starts = Counter(line.lstrip()[0] for line in lines if line.strip())
-    return max("#%", key=lambda sign: starts[sign]) if starts["#"] + starts["%"] else None
+    counts = {
+        sign: sum(bool(line.strip()) and not holds_cells(line, sign) for line in lines)
+        for sign in "#%"
+    }
+    return max(counts, key=lambda sign: counts[sign]) if any(counts.values()) else None
 
 
 def _delimiter_and_decimal(path: Path, sample: list[str], options: TextOptions) -> tuple[str, str]:
@@ -139,8 +139,8 @@ def _delimiter_and_decimal(path: Path, sample: list[str], options: TextOptions) 
     notations = [one for one in options.notations if not one[1:] or one[1:] in text]
     best, best_score = ("", ""), (0.0, 0.0, False)
     for delimiter in delimiters:
-        if delimiter == " " and best_score[1] > _CLEAR and best_score[2]:
-            continue  # blanks within cells, as in dates
+        if delimiter == " " and best_score[2] and _blanks_inside(sample, *best):
+            continue
         rows = [split_line(line, delimiter) for line in sample]
         width = Counter(map(len, rows)).most_common(1)[0][0]
         for notation in notations:
@@ -158,3 +158,14 @@ def _delimiter_and_decimal(path: Path, sample: list[str], options: TextOptions) 
             f"{sample[0][:60]!r}; try delimiter=, decimal= and skip_rows="
         )
     return best
+
+
+def _blanks_inside(sample: list[str], delimiter: str, notation: str) -> bool:
+    """Whether blanks are parts of cells, as in dates and remarks, and do not separate numbers."""
+    return not any(
+        kind_of(cell, notation) == "text"
+        and all(kind_of(word, notation) in FILLED for word in cell.split())
+        for line in sample
+        for cell in split_line(line, delimiter)
+        if " " in cell
+    )
