@@ -122,6 +122,7 @@ def read_frf(
     table = read_table(path, TextOptions.among(given), variable=variable, max_bytes=max_bytes)
     columns = _columns(table, given)
     check_lengths(table, columns.values())
+    _check_unit_of_std(table, columns)
     coherences, stds = (
         table.numbers(columns[key]) if key in columns else None for key in ("coherence", "std")
     )
@@ -202,6 +203,25 @@ def _frequency_hz(table: Table, index: int, unit: str | None) -> FloatArray:
             "'Hz', 'kHz', 'MHz' or 'rad/s'"
         )
     return table.numbers(index) * _IN_HZ[unit]
+
+
+def _check_unit_of_std(table: Table, columns: Mapping[str, int]) -> None:
+    """Refuse a standard deviation that is not in the unit of the response.
+
+    Raises
+    ------
+    OptionError
+    """
+    if (index := columns.get("std")) is None:
+        return
+    unit = plain_unit(table.columns[index].unit)
+    others = {plain_unit(table.columns[at].unit) for part, at in columns.items() if part != "std"}
+    if unit in ("db", "deg", "rad") or (unit == "%" and unit not in others):
+        raise OptionError(
+            f"{table.at(index)} is in {unit!r}; expected the standard deviation of the complex "
+            "response in its own unit. Convert it, 1 % of a response G being 0.01 |G| and 1 dB "
+            "0.115 |G|, or rename the column to leave it out"
+        )
 
 
 def _response(

@@ -153,6 +153,18 @@ def test_coherence_and_std_come_along_and_a_cut_last_line_does_not(tmp_path):
         check(read_frf(file))
 
 
+@pytest.mark.parametrize("unit", ["dB", "%", "deg"])
+def test_a_std_in_another_unit_than_the_response_is_refused(tmp_path, unit):
+    # 0.1 dB of a response of 0.1 was read as a std of 0.1
+    file = tmp_path / "a.csv"
+    head = f"f [Hz],gain [dB],phase [deg],std [{unit}]"
+    file.write_text(written(head, F, 20 * np.log10(abs(G)), np.angle(G, deg=True), 0.1 + 0 * F))
+    with pytest.raises(OptionError, match="standard deviation of the complex response"):
+        read_frf(file)
+    file.write_text(file.read_text().replace("std", "spread"))
+    check(read_frf(file))
+
+
 def test_every_measured_frequency_response_is_read(shared_data):
     files = list(shared_data.rglob("*frf*.csv"))
     assert len(files) >= 5
