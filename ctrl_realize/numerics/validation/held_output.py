@@ -75,10 +75,8 @@ def updates(output: FloatArray, inputs: FloatArray) -> BoolArray:
     # Steps of one size are those of a converter, which an even ramp passes at equal distances.
     if at.size < _FEWEST or np.ptp(sizes) <= rounding or _static(output, inputs, at, rounding):
         return ~new
-    bends = 1 + np.flatnonzero(np.abs(np.diff(output, 2)) > 2 * rounding)
-    if bends.size <= 2 * np.count_nonzero(np.diff(inputs).any(axis=0)):
-        bends = at  # those of an integrator
-    for some in (at, bends):
+    kinks = 2 * int(np.count_nonzero(np.diff(inputs).any(axis=0)))
+    for some in (at, _bends(output, kinks, 2 * rounding)):
         period = int(np.gcd.reduce(np.diff(some)))
         if period > 1 and some.size >= _FEWEST_UPDATES:
             new[some[0] % period :: period] = True
@@ -92,6 +90,19 @@ def updates(output: FloatArray, inputs: FloatArray) -> BoolArray:
     large = sizes.min() > _BAND * np.nanmax(output) - _BAND * np.nanmin(output)
     even = np.diff(at).max() <= _EVEN * np.median(np.diff(at)) and at.size >= _FEWEST_UPDATES
     return new if rare and various and (large or even) else np.ones_like(new)
+
+
+def _bends(output: FloatArray, kinks: int, rounding: float) -> IntArray:
+    """Samples at which the slope changes most; none if these may be so many kinks of a response.
+
+    An interpolated output is straight elsewhere, but for the digits of its file.
+    """
+    turns = np.nan_to_num(np.abs(np.diff(output, 2)))
+    most = np.sort(np.argsort(turns)[-_FEWEST_UPDATES:])
+    elsewhere = np.ones_like(turns, dtype=np.bool_)
+    elsewhere[most[0] % (period := int(np.gcd.reduce(np.diff(most)))) :: period] = False
+    bends = np.count_nonzero(turns > turns[elsewhere].max(initial=rounding))
+    return 1 + most if bends > max(kinks, _FEWEST_UPDATES - 1) else most[:0]
 
 
 def _static(output: FloatArray, inputs: FloatArray, at: IntArray, rounding: float) -> bool:

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
 from ctrl_realize.numerics.validation.held_output import (
     held_share,
@@ -89,6 +90,25 @@ def test_updates_at_about_equal_distances_and_those_of_a_dead_band_are_found():
     new = np.isin(TIME, [*stored, 299])
     held = noisy[np.maximum.accumulate(np.where(np.isin(TIME, stored), TIME, 0))]
     assert np.array_equal(updates(held, STEP), new)
+
+
+@pytest.mark.parametrize("digits", [16, 6, 3])
+@pytest.mark.parametrize(("period", "first"), [(2, 1), (6, 0), (10, 7)])
+def test_updates_of_an_interpolated_output_are_found_behind_the_digits_of_a_file(
+    period, first, digits
+):
+    # with 3 or 6 digits none was found: 7 of 21 good dead times were wrong
+    noisy = RISE + 0.03 * np.random.default_rng(6).standard_normal(300)
+    new = (TIME - first) % period == 0
+    between = np.interp(TIME, TIME[new], noisy[new])
+    assert np.array_equal(updates(np.round(between, digits), STEP), new)
+
+
+def test_kinks_of_a_response_to_an_input_that_moves_at_even_times_are_no_updates():
+    levels = np.repeat(np.random.default_rng(7).uniform(-1, 1, 30), 10)
+    for signs in (levels, np.sign(levels)):
+        response = lfilter([0.1], [1, -0.9], np.append(np.zeros(3), signs[:-3]))
+        assert updates(np.round(response, 6), signs[None]).all()
 
 
 def test_noise_steps_of_a_converter_an_even_ramp_and_a_gain_are_no_updates():
