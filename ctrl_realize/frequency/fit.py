@@ -96,7 +96,8 @@ def fit_frf(
     Notes
     -----
     Standard deviations from few repeats are themselves uncertain. With 50 points or more they are
-    smoothed over nine neighbours (geometric mean) before they weight the points.
+    smoothed over nine neighbours (geometric mean) before they weight the points; with fewer they
+    are moved towards that mean as far as the number of repeats explains their scatter [6]_.
 
     If the noise is not known, the standard deviations of the poles are computed from the residuals
     of the individual points [3]_: poles that depend on a noisy part of the band are more uncertain.
@@ -122,6 +123,9 @@ def fit_frf(
        Springer 2002, chapter 4, doi:10.1007/b97636.
     .. [5] R. Pintelon and J. Schoukens, System Identification: A Frequency Domain Approach, 2nd
        ed., Wiley 2012, chapter 9, doi:10.1002/9781118287422.
+    .. [6] G. K. Smyth, Linear models and empirical Bayes methods for assessing differential
+       expression in microarray experiments, Stat. Appl. Genet. Mol. Biol. 3 (2004) article 3,
+       doi:10.2202/1544-6115.1027.
 
     Examples
     --------

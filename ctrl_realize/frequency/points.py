@@ -1,4 +1,11 @@
-"""Points of a frequency response: values, standard deviations, and the hold of a sampled input."""
+"""Points of a frequency response: values, standard deviations, and the hold of a sampled input.
+
+References
+----------
+.. [1] G. K. Smyth, Linear models and empirical Bayes methods for assessing differential expression
+   in microarray experiments, Stat. Appl. Genet. Mol. Biol. 3 (2004) article 3, section 6.2,
+   doi:10.2202/1544-6115.1027.
+"""
 
 from __future__ import annotations
 
@@ -7,6 +14,7 @@ from typing import Any
 
 import control as ct
 import numpy as np
+from scipy.special import digamma, polygamma
 
 from .._checks import band, check_type, one_of
 from .._flags import Flag, flagged
@@ -77,7 +85,7 @@ def frf_points(
             "the unit and the values)"
         )
     points = points.only(usable)
-    sigma, known = _sigma(points.response, points.std, points.coherence, weighting)
+    sigma, known = _sigma(points, weighting)
     if known:
         _check_signal(points.response, sigma)
     assumed = weighting == "auto" and not known and points.coherence is None
@@ -95,16 +103,16 @@ def _check_signal(response: ComplexArray, sigma: FloatArray) -> None:
         )
 
 
-def _sigma(
-    response: ComplexArray, std: FloatArray | None, coherence: FloatArray | None, weighting: str
-) -> tuple[FloatArray, bool]:
+def _sigma(points: MeasuredPoints, weighting: str) -> tuple[FloatArray, bool]:
     """Return the standard deviation of each point, and whether it was measured."""
+    response, std, coherence = points.response, points.std, points.coherence
     if weighting in ("auto", "std") and std is not None and np.any(std > 0):
         # no measurement is accurate to the last digits
         usual = float(np.median(std[std > 0]))
         least = max(1e-3 * usual, 1e-14 * float(np.abs(response).max()))
         # A deviation of zero is one that was not measured, as of a single repeat.
-        return _smoothed(np.maximum(np.where(std > 0, std, usual), least)), True
+        std = np.maximum(np.where(std > 0, std, usual), least)
+        return _smoothed(std, points.repeats), True
     if weighting == "std":
         raise OptionError("weighting='std', but the FRF has no standard deviation")
     if weighting == "uniform":
@@ -116,14 +124,26 @@ def _sigma(
     return np.asarray(sigma, dtype=np.float64), False
 
 
-def _smoothed(std: FloatArray) -> FloatArray:
-    """Smooth uncertain standard deviations along frequency if there are many points."""
-    if std.size < _MANY_POINTS:
+def _smoothed(std: FloatArray, repeats: float | None) -> FloatArray:
+    """Smooth uncertain standard deviations along frequency.
+
+    Of many points each is replaced by the mean of its neighbours. Of fewer, the number of repeats
+    tells how much their logarithms are biased and scatter: they are moved towards that mean as far
+    as this explains their distances from it [1]_.
+    """
+    many = std.size >= _MANY_POINTS
+    if not many and repeats is None:
         return std
-    half = _SMOOTHED_POINTS // 2
-    padded = np.pad(np.log(std), half, mode="reflect")
-    kernel = np.full(_SMOOTHED_POINTS, 1 / _SMOOTHED_POINTS)
-    return np.asarray(np.exp(np.convolve(padded, kernel, mode="valid")))
+    half = (min(_SMOOTHED_POINTS, std.size) - 1) // 2
+    kernel = np.full(2 * half + 1, 1 / (2 * half + 1))
+    log = np.log(std)
+    mean = np.convolve(np.pad(log, half, mode="reflect"), kernel, mode="valid")
+    if many or repeats is None:
+        return np.asarray(np.exp(mean))
+    low = 0.5 * float(digamma(repeats - 1) - np.log(repeats - 1))
+    scatter = 0.25 * float(polygamma(1, repeats - 1))
+    beyond = max(float(np.mean((log - mean) ** 2)) / (1 - kernel[0]) - scatter, 0.0)
+    return np.asarray(np.exp(mean - low + beyond / (beyond + scatter) * (log - mean)))
 
 
 @dataclass(frozen=True, eq=False)
