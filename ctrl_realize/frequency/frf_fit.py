@@ -181,10 +181,14 @@ class FRFFit(FractionalDelayFit):
 
     @property
     def gain_resolved(self) -> bool:
-        """Whether the points tell the slowest poles from integrators, and so the gain."""
-        slow = np.abs(self.poles) < 2 * np.pi * self.frequency_hz[0]
-        slow[:1] = True
-        return not np.any(slow & (Z_95 * self.pole_std > np.abs(self.poles)))
+        """Whether the points tell the slowest poles from integrators, and so the gain.
+
+        A pole within the band that a zero nearly cancels is uncertain while the gain is known.
+        """
+        uncertain = Z_95 * self.pole_std > np.abs(self.poles)
+        if np.any(uncertain & (np.abs(self.poles) < 2 * np.pi * self.frequency_hz[0])):
+            return False
+        return not uncertain[:1].any() or Z_95 * self._gain_std < abs(self.gain)
 
     def table(self) -> pd.DataFrame:
         """List the structures that were tried, best first."""

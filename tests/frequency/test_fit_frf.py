@@ -399,6 +399,16 @@ def test_direct_term_is_fitted_and_its_delay_rounded_and_said():
     assert model.fit.flags[0].code == "dead_time_rounded"
 
 
+def test_poles_beside_zeros_in_the_band_do_not_hide_the_gain_of_accurate_points():
+    # two equal poles in noise of a millionth: order 4, whose poles are uncertain by far
+    f = np.geomspace(0.01, 3, 50)
+    exact = np.exp(-0.7 * 2j * np.pi * f) / (1 + 2j * np.pi * f) ** 2
+    noise = np.random.default_rng(0).standard_normal((2, 50))
+    fit = cr.fit_frf(cr.MeasuredFRF(exact * (1 + 1e-6 * (noise[0] + 1j * noise[1])), f)).fit
+    assert "gain_not_resolved" not in {flag.code for flag in fit.flags}
+    assert fit.gain == pytest.approx(1, abs=1e-6)
+
+
 def repeated(seed, repeats, count=35):
     """Mean of the repeats of a lag behind a dead time in white noise, with their scatter."""
     rng = np.random.default_rng(seed)
