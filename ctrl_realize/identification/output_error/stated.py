@@ -18,10 +18,6 @@ from .flags import dead_time_of
 from .result import OutputErrorFit
 from .words import Stated, order_words
 
-_SAMPLES, _PART = 0.5, 0.05
-"""Samples, and part of a stated range, from an end at which a dead time is compared with the fit
-without the range. It costs time; whether the two contradict each other, their intervals say."""
-
 
 def checked_statements(fastest_lag: Any, dead_time: Any, **others: Any) -> Stated:
     """Check the statements; `others` are arguments beside which there is none.
@@ -71,8 +67,8 @@ def told(
         # It was not max_delay that ended the search.
         flags = [flag for flag in flags if flag.code != "delay_at_bound"]
         estimate = replace(estimate, low=max(estimate.low, low), high=min(estimate.high, high))
-        ends = fit.dead_time - low, high - fit.dead_time
-        if min(ends) <= max(_SAMPLES * fit.dt, _PART * (high - low)):
+        # Where the range ends the interval, the record may contradict it.
+        if estimate.low == low or estimate.high == high:
             without = again().interval
             if without[0] > high or without[1] < low:
                 said = interval_in_time(low, high), interval_in_time(*without)

@@ -80,6 +80,18 @@ def test_a_stated_range_that_the_data_contradict_is_told(record, within):
     assert "the data contradict it" in fit.report()
 
 
+def test_a_contradicted_range_is_told_though_the_dead_time_is_not_at_its_end():
+    # a zero and a fast lag make up for 9 s too many: 19.92 s in 19.3 to 25.4 s, all verdicts good
+    t, rng = np.arange(222.0), np.random.default_rng(5)
+    slow, fast, after = 23.8, 6.6, np.clip(np.arange(222.0) - 60.2, 0, None)
+    response = 1 - (slow * np.exp(-after / slow) - fast * np.exp(-after / fast)) / (slow - fast)
+    record = cr.Record(t, 10.0 * (t >= 50), 20 * response + 0.1 * rng.standard_normal(222))
+    fit = cr.identify(record, dead_time=(19.3, 25.4)).fit
+    assert fit.dead_time > 19.8
+    assert "the data contradict it" in fit.report()
+    assert "good" not in {verdict.level for verdict in fit.verdicts}
+
+
 def test_statements_hold_for_any_input_and_for_a_frequency_response():
     rng = np.random.default_rng(5)
     u = np.repeat(rng.choice([-1.0, 1.0], 40), 10)
