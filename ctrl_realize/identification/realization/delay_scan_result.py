@@ -120,6 +120,7 @@ class DelayScan(ImpulseFit):
             ("tried", f"0...{self.max_delay} samples of {in_time(self.dt, 6)}"),
             ("order", f"{self.order}"),
             ("samples after each delay", f"{self.samples}"),
+            *self._rows_before(),
             ("feedthrough D", "G[d]" if self.feedthrough else "0"),
             ("smallest IAE", f"{self.iae[self.delay]:.4g}"),
             ("IAE without delay", f"{self.contrast:.3g} times the smallest"),

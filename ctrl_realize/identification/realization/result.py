@@ -40,6 +40,17 @@ class ImpulseFit(ModelFit):
         step = self.impulse.step
         return () if step is None or step.record is None else (step.record,)
 
+    def _rows_before(self) -> list[tuple[str, str]]:
+        """Tell which part of the static gain is in the response before the delay, as by a filter.
+
+        It is not in the model.
+        """
+        whole = channels(self.impulse).sum(axis=-1)
+        if whole.size > 1 or not self.delay or not whole.item():
+            return []
+        left = 100 * self.impulse.markov[..., : self.delay].sum() / whole.item()
+        return [("before the delay", f"{left:.2g} % of the sum of G, not in the model")]
+
 
 @dataclass(frozen=True, eq=False)
 class Realization(ImpulseFit):
@@ -137,6 +148,7 @@ class Realization(ImpulseFit):
             ("feedthrough D", f"G[{self.delay}]" if self.feedthrough else "0"),
             ("singular values", f"{values} (next {self.next_singular_value:.4g})"),
             ("sum of |error|", f"{self.iae:.4g}"),
+            *self._rows_before(),
         ]
         if self.error_bound is not None:
             rows.append(("error bound", f"{self.error_bound:.4g} at any frequency"))
