@@ -20,7 +20,7 @@ from ...numerics.constants import SMALLEST
 from ...numerics.engine.modal import partial_fractions
 from ...numerics.engine.poles import lag_sum
 from ...numerics.engine.profile import profile_limits
-from ...numerics.engine.static_gain import INTEGRATOR
+from ...numerics.engine.static_gain import INTEGRATOR, NEARLY_STRAIGHT
 from ...numerics.output_error.margins import CLOSE, DecisionKey
 from ...numerics.output_error.result import (
     AT_BOUND,
@@ -188,7 +188,7 @@ def _extrapolated(fit: OutputErrorEstimate, length: float) -> Iterator[Flag]:
         left = float(np.real(np.exp(fit.poles * seen) @ residues[0] @ fit.numerator))
         reached = 1 + left / (gain[0] * fit.numerator[0])
         ends = f"the record ends at {plainly(100 * reached, 2)} % of the response"
-    unresolved = list(_unresolved_gain(fit, ends and f"; {ends}"))
+    unresolved = list(_unresolved_gain(fit, length, ends and f"; {ends}"))
     yield from unresolved
     if ends and not unresolved:
         periods = 2 * np.pi / np.maximum(np.abs(unseen.imag), SMALLEST)
@@ -207,7 +207,7 @@ def _not_died_away(poles: ComplexArray, seen: float) -> ComplexArray:
     return poles[slow & (np.abs(poles.imag) * seen < 2 * np.pi)]
 
 
-def _unresolved_gain(fit: OutputErrorEstimate, ends: str) -> Iterator[Flag]:
+def _unresolved_gain(fit: OutputErrorEstimate, length: float, ends: str) -> Iterator[Flag]:
     """Report that gain or total delay are not determined: structures differ, or the sign is open.
 
     The sign is determined if the interval of the gain does not contain zero (`sign_is_told`);
@@ -228,6 +228,9 @@ def _unresolved_gain(fit: OutputErrorEstimate, ends: str) -> Iterator[Flag]:
     total = fit.dead_time + lag_sum(fit.poles, fit.numerator)
     gains = np.array([gain, *(line.gain for line in kept)])
     totals = np.array([total, *(line.total_delay for line in kept)])
+    slowest = np.array([np.abs(one.poles).min() for one in (fit, *kept)])
+    if slowest[0] * length < INTEGRATOR and slowest.max() * length < NEARLY_STRAIGHT:
+        gains, totals = gains * slowest, totals - 1 / slowest  # those of a slope
     if not fit.robust and (_apart(gains) or _apart(totals)):
         low, high, between = gains.min(), gains.max(), interval_in_time(totals.min(), totals.max())
         yield flagged("gain_not_resolved", low=low, high=high, totals=between, ends=ends)

@@ -36,6 +36,10 @@ INTEGRATOR = 5e-3
 """Poles slower than this, times the length of the record, cannot be distinguished from integrators:
 over the record they bend by an eighth of that, 0.06 % of the excursion."""
 
+NEARLY_STRAIGHT = 0.1
+"""The same of lags that may be integrators: they bend by 1.2 % of the excursion. Of 16 loops
+about an integrator nine had a lag of 4 to 137 records in its place, with a gain of any size."""
+
 SIGNIFICANT = Z_95  # standard errors: a gain of less may as well be none, or have the other sign
 
 _STEP = 1e-4  # of logarithms, and part of a numerator: for slopes by differences

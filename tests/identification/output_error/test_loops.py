@@ -346,3 +346,31 @@ def test_loads_are_told_with_their_sizes_and_times():
 def test_noise_is_not_taken_for_a_load(case):
     fit = cr.identify(loop(case, seed=0), structures="P2D").fit
     assert not [reason for reason in fit.choices if "loads at" in reason]
+
+
+def integrating_loop(dead_time, lag, slope, seed, samples=900):
+    """PI loop about an integrator behind a lag and a dead time of whole samples, in white noise."""
+    noise = 0.03 * np.random.default_rng(seed).standard_normal(samples)
+    wanted = np.select([np.arange(samples) < k for k in (80, 300, 520, 740)], [0, 1, 0, 1], 0)
+    slow = max(2 * dead_time, 10) + dead_time
+    integral = 2 * slow + lag
+    gain = 0.7 * integral / (slope * slow**2)
+    u, y, summed, fast, level = np.zeros(samples), np.zeros(samples), 0.0, 0.0, 0.0
+    for k in range(samples):
+        y[k] = level + noise[k]
+        summed += gain * (wanted[k] - y[k]) / (2 * integral)
+        u[k] = gain * (wanted[k] - y[k]) + summed
+        late = u[k - dead_time] if k >= dead_time else 0.0
+        level += slope * (late + (fast - late) * lag * -np.expm1(-1 / lag))
+        fast = late + (fast - late) * np.exp(-1 / lag)
+    return cr.Record(np.arange(samples) + 0.0, u, y, reference=wanted + 0.0)
+
+
+@pytest.mark.parametrize("case", [(9, 13.5, 0.054), (12, 3.2, 0.164), (11, 14.6, 0.077)])
+def test_an_integrator_in_a_loop_has_a_slope_and_no_gain_of_any_size(case):
+    # a lag of 15 to 137 records was in its place, one with a gain of 6707 (6677 to 6736)
+    fit = cr.identify(integrating_loop(*case, seed=3)).fit
+    assert fit.integrators == 1
+    assert fit.interval[0] <= case[0] <= fit.interval[1]
+    assert fit.gain_interval[0] <= case[2] <= fit.gain_interval[1]
+    assert {"integrating", "gain_not_resolved"} & codes(fit) == {"integrating"}

@@ -33,7 +33,8 @@ from ...engine.eliminate import evaluate
 from ...engine.plausible_models import PlausibleDraw
 from ...engine.problem import Structure
 from ...engine.profile import profile_curve, profile_limits
-from ...engine.structures import Candidate
+from ...engine.static_gain import NEARLY_STRAIGHT
+from ...engine.structures import SLOWEST, Candidate
 from ...engine.window_fit import RAMP, WindowFit, clipped, has_outliers
 from ...families.form_fit import fit_form
 from ...families.lag_profiles import with_profiled_lags
@@ -135,6 +136,7 @@ def fit_lags(
         first, last = min(first, low), max(last, high)
     std = float(np.sqrt(np.sum(weights * (dead_times - mean) ** 2)))
     chosen = _with_dead_time(fits, mean, forms, fitted)
+    chosen = chosen if requested.forms else _integrating(fits, chosen)
     curves = {
         one.structure: profile_curve(points, one, fits.variance, scales)
         for one, points in zip(fitted, profiles, strict=False)
@@ -337,6 +339,19 @@ def _with_dead_time(
         found[one.structure] = Candidate(one.structure, there.parameters, there.cost)
     values = fits.criteria(found)
     return found[min(values, key=lambda structure: values[structure])]
+
+
+def _integrating(fits: WindowFit, chosen: Candidate) -> Candidate:
+    """Take a lag far slower than the records for an integrator where that is no worse (BIC)."""
+    length = fits.scales.length
+    if float(np.abs(chosen.poles).min()) * length >= NEARLY_STRAIGHT:
+        return chosen
+    fixed = {"dead_time": chosen.dead_time, "lag_1": length / SLOWEST}
+    form = ProcessForm("P1DI", chosen.structure.order, fixed=fixed)
+    slope = fit_form(fits.problem, form, fits.scales, [chosen])
+    if slope.cost - chosen.cost > fits.penalty * fits.variance:
+        return chosen
+    return Candidate(chosen.structure, slope.parameters, slope.cost)
 
 
 def _with_noise(fits: WindowFit, lags: Sequence[Candidate]) -> WindowFit:
