@@ -178,3 +178,26 @@ def test_names_of_states_stay_apart_in_products_and_with_copies():
         assert kept.delay_free.state_labels == ["a", "b"]
         assert kept.repr_format == "eval"
     assert S.replace(delay=1).state_labels == ["a", "b", "u[k-1]"]
+
+
+def test_margin_counts_a_phase_of_180_degrees_at_an_end_of_the_axis():
+    # at z = -1, and at z = 1 of a negative static gain: 91 of 176 were too large, or infinite
+    rng = np.random.default_rng(0)
+    checked = 0
+    while checked < 40:
+        n = int(rng.integers(1, 4))
+        A = rng.standard_normal((n, n))
+        A *= rng.uniform(0.3, 0.95) / np.abs(np.linalg.eigvals(A)).max()
+        core = ct.ss(A, rng.standard_normal((n, 1)), 0.2 * rng.standard_normal((1, n)), 0, 0.1)
+        sys = cr.delayed_ss(core, int(rng.integers(0, 5)))
+        margin = ct.margin(sys)[0]
+        if not 0.05 < margin < 20:
+            continue
+        # the loop is on the border of stability there: a pole on the unit circle
+        loop = ct.ss(sys.A, margin * sys.B, sys.C, margin * sys.D, 0.1).feedback()
+        assert np.abs(np.abs(loop.poles()) - 1).min() < 1e-5
+        stable = np.abs(ct.ss(sys.A, sys.B, sys.C, sys.D, 0.1).feedback().poles()).max() < 1
+        if stable:
+            # it takes a cubic spline through points that are 0.1 rad apart
+            assert margin == pytest.approx(cr.design.margins(sys).gain_margin, rel=1e-4)
+        checked += 1

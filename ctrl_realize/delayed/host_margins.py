@@ -10,7 +10,7 @@ import numpy as np
 from scipy.optimize import brentq
 
 from .._checks import real
-from ..numerics.arrays import ComplexArray, FloatArray
+from ..numerics.arrays import BoolArray, ComplexArray, FloatArray
 from ..numerics.internal_delays.form import DelayForm
 from ..numerics.internal_delays.stability import grid, grid_about
 from ..numerics.loops.crossings import follow
@@ -24,6 +24,11 @@ spline of python-control is then accurate to 1e-6."""
 DECIDES = 0.2
 """Least relative gain that matters for a margin; beyond the last frequency with such a gain the
 response is left out."""
+
+
+STRAIGHT = 10.0
+"""Real over imaginary part from which on a response is taken for that at an end of the axis: that
+of an integrator is not, which is far above any margin there."""
 
 
 class HostMargins(DeferredMatrices):
@@ -49,7 +54,7 @@ class HostMargins(DeferredMatrices):
             More than one input or output.
         """
         check_single(self, "a margin")
-        omega, values = self._followed()
+        omega, values = _with_mirrored_ends(*self._followed(), float(self.dt or 0))
         return iter((np.abs(values), np.degrees(np.unwrap(np.angle(values))), omega))
 
     def _followed(self) -> tuple[FloatArray, ComplexArray]:
@@ -124,6 +129,30 @@ def _last(values: ComplexArray) -> int:
     size = np.abs(values)
     across = (values.imag[1:] < 0) != (values.imag[:-1] < 0)
     across &= values.real[1:] + values.real[:-1] < 0
-    level = DECIDES * min(1.0, float(size[1:][across].max(initial=0.0)) or 1.0)
+    real = np.append(size[1:][across], size[[0, -1]][_is_negative(values[[0, -1]])])
+    level = DECIDES * min(1.0, float(real.max(initial=0.0)) or 1.0)
     (above,) = np.nonzero(~(size < level))
     return int(above[-1]) + 3 if above.size else values.size
+
+
+def _is_negative(values: ComplexArray) -> BoolArray:
+    """Whether values at an end are real, up to the distance of a grid from it, and negative."""
+    return np.asarray(values.real < -STRAIGHT * np.abs(values.imag))
+
+
+def _with_mirrored_ends(
+    omega: FloatArray, values: ComplexArray, dt: float
+) -> tuple[FloatArray, ComplexArray]:
+    """Add a conjugate beyond the ends: a phase of -180 degrees there is between two points then.
+
+    python-control looks for its crossings between points alone.
+    """
+    end = np.pi / dt if dt else np.inf
+    if omega[-1] > (1 - 1e-9) * end:
+        inside = omega[:-1]
+        omega = np.append(inside, 2 * end - inside[-1])
+        values = np.append(values[:-1], values[-2].conj())
+    if _is_negative(values[:1])[0]:
+        omega = np.append(-omega[0], omega)
+        values = np.append(values[0].conj(), values)
+    return omega, values

@@ -228,9 +228,9 @@ def _unresolved_gain(fit: OutputErrorEstimate, length: float, ends: str) -> Iter
     total = fit.dead_time + lag_sum(fit.poles, fit.numerator)
     gains = np.array([gain, *(line.gain for line in kept)])
     totals = np.array([total, *(line.total_delay for line in kept)])
-    slowest = np.array([np.abs(one.poles).min() for one in (fit, *kept)])
-    if slowest[0] * length < INTEGRATOR and slowest.max() * length < NEARLY_STRAIGHT:
-        gains, totals = gains * slowest, totals - 1 / slowest  # those of a slope
+    rates = np.array([np.abs(poles).min() for poles in (fit.poles, *(line.poles for line in kept))])
+    if rates[0] * length < INTEGRATOR and rates.max() * length < NEARLY_STRAIGHT:
+        gains, totals = gains * rates, totals - 1 / rates  # those of a slope
     if not fit.robust and (_apart(gains) or _apart(totals)):
         low, high, between = gains.min(), gains.max(), interval_in_time(totals.min(), totals.max())
         yield flagged("gain_not_resolved", low=low, high=high, totals=between, ends=ends)
