@@ -33,7 +33,7 @@ from .eliminate import eliminate
 from .poles import poles_from_parameters
 from .problem import Bounds, Family, Structure
 from .static_gain import LocalErrors, local_errors
-from .structures import Candidate, parameter_bounds
+from .structures import Candidate, Scales, parameter_bounds
 from .window_fit import WindowFit
 
 COUNT = 39
@@ -141,7 +141,9 @@ def _about(
         chances = np.cumsum(np.exp(np.minimum(value + 0.5 * np.sum(moves**2, axis=1), 0.0)))
         places = (np.arange(count) + rng.random()) / count * chances[-1]
         chosen = np.searchsorted(chances, places).clip(0, len(tried) - 1)
-        return [_model(tried[k], found.numerator[k]) for k in chosen]
+        plain = Candidate(structure.plain, theta, candidate.cost)
+        errors = local_errors(problem, plain, numerator, scales.length)
+        return _models(plain, tried[chosen], found.numerator[chosen], errors, variance, scales, rng)
     bounds = parameter_bounds(structure, scales)
     rows = _WIDER * _directions(covariance[:n, :n], widest[:n])
 
@@ -163,14 +165,30 @@ def _about(
         places = (np.arange(count) + rng.random()) / count * weight.sum()
         drawn = tried[np.searchsorted(np.cumsum(weight), places).clip(0, len(tried) - 1)]
     there = eliminate(problem, structure, drawn).numerator
-    # The error of the numerator beside given poles is one of gain, and grows with their product;
-    # with a pole slower than the record it is one of slope, and does not.
-    given = variance * LocalErrors(errors.slopes[:, n:], errors.own).covariance()
-    beside = rng.standard_normal((count, free)) @ _directions(given, np.full(free, np.inf))
+    return _models(candidate, drawn, there, errors, variance, scales, rng)
+
+
+def _models(
+    fit: Candidate,
+    drawn: FloatArray,
+    numerator: FloatArray,
+    errors: LocalErrors,
+    variance: float,
+    scales: Scales,
+    rng: np.random.Generator,
+) -> list[PlausibleModel]:
+    """Add the error of their numerators (B, k) to models drawn about a fit.
+
+    The error of the numerator beside given poles is one of gain, and grows with their product; with
+    a pole slower than the record it is one of slope, and does not.
+    """
+    free = numerator.shape[1]
+    given = variance * LocalErrors(errors.slopes[:, drawn.shape[1] :], errors.own).covariance()
+    beside = rng.standard_normal((len(drawn), free)) @ _directions(given, np.full(free, np.inf))
     slowest = 1 / scales.length
-    own = np.prod(np.abs(candidate.poles) + slowest)
+    own = np.prod(np.abs(fit.poles) + slowest)
     scale = np.prod(np.abs(poles_from_parameters(drawn[:, 1:])[0]) + slowest, axis=1) / own
-    return [_model(*pair) for pair in zip(drawn, there + scale[:, None] * beside, strict=True)]
+    return [_model(*pair) for pair in zip(drawn, numerator + scale[:, None] * beside, strict=True)]
 
 
 def _stretched(
