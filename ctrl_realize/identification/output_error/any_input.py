@@ -32,6 +32,9 @@ from .sensor_flags import missing_code
 from .summary import choices_of
 
 _SOUGHT_THEN = 2.0  # times as far where nothing explains the output, or a dead time is at the bound
+_LEAST_REST, _STILL = 20, 3.0
+"""Samples before the first move of the input, and standard errors by which the halves of the output
+there may differ, for a plant at rest."""
 _ALL = 0.99  # of a record, from which on the rest is not reported
 
 
@@ -99,6 +102,10 @@ def _fit(
         # What explains little is no response for being sought for longer: it must lie inside.
         inside = follows or wider.fit.high < AT_BOUND * latest
         found = wider if wider.explained >= needed and inside else found
+    # A free response that begins with the record explains a slow one from rest as well.
+    if found.explained < needed and not requested.loop and all(map(_begins_at_rest, records)):
+        at_rest = fit_sampled(outputs, inputs, dt, replace(requested, rested=True))
+        found = at_rest if at_rest.explained >= needed else found
     if refuses and found.explained < needed:
         codes = [str(code) for y in found.data.measured if (code := missing_code(y))]
         raise UnrelatedError(
@@ -126,6 +133,17 @@ def _advice(records: Sequence[Record], outputs: Sequence[FloatArray]) -> str:
                 "when it is read joins its turns, as numpy.unwrap does"
             )
     return "check the columns, and whether the input excites the plant"
+
+
+def _begins_at_rest(record: Record) -> bool:
+    """Whether a record begins with a constant input and an output that does not move."""
+    y, u = _signals(record)
+    rest = y[: int(np.argmax(u != u[0]))]
+    if rest.size < _LEAST_REST or np.isnan(y).any():
+        return False
+    first, second = np.split(rest[: 2 * (rest.size // 2)], 2)
+    error = np.hypot(first.std(), second.std()) / np.sqrt(first.size)
+    return bool(abs(first.mean() - second.mean()) <= _STILL * error)
 
 
 def _check_moves(record: Record) -> None:
@@ -161,6 +179,8 @@ def _summary(
         flags += repeat_flags(repeats, fit.dead_time, data.dt)
     sums = found.condensed
     reasons = []
+    if data.rested:
+        reasons.append(chosen("samples.rested"))
     if data.every > 1:
         what = "means of" if data.width > 1 else "one of"
         reasons.append(chosen("samples.blocks", what=what, every=data.every))

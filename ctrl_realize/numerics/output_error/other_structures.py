@@ -59,6 +59,8 @@ class Requested:
         But not if the model then simulates them worse than coloured noise explains.
     loop : bool
         The input is that of a controller: see `any_input.lags`.
+    rested : bool
+        Records of any input begin at rest, so that none has a free response or a drift.
     compared : bool
         Look for structures that were not requested and fit better, or as well.
     """
@@ -73,6 +75,7 @@ class Requested:
     whiten: bool = True
     simulates: bool = True
     loop: bool = False
+    rested: bool = False
     compared: bool = True
 
 

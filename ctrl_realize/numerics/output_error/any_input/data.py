@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 from scipy.signal import lfilter
@@ -30,6 +30,10 @@ BEYOND = 1.5  # of a first-order model's dead time: no model's dead time is late
 _SPARSEST = 20
 """Samples, of which one is there, up to which a part is lengthened for what is missing in it. It is
 lengthened fully if the input moves seldom: time then grows with the samples that there are."""
+
+_AGO = 1e6
+"""Records since the plant moved before a record at its rest: nothing is left, of an integrator
+neither."""
 
 _INCOMPLETE = 0.5  # of the blocks, from which on a sample of each is taken
 
@@ -62,6 +66,8 @@ class SampledData:
         Inputs in a block for each output, and the samples of it of which an output is the mean.
     known : KnownFactor
         Dynamics in cascade that are not part of the plant.
+    rested : bool
+        Every record begins at rest: there is neither a free response nor a drift.
     past : tuple of ndarray
         Of every record, columns (N, order) that are estimated with level and drift: see `whitened`.
     steps, loads : tuple of ndarray
@@ -78,6 +84,7 @@ class SampledData:
     every: int
     width: int
     known: KnownFactor
+    rested: bool = False
     past: tuple[FloatArray, ...] = ()
     steps: tuple[FloatArray, ...] = ()
     loads: tuple[FloatArray, ...] = ()
@@ -148,7 +155,7 @@ class SampledData:
 
     def after(self, dead_time: float) -> SampledData:
         """Leave out what may depend on the input before the records; at most half of each."""
-        late = int(np.ceil(BEYOND * dead_time / self.step))
+        late = 0 if self.rested else int(np.ceil(BEYOND * dead_time / self.step))
         seen = [np.flatnonzero(~np.isnan(y)) for y in self.outputs]
         return replace(self, starts=tuple(min(late, int(i[i.size // 2])) for i in seen))
 
@@ -193,7 +200,10 @@ class SampledData:
             self.step * (rows - start).astype(np.float64)
             for rows, start in zip(self.rows, self.starts, strict=True)
         ]
-        shapes = [_own_shapes(clock, self.known) for clock in clocks]
+        if self.rested:
+            shapes = [np.ones((clock.size, 1)) for clock in clocks]
+        else:
+            shapes = [_own_shapes(clock, self.known) for clock in clocks]
         for more in filter(None, (self.past, self.loads)):
             own = [columns[rows] for columns, rows in zip(more, self.rows, strict=True)]
             shapes = [np.hstack(both) for both in zip(shapes, own, strict=True)]
@@ -203,7 +213,8 @@ class SampledData:
         joined = np.concatenate(
             [y / scale for y, scale in zip(self.measured, self.scales, strict=True)]
         )
-        segments = Segments(self.edges, np.concatenate(clocks), np.concatenate(shapes))
+        since = np.concatenate(clocks) + (_AGO * self.longest if self.rested else 0.0)
+        segments = Segments(self.edges, since, np.concatenate(shapes))
         return Problem(joined, np.ones(m), drive, np.empty((m, 0)), self.known, segments)
 
 
@@ -213,6 +224,7 @@ def cut(
     dt: float,
     every: int,
     known: KnownFactor,
+    rested: bool = False,
 ) -> SampledData:
     """Shorten long records to a part in which the input moves; the shortest are kept complete.
 
@@ -241,8 +253,9 @@ def cut(
     ]
     parts = [slice(first, first + int(n)) for first, n in zip(firsts, lengths, strict=True)]
     spans = [slice(every * part.start, every * part.stop) for part in parts]
+    level = partial(np.take, indices=0) if rested else np.mean
     return SampledData(
-        tuple(u[span] - float(np.mean(u[span])) for u, span in zip(inputs, spans, strict=True)),
+        tuple(u[span] - float(level(u[span])) for u, span in zip(inputs, spans, strict=True)),
         tuple(y[part] for y, part in zip(means, parts, strict=True)),
         (0,) * len(lengths),
         (1.0,) * len(lengths),
@@ -251,6 +264,7 @@ def cut(
         every=every,
         width=width,
         known=known,
+        rested=rested,
     )
 
 

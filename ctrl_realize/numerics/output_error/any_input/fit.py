@@ -92,7 +92,7 @@ class SampledFit:
     def own_delay(self, output: FloatArray, signal: FloatArray) -> OwnResponse:
         """Shift and scale the common model to fit one record best, whether it was fitted or not."""
         data = self.data
-        one = cut([output], [signal], data.dt, data.every, data.known)
+        one = cut([output], [signal], data.dt, data.every, data.known, data.rested)
         start = min(max(data.starts), one.outputs[0].size // 2)
         problem = replace(one, starts=(start,)).whitened(self.noise).problem
         assert problem.segments is not None
@@ -156,7 +156,7 @@ def fit_sampled(
     # How long a plant must be seen is a question to all structures.
     every, part = samples_in_a_block(outputs, inputs, dt, replace(requested, structures=None))
     if part is None or structures is not None:
-        data = cut(outputs, inputs, dt, every, requested.known)
+        data = cut(outputs, inputs, dt, every, requested.known, requested.rested)
         part = fit_stretch(data, structures or ORDERS, requested)
     data, stretch = part.data, part.fit
     fits, sums = stretch, None

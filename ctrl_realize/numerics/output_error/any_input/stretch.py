@@ -83,7 +83,7 @@ def samples_in_a_block(
     sizes, plain = [y.size for y in outputs], replace(requested, whiten=False)
     longest, every = max(sizes), 1
     while True:
-        data = cut(outputs, inputs, dt, every, requested.known)
+        data = cut(outputs, inputs, dt, every, requested.known, requested.rested)
         rows = max(y.size for y in data.outputs)
         if longest < _WORTHWHILE * every * rows:
             return every, None
