@@ -304,6 +304,7 @@ def test_a_step_that_does_not_settle_is_refused_with_what_to_try():
             unstable.step_info()
     with pytest.raises(UnsuitableSystemError, match="more than 1000000 samples"):
         cr.delayed_ss(ct.tf([1], [1e6, 1]), 100, dt=1.0).step_info()
+    assert slow.step_info(T=3000) == pytest.approx(slow.step_info(3000), rel=1e-12)
     both = ct.append(slow, 2 * slow).step_info()
     assert both[1][1]["SteadyStateValue"] == pytest.approx(2)
     assert both[0][0] == pytest.approx(slow.step_info(), rel=1e-12)

@@ -211,7 +211,8 @@ class HostResponses(HostMargins):
             Times of the step response, or its end. Default, in discrete time: until the slowest
             pole has decayed to a thousandth, dead time included.
         **settings
-            ``SettlingTimeThreshold`` and ``RiseTimeLimits`` of `control.step_info`.
+            ``SettlingTimeThreshold`` and ``RiseTimeLimits`` of `control.step_info`, and ``T``, its
+            former name of `timepts`.
 
         Returns
         -------
@@ -232,6 +233,7 @@ class HostResponses(HostMargins):
         >>> found["RiseTime"], found["SettlingTime"]
         (110.0, 1196.0)
         """
+        timepts = settings.pop("T", timepts)
         if not self.issiso():
             rows, columns = range(self.noutputs), range(self.ninputs)
             return [[self[i, j].step_info(timepts, **settings) for j in columns] for i in rows]

@@ -189,7 +189,8 @@ def _tuning(
         said = f"a PI of this model crosses over below {omega[0]:.3g} rad/s"
         return Verdict("tuning", "no", said, float("inf"))
     own, *found = largest_sensitivity(loops)
-    worst = float(np.sort(found)[-1 - seldom])
+    # The model is one of those that fit as well as it does.
+    worst = max(float(np.sort(found)[-1 - seldom]), float(own) * bool(seldom))
     level, why = _level(flags, "tuning", worst <= _ROBUST, worst <= _TOO_MUCH)
     there = f"{'at most ' * bool(seldom)}{worst:.3g}" if np.isfinite(worst) else "is unstable"
     said = words.format(own=f"{own:.3g}", there=there)
