@@ -14,7 +14,7 @@ from ...data import Record
 from ...errors import DataError
 from ...numerics.arrays import FloatArray
 from ...numerics.constants import SMALLEST
-from ...numerics.output_error.any_input.data import SOUGHT, SampledData
+from ...numerics.output_error.any_input.data import MOST_SAMPLES, SOUGHT, SampledData
 from ...numerics.output_error.any_input.fit import SampledFit, fit_sampled
 from ...numerics.output_error.any_input.stretch import FOLLOWS, FOLLOWS_IN_LOOPS
 from ...numerics.output_error.other_structures import Requested
@@ -103,7 +103,8 @@ def _fit(
         inside = follows or wider.fit.high < AT_BOUND * latest
         found = wider if wider.explained >= needed and inside else found
     # A free response that begins with the record explains a slow one from rest as well.
-    if found.explained < needed and not requested.loop and all(map(_begins_at_rest, records)):
+    whole = max(y.size for y in outputs) <= MOST_SAMPLES and not requested.loop
+    if found.explained < needed and whole and all(map(_begins_at_rest, records)):
         at_rest = fit_sampled(outputs, inputs, dt, replace(requested, rested=True))
         found = at_rest if at_rest.explained >= needed else found
     if refuses and found.explained < needed:

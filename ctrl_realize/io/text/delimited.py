@@ -62,19 +62,16 @@ def _parse(source: TextSource, layout: TextLayout) -> Any:
 
     path, head = source.path, layout.head
     separator = r"\s+" if head.delimiter == " " else head.delimiter
-    keywords: dict[str, Any] = {"low_memory": False, "comment": head.comment}
+    keywords: dict[str, Any] = {"low_memory": False}
     if not (head.delimiter + (head.comment or "")).isascii():
         # the faster parser accepts delimiters of one byte only
-        keywords = {"engine": "python", "comment": head.comment}
+        keywords = {"engine": "python"}
     elif tuple(map(int, pd.__version__.split(".")[:2])) < (3, 1):
         # the default of later versions; without it, the last digit could be wrong
         keywords["float_precision"] = "round_trip"
-    within = (cell for row in head.cells[layout.first :] for cell in row)
-    if head.comment and any(
-        cell.startswith(head.comment) and kind_of(cell, ".") == "missing" for cell in within
-    ):
-        # the parser would take what stands behind #N/A for a comment
-        keywords["comment"] = None
+    comment, cells = head.comment, (cell for row in head.cells[layout.first :] for cell in row)
+    if comment and any(one.startswith(comment) and kind_of(one, ".") == "missing" for one in cells):
+        comment = None  # the parser would take what stands behind #N/A for one
     try:
         with source.open(layout.encoding, newline="") as file:
             # Not by skiprows: the parser counts lines differently, and would leave out more.
@@ -84,6 +81,7 @@ def _parse(source: TextSource, layout: TextLayout) -> Any:
                 sep=separator,
                 decimal=head.decimal[0],
                 header=None,
+                comment=comment,
                 # numbers are ASCII in all encodings here; a wrong character in a name is harmless
                 skipinitialspace=True,
                 # an empty cell or "NaN" makes its column text, and is reported there

@@ -346,8 +346,8 @@ def _integrating(fits: WindowFit, chosen: Candidate) -> Candidate:
     length = fits.scales.length
     if float(np.abs(chosen.poles).min()) * length >= NEARLY_STRAIGHT:
         return chosen
-    fixed = {"dead_time": chosen.dead_time, "lag_1": length / SLOWEST}
-    form = ProcessForm("P1DI", chosen.structure.order, fixed=fixed)
+    n, fixed = chosen.structure.order, {"dead_time": chosen.dead_time, "lag_1": length / SLOWEST}
+    form = ProcessForm(f"P{n}D", n, fixed=fixed)
     slope = fit_form(fits.problem, form, fits.scales, [chosen])
     if slope.cost - chosen.cost > fits.penalty * fits.variance:
         return chosen
