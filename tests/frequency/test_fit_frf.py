@@ -406,7 +406,7 @@ def test_poles_beside_zeros_in_the_band_do_not_hide_the_gain_of_accurate_points(
     noise = np.random.default_rng(0).standard_normal((2, 50))
     fit = cr.fit_frf(cr.MeasuredFRF(exact * (1 + 1e-6 * (noise[0] + 1j * noise[1])), f)).fit
     assert "gain_not_resolved" not in {flag.code for flag in fit.flags}
-    assert fit.gain == pytest.approx(1, abs=1e-6)
+    assert fit.gain == pytest.approx(1, abs=1e-6)  # its standard error is 2e-7
 
 
 def repeated(seed, repeats, count=35):
