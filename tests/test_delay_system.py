@@ -1,11 +1,13 @@
 """Laws of systems with delays inside, against augmented matrices and closed forms."""
 
 import tracemalloc
+from math import factorial
 
 import control as ct
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
+from scipy.optimize import brentq
 
 import ctrl_realize as cr
 from ctrl_realize.errors import DataError, ModelWarning, UnsuitableSystemError
@@ -282,6 +284,34 @@ def test_rise_and_settling_time_of_a_lag_are_those_of_the_closed_form(lag, delay
     assert found["RiseTime"] == pytest.approx(lag * np.log(9), abs=1)
     assert 0 <= found["SettlingTime"] - delay - lag * np.log(50) <= 1
     assert found["SteadyStateValue"] == pytest.approx(2, rel=1e-9)
+
+
+def test_a_fast_rise_before_a_slow_end_is_seen():
+    # 1 - b exp(-t) - a exp(-t / 1000): all equal intervals to its end were 15 s each
+    a = 0.01 / 0.999
+    b = 1 - a
+    plant = ct.tf([1], [1, 1]) * ct.tf([990, 1], [1000, 1]) * cr.delay(0.5)
+    found = plant.step_info()
+
+    def reached(part):
+        return brentq(lambda t: 1 - b * np.exp(-t) - a * np.exp(-t / 1000) - part, 0, 50)
+
+    # both times are rounded up to intervals of a twentieth of the lag
+    assert found["RiseTime"] == pytest.approx(reached(0.9) - reached(0.1), abs=0.05)
+    assert found["SettlingTime"] == pytest.approx(0.5 + reached(0.98), abs=0.05)
+
+
+def test_the_overshoot_of_a_loop_beside_a_slow_mode_is_that_of_its_fast_part():
+    # y' = 0.8 u, u = 1 - y(t - 1): 0.8 (t - 1) up to t = 2, then 0.8 (t - 1) - 0.32 (t - 2)^2, ...
+    fast = ct.feedback(0.8 * cr.delay(1.0) * ct.tf([1], [1, 0]))
+    t = np.linspace(0, 12, 4001)
+    y = np.zeros(t.size)
+    for k in range(12):  # method of steps: powers of (t - 1 - k)
+        y -= (-0.8) ** (k + 1) * np.clip(t - 1 - k, 0, None) ** (k + 1) / factorial(k + 1)
+    slow = ct.tf([4950, 1], [5000, 1])  # 1 - 0.01 / (5000 s + 1), seen in 12 s as a gain of 0.99
+    found = (fast * slow).step_info()
+    assert found["Overshoot"] == pytest.approx(100 * (0.99 * y.max() - 1), abs=0.1)
+    assert found["PeakTime"] == pytest.approx(t[y.argmax()], abs=0.05)
 
 
 @pytest.mark.parametrize("gain", [-0.5, 0.8])

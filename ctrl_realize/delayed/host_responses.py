@@ -197,8 +197,9 @@ class HostResponses(HostMargins):
         """Compute the step responses, see `control.step_response`.
 
         Without `timepts` until the slowest pole has decayed; in discrete time to a thousandth, for
-        5000 samples at most. In continuous time from zero initial state, and ``tolerance`` is
-        accepted as in `forced_response`.
+        5000 samples at most. In continuous time from zero initial state, at equal times that show
+        the fastest of the dominant poles, and later at fewer ones where the slowest takes far
+        longer; ``tolerance`` is accepted as in `forced_response`.
         """
         return self._responded("step", timepts, 1.0, initial_state, settings)
 

@@ -12,12 +12,13 @@ from numpy.typing import ArrayLike
 from ..._checks import finite, positive
 from ...errors import DataError, ModelWarning, UnsuitableSystemError, warn_caller
 from ...numerics.arrays import FloatArray
-from ...numerics.internal_delays.equation import Signal, TooManyStepsError, solve
+from ...numerics.constants import SMALLEST
+from ...numerics.internal_delays.equation import Signal, TooManyStepsError, response_times, solve
 from ..host_responses import spread
 from .poles import InsidePoles
 
-POINTS = 401
-"""Default number of points of a response."""
+LEAST = 400
+"""Intervals between the times of a response, by default."""
 
 TOLERANCE = 1e-8
 """Largest error of a response, relative to its largest value."""
@@ -113,7 +114,9 @@ class Motion(InsidePoles):
         """Check the given times, or make those up to an end or until the response has settled."""
         if timepts is None or np.size(timepts) == 1:
             end = self._settling() if timepts is None else float(np.ravel(timepts)[0])
-            return np.linspace(0, positive(end, "timepts", "time in s"), POINTS)
+            end = positive(end, "timepts", "time in s")
+            fastest = float(np.abs(self.dominant_poles(4)).max(initial=SMALLEST))
+            return response_times(end, 1 / fastest, LEAST)
         return _checked_times(timepts, self.name)
 
     def _settling(self) -> float:

@@ -13,6 +13,7 @@ from ...delayed import DelayedStateSpace, DelaySystem
 from ...errors import ModelWarning, UnsuitableSystemError, warn_caller
 from ...numerics.arrays import FloatArray
 from ...numerics.blas_threads import single_threaded
+from ...numerics.internal_delays.equation import MOST_EQUAL, response_times
 from ...numerics.loops.circle import damped_circle, step_on_circle
 from ..models.conversions import to_discrete
 from ..resolved import warn_unresolved
@@ -24,11 +25,8 @@ LONGEST = 2**19
 """Largest number of samples of a response."""
 SETTLED = 1e-4
 """Relative range of the last part of a response that counts as settled."""
-POINTS, DOUBLINGS = 2000, 8
-"""Samples of the responses of a continuous loop, and how often their duration is doubled."""
-PER_TURN, LATER = 20, 400
-"""Samples while such a loop turns by 1 rad at its crossover, and while times after `POINTS` such
-samples grow by a factor of e."""
+DOUBLINGS = 8
+"""How often the duration of the responses of a continuous loop is doubled."""
 SHORT = 1000
 """Turn of a continuous loop by 1 rad over a dead time that a hold of its length stands for."""
 ROUNDING = 1e-8
@@ -183,9 +181,7 @@ def continuous_performance(
     to_load = plant.feedback(controller)
     end = 4 * total_time
     for _ in range(DOUBLINGS):
-        near = min(end, POINTS * turn / PER_TURN)
-        later = np.geomspace(near, end, 1 + int(LATER * np.log(end / near)))[1:]
-        times = np.concatenate([np.linspace(0, near, POINTS + 1), later])
+        times = response_times(end, turn, MOST_EQUAL)
         setpoint = np.asarray(loop.step_response(times, tolerance=SETTLED / 100).outputs)
         load = np.asarray(to_load.step_response(times, tolerance=SETTLED / 100).outputs)
         if _still(setpoint, load, int(np.sum(times >= 0.95 * end))):

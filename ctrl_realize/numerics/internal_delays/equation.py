@@ -21,6 +21,7 @@ References
 from __future__ import annotations
 
 from collections.abc import Callable
+from itertools import pairwise
 
 import numpy as np
 from scipy.special import roots_jacobi
@@ -43,12 +44,41 @@ HALVINGS = 7
 SNAP = 1e-10
 """Part of the time span within which two points of time are one."""
 
+MOST_EQUAL = 2000
+"""Equal intervals between the times at which a response is drawn."""
+
+_PER_TURN, _PER_PART = 20, 400
+"""Times at which a response is drawn, in a turn of 1 rad, and later in a part of twice the length
+of the part before: a peak is missed by 3e-4 of its height at most."""
+
 Signal = Callable[[FloatArray], FloatArray]
 """Inputs (m, K) at K times; right-continuous."""
 
 
 class TooManyStepsError(ArithmeticError):
     """The shortest delay, or the tolerance, asks for more steps than are made."""
+
+
+def response_times(end: float, turn: float, least: int) -> FloatArray:
+    """Times from 0 at which a response is drawn that begins fast, and may have a slow end.
+
+    Parameters
+    ----------
+    end : float
+        The last time in s.
+    turn : float
+        In s, of the fastest motion that is to be seen by 1 rad.
+    least : int
+        Number of equal intervals. There are more if these are longer than a twentieth of `turn`,
+        up to `MOST_EQUAL`; beyond so many they are doubled as often as time is.
+    """
+    count = int(np.clip(np.ceil(_PER_TURN * end / turn), least, max(least, MOST_EQUAL)))
+    near = min(end, count * turn / _PER_TURN)
+    # Equal ones in parts: steps that are alike share their matrices.
+    ends = np.append(near * 2.0 ** np.arange(np.ceil(np.log2(end / near))), end)
+    parts = [np.linspace(0, near, count + 1)]
+    parts += [np.linspace(*pair, _PER_PART + 1)[1:] for pair in pairwise(ends)]
+    return np.concatenate(parts)
 
 
 def solve(
