@@ -99,7 +99,9 @@ def test_the_exit_code_tells_whether_a_required_verdict_is_good(folder, tmp_path
     assert main([*good, "--require", "gain"]) == 0
     assert main([*good, "--overwrite", "--method", "scan", "--require", "gain"]) == 4
     assert "--require gain: the verdict is 'not judged by this method'" in capsys.readouterr().err
-    assert main([*good, "--overwrite", "--require", "order"]) == 2
+    capsys.readouterr()
+    assert main([*good, "--overwrite", "--require", "gain,tuning"]) == 2
+    assert "each with --require before it" in capsys.readouterr().err
 
 
 def test_tune_tells_the_numbers_of_the_same_calls_in_python(tmp_path, capsys):
@@ -159,6 +161,8 @@ def test_tune_takes_any_saved_plant_and_no_loop(tmp_path, capsys):
         said = capsys.readouterr()
         assert said.out == ""
         assert "no model of a plant that was identified" in said.err
+    assert main(["tune", str(tmp_path / "plant.json"), "--order", "3"]) == 2
+    assert "got --order; give the records" in capsys.readouterr().err
 
 
 def test_tune_tells_a_doubtful_verdict_beside_the_numbers(tmp_path, capsys):

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from .._checks import one_of
 from ..data import MeasuredFRF
 from ..delayed import DelayedStateSpace, fit_of
 from ..errors import CtrlRealizeError, DataError, OptionError, UnsuitableSystemError
@@ -18,6 +17,7 @@ from ..identification.methods import identify as identify_record
 from ..io import load_model, read_frf
 from ..io.models import holds_model
 from ..results import ModelFit
+from .arguments import option_of
 from .inputs import Reading, Settings, Source, calls_again
 from .machine import Told, told_as_json
 from .manifest import Run, refuse_other_results
@@ -73,11 +73,13 @@ def run_tune(
     tuning = Tuning(tuned, entered)
     if len(files) > 1 or not holds_model(files[0]):
         return identified(files, folder, joint=True, tuning=tuning, **given)
-    unused = [name for name in ("chosen", "tests", "record") if given[name]]
-    if unused or folder is not None:
+    unused = [option_of(name) for kind in ("chosen", "tests", "record") for name in given[kind]]
+    if folder is not None:
+        unused.append("--output")
+    if unused:
         raise OptionError(
             f"{files[0]} is a saved model: expected options of the controller and --require only, "
-            "got --output or options of records; give the records to have these"
+            f"got {', '.join(unused)}; give the records to have these"
         )
     system, required = load_model(files[0]), _required(given["require"])
     if not isinstance(system, DelayedStateSpace) or (required and system.fit is None):
@@ -175,7 +177,13 @@ class _Task:
 
 
 def _required(require: Sequence[str] | None) -> list[str]:
-    return [one_of(name, "require", tuple(_QUESTIONS)) for name in require or ()]
+    for name in require or ():
+        if name.casefold() not in _QUESTIONS:
+            raise OptionError(
+                f"--require {name}: expected {', '.join(_QUESTIONS)}; "
+                "of several each with --require before it"
+            )
+    return [name.casefold() for name in require or ()]
 
 
 def _judged(system: DelayedStateSpace, required: Sequence[str]) -> int:

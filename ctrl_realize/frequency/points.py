@@ -16,7 +16,7 @@ import control as ct
 import numpy as np
 from scipy.special import digamma, polygamma
 
-from .._checks import band, check_type, one_of
+from .._checks import check_type, one_of, rising
 from .._flags import Flag, flagged
 from .._wording import plainly
 from ..data import MeasuredFRF
@@ -70,7 +70,7 @@ def frf_points(
     usable = (frequency > SMALLEST) & (np.abs(points.response) > SMALLEST)
     usable &= np.isfinite(points.response) & (frequency < below_hz)
     if band_hz is not None:
-        low, high = band(band_hz, "band_hz", "frequencies in Hz")
+        low, high = rising(band_hz, "band_hz", "frequencies in Hz")
         usable &= (frequency >= low) & (frequency <= high)
     if usable.sum() < 3:
         limit = f", below {below_hz:.4g} Hz" if np.isfinite(below_hz) else ""

@@ -6,7 +6,7 @@ from typing import Literal
 
 import numpy as np
 
-from .._checks import band, within
+from .._checks import rising, within
 from ..errors import DataError, OptionError
 from ..numerics.arrays import BoolArray
 from ..numerics.rational.bands import running_median, widest_run
@@ -45,7 +45,7 @@ def trusted_points(
 
 
 def _inside(points: MeasuredPoints, band_hz: tuple[float, float]) -> BoolArray:
-    low, high = band(band_hz, "band_hz", "frequencies in Hz")
+    low, high = rising(band_hz, "band_hz", "frequencies in Hz")
     frequency = points.frequency_hz
     inside = (frequency >= low) & (frequency <= high)
     if not inside.any():

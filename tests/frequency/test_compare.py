@@ -11,6 +11,7 @@ from numpy.testing import assert_allclose
 
 import ctrl_realize as cr
 from ctrl_realize import report
+from ctrl_realize.errors import OptionError
 from tests.measured import model
 
 DT = 1 / 1280
@@ -108,6 +109,8 @@ def test_band_ends_where_the_coherence_falls_and_not_at_one_bad_point():
     given = cr.compare_frf(PLANT, measured(coherence=coherence), band_hz=(F[0], 13.0))
     assert given.band_from == "given"
     assert "(as given)" in given.report()
+    with pytest.raises(OptionError, match=r"band_hz=\(13, 0\.5\); expected the lower end first"):
+        cr.compare_frf(PLANT, measured(), band_hz=(13.0, 0.5))
 
 
 def test_simulated_valve_agrees_with_its_measured_frf_down_to_the_noise(valve_frf):
