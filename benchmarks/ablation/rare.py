@@ -189,6 +189,13 @@ def far_away(rng: Rng) -> Case:
     return plant.case(record(u, noisy(rng, stepped(rng, plant, u), 0.05)))
 
 
+def stairs_up(rng: Rng) -> Case:
+    """Three steps up from rest, a dead time of 0.55 to 0.8 of a stair, one lag, 0.5 % noise."""
+    plant = drawn(rng, ((0.05, 0.15),), (0.55, 0.8))
+    u = np.clip((np.arange(360) + 60) // 100, 0, 3).astype(np.float64)
+    return plant.case(record(u, noisy(rng, stepped(rng, plant, u), 0.005)))
+
+
 def slow_disturbance(rng: Rng) -> Case:
     """A slow sine, or AR(1) noise with a pole at 0.998, as large as a third of the response."""
     plant, u = drawn(rng, ((0.05, 0.15), (0.1, 0.25)), (0.12, 0.3)), binary(rng, 1500, 8)
@@ -351,6 +358,7 @@ MADE_FOR = {
     Rule.FOLLOWED: slow_disturbance,
     Rule.INTEGRATOR: long_ramp,
     Rule.CORRELATION: far_away,
+    Rule.FROM_REST: stairs_up,
     Rule.RINGING: wandering_output,
     Rule.RECORD_NOISE: unequal_sensors,
     Rule.CURVES: step_behind_a_filter,

@@ -83,6 +83,7 @@ class Rule(Enum):
     FOLLOWED = "noise that a model follows"
     MORE_LAGS = "fourth and fifth lag"
     CORRELATION = "start from the correlation"
+    FROM_REST = "fits from rest"
     HELD_STEPS = "steps that are held"
     CURVES = "curves are no steps"
     SPIKES = "spikes left out"

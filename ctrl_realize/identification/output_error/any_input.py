@@ -16,10 +16,10 @@ from ...numerics.arrays import FloatArray
 from ...numerics.constants import SMALLEST
 from ...numerics.output_error.any_input.data import MOST_SAMPLES, SOUGHT, SampledData
 from ...numerics.output_error.any_input.fit import SampledFit, fit_sampled
-from ...numerics.output_error.any_input.stretch import FOLLOWS, FOLLOWS_IN_LOOPS
 from ...numerics.output_error.other_structures import Requested
 from ...numerics.output_error.result import AT_BOUND, OutputErrorEstimate
 from ...numerics.output_error.step_data import StepData, bare_data
+from ...numerics.rules import Rule
 from ...numerics.signals.counters import counter_period
 from ...numerics.validation.own_response import OwnResponse
 from .averaging import common_sample_time
@@ -93,29 +93,40 @@ def _fit(
     for record in records:
         _check_moves(record)
     outputs, inputs = zip(*signals, strict=True)
-    found = fit_sampled(outputs, inputs, dt, requested)
-    needed = FOLLOWS_IN_LOOPS if found.fit.averaged else FOLLOWS
-    latest, follows = SOUGHT * found.data.longest, found.explained >= needed
-    if requested.latest is None and not (follows and found.fit.high < AT_BOUND * latest):
-        latest *= _SOUGHT_THEN
-        wider = fit_sampled(outputs, inputs, dt, replace(requested, latest=latest))
-        # What explains little is no response for being sought for longer: it must lie inside.
-        inside = follows or wider.fit.high < AT_BOUND * latest
-        found = wider if wider.explained >= needed and inside else found
-    # A free response that begins with the record explains a slow one from rest as well.
-    whole = max(y.size for y in outputs) <= MOST_SAMPLES and not requested.loop
-    if found.explained < needed and whole and all(map(_begins_at_rest, records)):
-        at_rest = fit_sampled(outputs, inputs, dt, replace(requested, rested=True))
-        found = at_rest if at_rest.explained >= needed else found
-    if refuses and found.explained < needed:
+    size = max(y.size for y in outputs)
+    if size <= MOST_SAMPLES and not requested.loop and all(map(_begins_at_rest, records)):
+        # A free response that begins with the record explains a slow one from rest as well.
+        # Ablation: fits from rest.
+        latest = requested.latest or SOUGHT * _SOUGHT_THEN * size * dt
+        found = fit_sampled(outputs, inputs, dt, replace(requested, latest=latest, rested=True))
+        if found.follows and found.rests and Rule.FROM_REST.on:
+            return found
+    found = _sought(outputs, inputs, dt, requested)
+    if refuses and not found.follows:
+        latest = requested.latest or SOUGHT * _SOUGHT_THEN * found.data.longest
         codes = [str(code) for y in found.data.measured if (code := missing_code(y))]
         raise UnrelatedError(
             f"{_named(records)}: the output does not respond to the input, which explains nothing "
-            f"beyond the noise (test value {found.explained:.3g}, needed {needed:g}), with dead "
-            f"times up to {in_time(requested.latest or latest)}; "
+            f"beyond the noise (test value {found.explained:.3g}, needed {found.needed:g}), with "
+            f"dead times up to {in_time(latest)}; "
             + (codes[0] if codes else _advice(records, found.data.measured))
         )
     return found
+
+
+def _sought(
+    outputs: Sequence[FloatArray], inputs: Sequence[FloatArray], dt: float, requested: Requested
+) -> SampledFit:
+    """Fit records with dead times up to a part of them, and with later ones where none explains."""
+    found = fit_sampled(outputs, inputs, dt, requested)
+    latest = SOUGHT * found.data.longest
+    if requested.latest is not None or (found.follows and found.fit.high < AT_BOUND * latest):
+        return found
+    latest *= _SOUGHT_THEN
+    wider = fit_sampled(outputs, inputs, dt, replace(requested, latest=latest))
+    # What explains little is no response for being sought for longer: it must lie inside.
+    inside = found.follows or wider.fit.high < AT_BOUND * latest
+    return wider if wider.follows and inside else found
 
 
 def _advice(records: Sequence[Record], outputs: Sequence[FloatArray]) -> str:

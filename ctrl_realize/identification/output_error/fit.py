@@ -95,7 +95,7 @@ def fit_output_error(
         One input, one output, any input that moves. Several records of one plant are fitted
         together: step records are aligned and averaged; for other inputs, and if samples are
         missing, poles, gain and dead time are common, and level, drift and initial state are
-        estimated for each record.
+        estimated for each record (the level alone where all begin at rest, and no more is seen).
     structures : optional
         Models to try: (order, relative degree), a process model by name (``"P1D"``, ``"P2DZ"``,
         ``"P2DU"``, ``"P1DI"``, ``"FOPDT"``, ``"SOPDT"``, ...), a `ProcessStructure` with fixed or

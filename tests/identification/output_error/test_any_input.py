@@ -388,7 +388,7 @@ def test_a_record_that_begins_at_rest_is_simulated_from_its_first_input():
         fit = cr.identify(given).fit
         assert fit.simulated_percent == pytest.approx(fit.fit_percent, abs=0.1)
         assert fit.fit_percent > 95
-        assert "from rest" not in fit.report()
+        assert "simulated from rest" not in fit.report()
 
 
 def test_noise_as_input_is_simulated_from_its_mean():

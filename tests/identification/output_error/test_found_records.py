@@ -152,8 +152,12 @@ def test_a_narrow_maximum_in_slow_noise_is_not_all_that_a_ramp_tells(seed):
     assert low <= 4.37 <= high
 
 
-def test_the_errors_of_a_ramp_are_those_of_the_cramer_rao_bound():
-    """The mean of an input is made up for by a free response, which moves with the lag as well."""
+@pytest.mark.parametrize("drift", [0.0, 0.01])
+def test_the_errors_of_a_ramp_are_those_of_the_cramer_rao_bound(drift):
+    """The mean of an input is made up for by a free response, which moves with the lag as well.
+
+    From rest, and without a drift, there is none, and the errors are a third of these.
+    """
     time, truth = np.arange(500.0), np.array([2.0, 8.0, 20.0])
     ramp = np.clip(time - 50, 0, 150) / 30
 
@@ -161,12 +165,14 @@ def test_the_errors_of_a_ramp_are_those_of_the_cramer_rao_bound():
         return response(time, ramp, gain, dead_time, [lag])
 
     fit = cr.fit_output_error(
-        cr.Record(time, ramp, plant(*truth) + noise(500, 0.05, 500)), structures="FOPDT"
+        cr.Record(time, ramp, plant(*truth) + drift * time + noise(500, 0.05, 500)),
+        structures="FOPDT",
     ).fit
     steps = 1e-3 * np.eye(3)
     slopes = [(plant(*truth + step) - plant(*truth - step)) / 2e-3 for step in steps]
-    own = [np.ones(500), time, np.exp(-time / truth[2])]
-    columns = np.stack([*slopes, *own], axis=1)[20:]  # the first samples depend on the past
+    own = [np.ones(500), time, np.exp(-time / truth[2])] if drift else [np.ones(500)]
+    past = 20 if drift else 0  # the first samples depend on it
+    columns = np.stack([*slopes, *own], axis=1)[past:]
     bound = 0.05 * np.sqrt(np.diag(np.linalg.inv(columns.T @ columns)))
     stated = {parameter.name: parameter.std for parameter in fit.parameters}
     assert stated["gain"] == pytest.approx(bound[0], rel=0.1)

@@ -52,6 +52,8 @@ from .lags import fit_lags, plain_lags
 from .loads import Load
 from .stretch import (
     DIED_AWAY,
+    FOLLOWS,
+    FOLLOWS_IN_LOOPS,
     WHITE,
     explained,
     fit_stretch,
@@ -79,7 +81,8 @@ class SampledFit:
     `explained` is the decrease of the sum of squares due to the input, divided by the residual
     variance: a chi-square. If the records are longer than `data`, `condensed` contains the data
     that were fitted. `noise` is the polynomial that makes the noise white, 1 for white noise;
-    `loads` are those of loops.
+    `loads` are those of loops. `rests` tells, of a fit from rest, that no motion of the plant's own
+    is seen.
     """
 
     fit: OutputErrorEstimate
@@ -88,6 +91,17 @@ class SampledFit:
     noise: FloatArray
     condensed: Condensed | None
     loads: tuple[Load, ...] = ()
+    rests: bool = False
+
+    @property
+    def needed(self) -> float:
+        """Least chi-square of the response to the input for which the output follows it."""
+        return FOLLOWS_IN_LOOPS if self.fit.averaged else FOLLOWS
+
+    @property
+    def follows(self) -> bool:
+        """Whether the output follows the input."""
+        return self.explained >= self.needed
 
     def own_delay(self, output: FloatArray, signal: FloatArray) -> OwnResponse:
         """Shift and scale the common model to fit one record best, whether it was fitted or not."""
@@ -126,14 +140,16 @@ def fit_sampled(
     Notes
     -----
     The past before a record is represented by an initial state, which is eliminated together with
-    level and drift. The input within the dead time before the record is unknown: samples for one
-    and a half dead times of the best first-order model are left out, at most half of the record. If
-    the residual is coloured, all structures are fitted again by generalised least squares [3]_:
-    inputs and outputs are filtered by the residual's autoregressive model, which does not change a
-    linear plant. A likelihood in such noise has many narrow maxima, and its ratio is no chi-square:
-    the interval contains 95 % of the weight of the dead times as well (`posterior_of`; of 42 ramps
-    in AR(0.9) noise 37 intervals hold, 31 without). Structures that are given remain those of equal
-    weights where others rule them out in such noise: the residual is what they cannot describe.
+    level and drift; records that are `requested` as rested have neither, and `SampledFit.rests`
+    tells whether they ask for one. The input within the dead time before the record is unknown:
+    samples for one and a half dead times of the best first-order model are left out, at most half
+    of the record. If the residual is coloured, all structures are fitted again by generalised least
+    squares [3]_: inputs and outputs are filtered by the residual's autoregressive model, which does
+    not change a linear plant. A likelihood in such noise has many narrow maxima, and its ratio is
+    no chi-square: the interval contains 95 % of the weight of the dead times as well
+    (`posterior_of`; of 42 ramps in AR(0.9) noise 37 intervals hold, 31 without). Structures that
+    are given remain those of equal weights where others rule them out in such noise: the residual
+    is what they cannot describe.
 
     Of a record of more than `data.MOST_SAMPLES` a part is fitted. If the response ends within
     `condensed.MOST_LAGS` samples, all samples are fitted afterwards; if the plant is slower, means
@@ -206,7 +222,8 @@ def fit_sampled(
     close = fit.close + close_to("adequate", correlation, WHITE)
     fitted = fit.fitted * np.repeat(data.scales, data.counts)
     fit = _at_rest(data, replace(fit, residual=residual, close=close, fitted=fitted))
-    return SampledFit(fit, data, explained(stretch), part.noise, sums)
+    rests = data.rested and part.rests
+    return SampledFit(fit, data, explained(stretch), part.noise, sums, rests=rests)
 
 
 def _of_measured(

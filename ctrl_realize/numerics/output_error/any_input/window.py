@@ -11,6 +11,8 @@ References
 .. [2] T. Soderstrom, Convergence properties of the generalised least squares identification method,
    Automatica 10 (1974) 617-626, doi:10.1016/0005-1098(74)90083-8.
 .. [3] L. Ljung, System Identification: Theory for the User, 2nd ed., Prentice Hall 1999.
+.. [4] G. Schwarz, Estimating the dimension of a model, Ann. Statist. 6 (1978) 461-464,
+   doi:10.1214/aos/1176344136.
 """
 
 from __future__ import annotations
@@ -22,7 +24,7 @@ import numpy as np
 from scipy.linalg import block_diag
 
 from ...arrays import FloatArray, unit_columns, without_gaps
-from ...constants import SMALLEST, VERY_STRONG
+from ...constants import SMALLEST, STRONG, VERY_STRONG
 from ...engine.compared_fits import settled
 from ...engine.eliminate import evaluate
 from ...engine.local_terms import local_columns
@@ -31,17 +33,19 @@ from ...engine.plausible_models import PlausibleModel
 from ...engine.poles import poles_from_parameters
 from ...engine.problem import Problem, Structure
 from ...engine.static_gain import StaticGain, local_errors
-from ...engine.structures import Candidate, Scales, pattern_starts, search
+from ...engine.structures import Candidate, Scales, needless_parameters, pattern_starts, search
 from ...engine.window import Window, window_of_rows
 from ...engine.window_fit import WindowFit, fit_window
 from ...rules import Rule
 from ...signals.noise import correlation_time, quantisation_step, winsorised_sigma
 from ...signals.noise_model import noise_lags, whitening_filter
 from ...signals.onset import correlation_onset
+from ..step_data import step_data
 from .data import BEYOND, MOST_SAMPLES, SampledData
 
 ORDERS = tuple(Structure(n, r) for n in range(1, 4) for r in range(n, 0, -1))
 """Every sample counts here, so that orders 4 and 5 would take most of the time."""
+_FEW = (Structure(1, 1), Structure(2, 2))  # with which a motion is tried beside the best
 _NOISE_TURNS = 2
 """Noise models, each from the residual of the previous fit: the first residual contains what
 the model followed of slow noise. Ablation: coloured noise of any input."""
@@ -50,6 +54,7 @@ _RISES = (2.0, 10.0, 50.0)  # samples, of the starts of the first-order fit, and
 _ONSETS = (1.0, 5.0, 20.0)
 _SMALLEST = 1e-4  # of the range: noise is not taken to be less
 _CONFIDENCE = 0.99  # of a start; ablation: start from the correlation
+_REST = 4  # samples before the first move of the input, for an onset to be visible
 _UNLIKE = 1.3  # ratio of noise levels from which weights shorten errors by more than 2 %
 
 
@@ -75,6 +80,31 @@ class SampledWindow:
         best = self.fit.best
         state = evaluate(self.fit.problem, best.structure, best.parameters[None])
         return PlausibleModel(best.dead_time, best.poles, state.numerator[0])
+
+    @property
+    def rests(self) -> bool:
+        """Whether records fitted from rest have neither a free response nor a drift.
+
+        These are tried with the best structure, and with one and two lags: slow poles beside zeros
+        take their place in richer ones. Rest needs strong evidence by the criterion [4]_, as what
+        was fitted with a motion that is none loses accuracy alone.
+        """
+        still, data = self.fit, replace(self.data, rested=False)
+        tried = dict.fromkeys([still.best.structure, *(s for s in _FEW if s in still.candidates)])
+        moving = _fit(data.whitened(self.noise), list(tried), self.scales, self.huber, still)
+        variance = min(still.variance, moving.variance)
+        assert still.problem.segments is not None
+        levels = still.problem.segments.shapes
+
+        def least(fits: WindowFit) -> float:
+            values = []
+            for structure, one in fits.candidates.items():
+                own = fits.problem.local_count(structure.order) if fits is moving else levels
+                charge = still.penalty * (structure.free + own) + needless_parameters(structure)
+                values.append(one.cost / variance + charge)
+            return min(values)
+
+        return bool(least(still) + STRONG < least(moving))
 
     def fit_of(self, structures: Sequence[Structure]) -> WindowFit:
         """Fit other structures to the same data."""
@@ -105,7 +135,8 @@ def fit_windows(
     starts = tuple(min(y.size // 20, at) for y, at in zip(data.outputs, moves, strict=True))
     data = replace(data, starts=starts, scales=alike)
     filtered = data.whitened(noise, residual)
-    rough = _first_order(filtered.problem, n, dt, usual, within, _seen(filtered, within[1]))
+    seen = [*_seen(filtered, within[1]), *_onsets(data)]
+    rough = _first_order(filtered.problem, n, dt, usual, within, seen)
     lag = float(-1.0 / rough.poles[0].real)
     data = data.after(max(rough.dead_time, longest / BEYOND))
     length = (max(data.lengths) - order) * dt
@@ -249,6 +280,20 @@ def _seen(data: SampledData, limit: float) -> list[float]:
             found.append(correlation_onset(u, without_gaps(y), most, _CONFIDENCE).onset)
     onsets = [float(lag) for lag in found if lag > 0]
     return [float(np.median(onsets))] if onsets and Rule.CORRELATION.on else []
+
+
+def _onsets(data: SampledData) -> list[float]:
+    """Visible onset after the first move of the input, in samples; empty if there is none.
+
+    A response to several moves looks like a slow one to the first of them, with less dead time.
+    """
+    found = []
+    for u, y in zip(data.held, data.outputs, strict=True):
+        first = int(np.argmax(u != u[0]))
+        if np.count_nonzero(~np.isnan(y[:first])) >= _REST:
+            motion = step_data(y, u, data.step, [(first, 1)]).motion
+            found += [] if motion is None else [float(motion.onset)]
+    return [float(np.median(found))] if found else []
 
 
 def _first_order(
