@@ -18,7 +18,7 @@ from ...numerics.output_error.any_input.data import MOST_SAMPLES, SOUGHT, Sample
 from ...numerics.output_error.any_input.fit import SampledFit, fit_sampled
 from ...numerics.output_error.other_structures import Requested
 from ...numerics.output_error.result import AT_BOUND, OutputErrorEstimate
-from ...numerics.output_error.step_data import StepData, bare_data
+from ...numerics.output_error.step_data import StepData, bare_data, step_data
 from ...numerics.rules import Rule
 from ...numerics.signals.counters import counter_period
 from ...numerics.validation.own_response import OwnResponse
@@ -32,9 +32,7 @@ from .sensor_flags import missing_code
 from .summary import choices_of
 
 _SOUGHT_THEN = 2.0  # times as far where nothing explains the output, or a dead time is at the bound
-_LEAST_REST, _STILL = 20, 3.0
-"""Samples before the first move of the input, and standard errors by which the halves of the output
-there may differ, for a plant at rest."""
+_LEAST_REST = 20  # samples before the first move of the input, for a plant at rest
 _ALL = 0.99  # of a record, from which on the rest is not reported
 
 
@@ -150,12 +148,11 @@ def _advice(records: Sequence[Record], outputs: Sequence[FloatArray]) -> str:
 def _begins_at_rest(record: Record) -> bool:
     """Whether a record begins with a constant input and an output that does not move."""
     y, u = _signals(record)
-    rest = y[: int(np.argmax(u != u[0]))]
-    if rest.size < _LEAST_REST or np.isnan(y).any():
+    first = int(np.argmax(u != u[0]))
+    if np.count_nonzero(~np.isnan(y[:first])) < _LEAST_REST:
         return False
-    first, second = np.split(rest[: 2 * (rest.size // 2)], 2)
-    error = np.hypot(first.std(), second.std()) / np.sqrt(first.size)
-    return bool(abs(first.mean() - second.mean()) <= _STILL * error)
+    rest = step_data(y, u, record.dt, [(first, 1)])
+    return not (rest.drift or rest.relaxing or rest.bend)
 
 
 def _check_moves(record: Record) -> None:
