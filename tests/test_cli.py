@@ -191,6 +191,19 @@ def test_a_model_is_kept_where_no_controller_can_be_tuned(tmp_path, capsys):
     assert "needs the sign of the gain" in capsys.readouterr().err
 
 
+@pytest.mark.parametrize(("sign", "action"), [(1, "reverse"), (-1, "direct")])
+def test_json_has_the_direction_of_action_beside_what_is_entered(sign, action, tmp_path, capsys):
+    # a block that takes no negative gain would have positive feedback without
+    t, u, y = signals()
+    csv(t, u, sign * y)(tmp_path / "plant.csv")
+    words = [str(tmp_path / "plant.csv"), *FAST, "--tune", "siemens_pid_compact"]
+    assert main(["identify", *words, "--json", "-"]) == 0
+    told = json.loads(capsys.readouterr().out)["controller"]
+    assert told["action"] == action
+    assert told["gain"]["value"] * sign > 0
+    assert next(one["value"] for one in told["enter"] if one["name"] == "Gain") > 0
+
+
 def test_json_is_written_into_a_new_folder_and_not_in_place_of_one(folder, tmp_path, capsys):
     words = ["identify", str(folder / "step_0.csv"), *FAST, "--json"]
     assert main([*words, str(tmp_path / "new" / "model.json")]) == 0

@@ -188,6 +188,7 @@ def _controller(pid: PIDController, form: PIDForm | None) -> dict[str, Any]:
         "enter": [
             {"name": one.name, "value": one.value, "unit": one.unit} for one in written.values
         ],
+        "action": "direct" if written.reversed_action else "reverse",
         "ms": None if check is None else _number(check.margins.ms),
         "ms_at_worst": _number(worst),
         "stable_on_all": check is not None and check.stable and worst != math.inf,
