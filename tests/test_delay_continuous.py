@@ -252,6 +252,15 @@ def test_any_input_is_taken_as_straight_between_its_samples_or_as_a_function():
     assert_allclose(ramp[110:], lagged[:-110], atol=1e-8)
 
 
+def test_a_response_is_not_cut_where_a_dead_time_is_far_below_the_lags():
+    # the end was five dead times: modes of the dead time are a million times as fast as the slowest
+    loop = ct.feedback(
+        5 * ct.tf([1000, 1], [1000, 0]) * ct.tf([1], [250000, 1000, 1]) * cr.delay(0.005)
+    )
+    with pytest.raises(UnsuitableSystemError, match=r"steps, each no longer than the shortest"):
+        loop.step_response()
+
+
 def test_stiff_cores_and_several_outputs():
     core = ct.ss(ct.tf([1], [1e-4, 1]) * ct.tf([1], [1, 1]))
     loop = cr.interconnect(

@@ -122,7 +122,7 @@ class Motion(InsidePoles):
     def _settling(self) -> float:
         """Estimate a time in s at which a response has settled, or is seen not to settle."""
         poles = self.dominant_poles(4)
-        rates = np.abs(poles.real[np.abs(poles.real) > 1e-6 * (np.abs(poles).max(initial=0.0))])
+        rates = np.abs(poles.real[np.abs(poles.real) > 1e-6 * np.abs(poles)])
         slow = 6 / float(rates.min()) if rates.size else 0.0
         delay = float(sum(self.internal_delays))
         return min(max(slow + delay, 5 * delay), 100 * delay + slow) or 1.0
