@@ -222,8 +222,7 @@ def fit_sampled(
     close = fit.close + close_to("adequate", correlation, WHITE)
     fitted = fit.fitted * np.repeat(data.scales, data.counts)
     fit = _at_rest(data, replace(fit, residual=residual, close=close, fitted=fitted))
-    rests = data.rested and part.rests
-    return SampledFit(fit, data, explained(stretch), part.noise, sums, rests=rests)
+    return SampledFit(fit, data, explained(stretch), part.noise, sums, rests=part.rests)
 
 
 def _of_measured(

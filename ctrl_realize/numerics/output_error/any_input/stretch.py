@@ -24,7 +24,14 @@ from ...rules import Rule
 from ..other_structures import Requested
 from .condensed import MOST_LAGS
 from .data import BEYOND, SOUGHT, SampledData, cut
-from .window import ORDERS, SampledWindow, fit_windows, in_coloured_noise, simulates_worse
+from .window import (
+    ORDERS,
+    SampledWindow,
+    fit_windows,
+    in_coloured_noise,
+    seen_at_rest,
+    simulates_worse,
+)
 
 FOLLOWS = 36.0
 """Least chi-square of the response to the input: six standard deviations. White noise without any
@@ -54,6 +61,10 @@ def fit_stretch(
     limit = SOUGHT * data.longest if requested.latest is None else requested.latest
     within = requested.earliest, max(limit, requested.earliest)
     part = fit_windows(data, structures, within, requested.huber, np.ones(1))
+    if data.rested:
+        part = seen_at_rest(part)
+        if not part.rests:
+            return part
     return part if requested.structures is not None else made_white(part, requested)
 
 
@@ -66,7 +77,7 @@ def made_white(part: SampledWindow, requested: Requested) -> SampledWindow:
     # In a loop the noise model is needed for consistency [1]_.
     if requested.simulates and not requested.loop and simulates_worse(weighted, part):
         return part
-    return replace(weighted, unweighted=part.model)
+    return replace(weighted, unweighted=part.model, rests=part.rests)
 
 
 def samples_in_a_block(

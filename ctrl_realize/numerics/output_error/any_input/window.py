@@ -63,7 +63,8 @@ class SampledWindow:
     """Fit of all structures to records that were filtered by a polynomial `noise`, 1 for none.
 
     `data` are the records before the filter, without the samples that depend on the unknown past;
-    `unweighted` is the model before it, and `residual` as for `SampledData.whitened`.
+    `unweighted` is the model before it, and `residual` as for `SampledData.whitened`. `rests` tells
+    whether records fitted from rest have neither a free response nor a drift.
     """
 
     data: SampledData
@@ -73,6 +74,7 @@ class SampledWindow:
     huber: bool
     unweighted: PlausibleModel | None = None
     residual: tuple[FloatArray, ...] = ()
+    rests: bool = False
 
     @property
     def model(self) -> PlausibleModel:
@@ -80,31 +82,6 @@ class SampledWindow:
         best = self.fit.best
         state = evaluate(self.fit.problem, best.structure, best.parameters[None])
         return PlausibleModel(best.dead_time, best.poles, state.numerator[0])
-
-    @property
-    def rests(self) -> bool:
-        """Whether records fitted from rest have neither a free response nor a drift.
-
-        These are tried with the best structure, and with one and two lags: slow poles beside zeros
-        take their place in richer ones. Rest needs strong evidence by the criterion [4]_, as what
-        was fitted with a motion that is none loses accuracy alone.
-        """
-        still, data = self.fit, replace(self.data, rested=False)
-        tried = dict.fromkeys([still.best.structure, *(s for s in _FEW if s in still.candidates)])
-        moving = _fit(data.whitened(self.noise), list(tried), self.scales, self.huber, still)
-        variance = min(still.variance, moving.variance)
-        assert still.problem.segments is not None
-        levels = still.problem.segments.shapes
-
-        def least(fits: WindowFit) -> float:
-            values = []
-            for structure, one in fits.candidates.items():
-                own = fits.problem.local_count(structure.order) if fits is moving else levels
-                charge = still.penalty * (structure.free + own) + needless_parameters(structure)
-                values.append(one.cost / variance + charge)
-            return min(values)
-
-        return bool(least(still) + STRONG < least(moving))
 
     def fit_of(self, structures: Sequence[Structure]) -> WindowFit:
         """Fit other structures to the same data."""
@@ -180,6 +157,32 @@ def in_coloured_noise(
             break
         found = again
     return found
+
+
+def seen_at_rest(part: SampledWindow) -> SampledWindow:
+    """Tell of records that were fitted from rest whether they show neither free response nor drift.
+
+    These are tried with the best structure, and with one and two lags: slow poles beside zeros take
+    their place in richer ones, and a filter in coloured noise, which is why it comes afterwards.
+    Rest needs strong evidence by the criterion [4]_, as what was fitted with a motion that is none
+    loses accuracy alone.
+    """
+    still, data = part.fit, replace(part.data, rested=False)
+    tried = dict.fromkeys([still.best.structure, *(s for s in _FEW if s in still.candidates)])
+    moving = _fit(data, list(tried), part.scales, part.huber, still)
+    variance = min(still.variance, moving.variance)
+    assert still.problem.segments is not None
+    levels = still.problem.segments.shapes
+
+    def least(fits: WindowFit) -> float:
+        values = []
+        for structure, one in fits.candidates.items():
+            own = fits.problem.local_count(structure.order) if fits is moving else levels
+            charge = still.penalty * (structure.free + own) + needless_parameters(structure)
+            values.append(one.cost / variance + charge)
+        return min(values)
+
+    return replace(part, rests=bool(least(still) + STRONG < least(moving)))
 
 
 def noise_model(part: SampledWindow, model: Candidate, error: FloatArray, lags: int) -> FloatArray:
