@@ -2,6 +2,7 @@
 
 import base64
 import json
+import re
 
 import numpy as np
 import pytest
@@ -423,18 +424,27 @@ def test_what_is_written_is_what_its_name_says(fitted, what, text):
 
 
 @pytest.mark.parametrize(
-    "command",
+    ("command", "said"),
     [
-        {"do": "drag"}, {"do": "slide", "speed": "quick"}, {"do": "set"}, {"do": "select"},
-        {"do": "open", "name": "x.csv", "content": "%"}, {"do": "write", "what": "everything"},
-        put("loop", rule="best"), put("loop", limits=[3, 1]), put("model", structure=[0]),
-        put("record", 5, used=True), put("record", 0, options={"path": "/etc/passwd"}),
+        ({"do": "drag"}, "values is a NoneType; expected the parameters"),
+        ({"do": "slide", "speed": "quick"}, "speed='quick'"),
+        ({"do": "slide", "speed": None}, "speed=None"), ({"do": "set"}, "set: .* is incomplete"),
+        ({"do": "select"}, "index=None; expected a whole number in 0...0"),
+        ({"do": "remove", "index": -1}, "index=-1; expected a whole number in 0...0"),
+        ({"do": "open", "name": "x.csv", "content": "%"}, "x.csv"),
+        ({"do": "write", "what": "everything"}, "everything"),
+        ({"do": "dance"}, "choose one of .*'undo'"), ([1], "do='None'"), (None, "do='None'"),
+        (put("loop", rule="best"), "rule='best'"), (put("loop", limits=[3, 1]), r"limits=\(3, 1\)"),
+        (put("model", structure=[0]), r"structure=\[0\]; expected two numbers"),
+        (put("model", structure="FOPDT"), "structure='FOPDT'; expected two numbers"),
+        (put("record", 5, used=True), "index=5"),
+        (put("record", 0, options={"path": "/etc/passwd"}), "options has path"),
     ],
 )  # fmt: skip
-def test_a_command_that_makes_no_sense_is_a_sentence_and_changes_nothing(fitted, command):
+def test_a_command_that_makes_no_sense_is_a_sentence_and_changes_nothing(fitted, command, said):
     session, _ = fitted
     before = json.dumps(session.state)
-    assert session.apply(command)["error"]
+    assert re.search(said, session.apply(command)["error"])
     assert json.dumps(session.state) == before
 
 

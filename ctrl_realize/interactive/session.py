@@ -13,10 +13,11 @@ from functools import partial
 from pathlib import Path
 from typing import Any, TypeVar
 
+from .._checks import check_type, real
 from .._wording import times_in
 from ..data import Record
 from ..data.shown_units import shown_time_unit
-from ..errors import CtrlRealizeError, DataError, FileFormatError
+from ..errors import CtrlRealizeError, DataError, FileFormatError, OptionError
 from ..experiment import plan as plan_test
 from ..io.models import model_to_text
 from . import loops, model_view, models, outputs, records, saving
@@ -98,14 +99,15 @@ class Session:
             command = after(command)
         return answer
 
-    def attempt(self, command: Mapping[str, Any]) -> JSON | Task:
+    def attempt(self, command: object) -> JSON | Task:
         """Answer a command, or tell what has to be computed first, perhaps elsewhere.
 
         Its result is for `store`; then the command that `after` gives is the next one.
         """
-        answer: JSON = {"id": command.get("id")}
+        given = command if isinstance(command, Mapping) else {}
+        answer: JSON = {"id": given.get("id")}
         try:
-            answer |= self._answer(command)
+            answer |= self._answer(given)
         except MissingError as found:
             return found.task
         except (*_REFUSED, OSError) as error:
@@ -216,11 +218,13 @@ class Session:
         return self._change({"do": "add", **given})
 
     def _drag(self, command: Mapping[str, Any]) -> JSON:
-        values = {str(key): float(value) for key, value in command["values"].items()}
+        given: Any = command.get("values")
+        check_type(given, Mapping, "values", "the parameters that are moved", OptionError)
+        values = {str(key): real(value, str(key), "number") for key, value in given.items()}
         return models.drag(self._system(), self._free(), values)
 
     def _slide(self, command: Mapping[str, Any]) -> JSON:
-        settings = self.state["loop"] | {"speed": float(command["speed"])}
+        settings = self.state["loop"] | {"speed": real(command.get("speed"), "speed", "number")}
         loop = loops.tuned_loop(system := self._system(), settings, checked=False)
         numbers = loops.numbers_to_enter(loop.controller, settings)
         return loops.drawn(system, loop, settings, all_plants=False) | {"numbers": numbers}

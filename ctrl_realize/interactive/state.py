@@ -7,7 +7,7 @@ import json
 from collections.abc import Callable, Mapping
 from typing import Any, TypeAlias
 
-from .._checks import one_of, real, rising
+from .._checks import band, integer, one_of, real, rising
 from .._facts import facts
 from .._parameters import SECONDS
 from ..design.tuning.layouts import LAYOUTS
@@ -49,7 +49,7 @@ def _rest(value: Any, name: str) -> list[float | None]:
 
 
 def _structure(value: Any, name: str) -> list[int]:
-    order, degree = value
+    order, degree = band(value, name, "order and relative degree")
     return [int(order), int(degree)]
 
 
@@ -94,7 +94,7 @@ def changed(state: State, command: Mapping[str, Any]) -> State:
     OptionError
         An unknown command, or a value that it does not take.
     """
-    name = one_of(str(command.get("do")), "do", tuple(_CHANGES))
+    name = one_of(str(command.get("do")), "do", (*_CHANGES, *OTHERS))
     new = copy.deepcopy(state)
     try:
         _CHANGES[name](new, command)
@@ -113,21 +113,28 @@ def _add_response(state: State, command: Mapping[str, Any]) -> None:
     state["frf"] = {key: command.get(key) for key in ("file", "name", "path")}
 
 
+def _index(state: State, command: Mapping[str, Any]) -> int:
+    return integer(command.get("index"), "index", 0, len(state["records"]) - 1)
+
+
 def _remove(state: State, command: Mapping[str, Any]) -> None:
-    del state["records"][command["index"]]
+    del state["records"][_index(state, command)]
     state["selected"] = max(0, min(state["selected"], len(state["records"]) - 1))
 
 
 def _select(state: State, command: Mapping[str, Any]) -> None:
-    state["selected"] = range(len(state["records"]))[command["index"]]
+    state["selected"] = _index(state, command)
 
 
 def _set(state: State, command: Mapping[str, Any]) -> None:
     part = one_of(str(command["part"]), "part", tuple(CHECKS))
-    held = state["records"][command["index"]] if part == "record" else state[part]
+    held = state["records"][_index(state, command)] if part == "record" else state[part]
     for name, value in command["values"].items():
         held[one_of(name, "values", tuple(CHECKS[part]))] = CHECKS[part][name](value, name)
 
+
+OTHERS = ("open", "undo", "redo", "view", "compute", "drag", "slide", "figures", "write")
+"""Commands that do not change the state by themselves."""
 
 _CHANGES: dict[str, Callable[[State, Mapping[str, Any]], None]] = {
     "add": _add, "add_response": _add_response, "remove": _remove, "select": _select, "set": _set,
