@@ -48,8 +48,8 @@ MOST_EQUAL = 2000
 """Equal intervals between the times at which a response is drawn."""
 
 _PER_TURN, _PER_PART = 20, 400
-"""Times at which a response is drawn, in a turn of 1 rad, and later in a part of twice the length
-of the part before: a peak is missed by 3e-4 of its height at most."""
+"""Times at which a response is drawn, in a turn of 1 rad, of whose peaks 3e-4 are missed at most,
+and later in a part of twice the length of the part before."""
 
 Signal = Callable[[FloatArray], FloatArray]
 """Inputs (m, K) at K times; right-continuous."""
