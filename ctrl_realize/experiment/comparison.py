@@ -45,7 +45,7 @@ class Achieved(Result):
     >>> bool(found.std < plan.step.std / 2)
     True
     >>> found
-    <Achieved: dead time, standard error 0.89 times the planned 8.21 ms>
+    <Achieved: dead time, standard error 0.87 times the planned 8.21 ms>
     """
 
     plan: ExperimentPlan
