@@ -310,8 +310,9 @@ def test_the_overshoot_of_a_loop_beside_a_slow_mode_is_that_of_its_fast_part():
         y -= (-0.8) ** (k + 1) * np.clip(t - 1 - k, 0, None) ** (k + 1) / factorial(k + 1)
     slow = ct.tf([4950, 1], [5000, 1])  # 1 - 0.01 / (5000 s + 1), seen in 12 s as a gain of 0.99
     found = (fast * slow).step_info()
+    # a peak between two times is missed by 0.03 % of it
     assert found["Overshoot"] == pytest.approx(100 * (0.99 * y.max() - 1), abs=0.1)
-    assert found["PeakTime"] == pytest.approx(t[y.argmax()], abs=0.05)
+    assert found["PeakTime"] == pytest.approx(t[y.argmax()], abs=0.05)  # an interval
 
 
 @pytest.mark.parametrize("gain", [-0.5, 0.8])

@@ -36,8 +36,8 @@ def holds(ends, value):
 
 
 @pytest.mark.parametrize("structures", [None, "FOPDT"])
-@pytest.mark.parametrize("sizes", [(1, 1, 1), (1, 1, -1), (1, -1, 1)])
-@pytest.mark.parametrize(("dead_time", "lag"), [(110.0, 6.0), (140.0, 11.0), (165.0, 20.0)])
+@pytest.mark.parametrize("sizes", [(1, 1, 1), (1, 1, -1)])
+@pytest.mark.parametrize(("dead_time", "lag"), [(110.0, 6.0), (165.0, 20.0)])
 def test_a_dead_time_of_half_a_stair_and_more_is_found(dead_time, lag, sizes, structures):
     # beside a free response and a drift stairs up had a gain of the wrong sign, -11 for 20, and
     # those up and down a dead time that was short by a tenth
@@ -47,7 +47,7 @@ def test_a_dead_time_of_half_a_stair_and_more_is_found(dead_time, lag, sizes, st
     assert holds(fit.interval, dead_time)
     assert holds(fit.gain_interval, 20)
     assert fit.dead_time == pytest.approx(dead_time, abs=1)  # a sample
-    assert fit.gain == pytest.approx(20, rel=0.01)
+    assert fit.gain == pytest.approx(20, rel=0.005)  # half the width of the interval is 0.0012
 
 
 @pytest.mark.parametrize("seed", [0, 2, 3])
@@ -62,7 +62,7 @@ def test_an_integrator_behind_a_binary_input_has_its_slope(seed):
     fit = cr.identify(record_of(binary(seed, 11), response, seed=seed)).fit
     assert fit.integrators == 1
     assert holds(fit.gain_interval, slope)
-    assert fit.gain == pytest.approx(slope, rel=0.05)
+    assert fit.gain == pytest.approx(slope, rel=0.01)  # half the width of the interval is 0.005
     assert holds(fit.interval, dead_time)
 
 
@@ -73,7 +73,7 @@ def test_a_drift_is_no_part_of_a_plant_at_rest(drift):
     assert "fitted from rest" not in " ".join(fit.choices)
     assert holds(fit.gain_interval, 2)
     assert holds(fit.interval, 9.4)
-    assert fit.gain == pytest.approx(2, rel=0.05)
+    assert fit.gain == pytest.approx(2, rel=0.02)  # half the width of the interval is 0.01
 
 
 def test_a_motion_from_before_the_record_is_seen_though_the_input_rests():
