@@ -33,6 +33,7 @@ from .summary import choices_of
 
 _SOUGHT_THEN = 2.0  # times as far where nothing explains the output, or a dead time is at the bound
 _LEAST_REST = 20  # samples before the first move of the input, for a plant at rest
+_MISSED = 0.9  # of the residual with a motion, which is larger only where its search has failed
 _ALL = 0.99  # of a record, from which on the rest is not reported
 
 
@@ -91,15 +92,19 @@ def _fit(
     for record in records:
         _check_moves(record)
     outputs, inputs = zip(*signals, strict=True)
-    size = max(y.size for y in outputs)
+    size, from_rest = max(y.size for y in outputs), None
     if size <= MOST_SAMPLES and not requested.loop and all(map(_begins_at_rest, records)):
         # A free response that begins with the record explains a slow one from rest as well.
         # Ablation: fits from rest.
         latest = requested.latest or SOUGHT * _SOUGHT_THEN * size * dt
-        found = fit_sampled(outputs, inputs, dt, replace(requested, latest=latest, rested=True))
-        if found.follows and found.rests and Rule.FROM_REST.on:
-            return found
+        from_rest = fit_sampled(outputs, inputs, dt, replace(requested, latest=latest, rested=True))
+        if from_rest.follows and from_rest.rests and Rule.FROM_REST.on:
+            return from_rest
     found = _sought(outputs, inputs, dt, requested)
+    if from_rest is not None and from_rest.follows:
+        left, more = from_rest.fit.residual.std, found.fit.residual.std
+        if left < _MISSED * more and Rule.FROM_REST.on:
+            return from_rest
     if refuses and not found.follows:
         latest = requested.latest or SOUGHT * _SOUGHT_THEN * found.data.longest
         codes = [str(code) for y in found.data.measured if (code := missing_code(y))]

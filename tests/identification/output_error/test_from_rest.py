@@ -50,6 +50,15 @@ def test_a_dead_time_of_half_a_stair_and_more_is_found(dead_time, lag, sizes, st
     assert fit.gain == pytest.approx(20, rel=0.005)  # half the width of the interval is 0.0012
 
 
+@pytest.mark.parametrize("seed", [6, 9])
+def test_a_search_with_a_motion_that_fails_does_not_replace_a_fit_from_rest(seed):
+    # by chance this noise has evidence for a motion, with which gains of -14 and -9 were found
+    moves = [(at - 0.001, 1) for at in (30, 230, 430)]
+    fit = cr.identify(record_of(moves, lag_of(20, 20, 140.0), noise=0.005, seed=seed)).fit
+    assert holds(fit.interval, 140)
+    assert holds(fit.gain_interval, 20)
+
+
 @pytest.mark.parametrize("seed", [0, 2, 3])
 def test_an_integrator_behind_a_binary_input_has_its_slope(seed):
     # a lag of 15 to 100 records, in whose free response and drift the slope was lost
