@@ -33,7 +33,14 @@ from ...engine.plausible_models import PlausibleModel
 from ...engine.poles import poles_from_parameters
 from ...engine.problem import Problem, Structure
 from ...engine.static_gain import StaticGain, local_errors
-from ...engine.structures import Candidate, Scales, needless_parameters, pattern_starts, search
+from ...engine.structures import (
+    Candidate,
+    Scales,
+    criteria,
+    needless_parameters,
+    pattern_starts,
+    search,
+)
 from ...engine.window import Window, window_of_rows
 from ...engine.window_fit import WindowFit, fit_window
 from ...rules import Rule
@@ -175,12 +182,12 @@ def seen_at_rest(part: SampledWindow) -> SampledWindow:
     levels = still.problem.segments.shapes
 
     def least(fits: WindowFit) -> float:
-        values = []
-        for structure, one in fits.candidates.items():
-            own = fits.problem.local_count(structure.order) if fits is moving else levels
-            charge = still.penalty * (structure.free + own) + needless_parameters(structure)
-            values.append(one.cost / variance + charge)
-        return min(values)
+        values = criteria(fits.candidates, variance, still.independent)
+        # Local terms are what is chosen here, and are charged as parameters.
+        terms = {s: fits.problem.local_count(s.order) if fits is moving else levels for s in values}
+        return min(
+            value + still.penalty * terms[s] + needless_parameters(s) for s, value in values.items()
+        )
 
     return replace(part, rests=bool(least(still) + STRONG < least(moving)))
 
