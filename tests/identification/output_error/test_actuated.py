@@ -158,6 +158,7 @@ def test_no_linear_model_need_follow_what_a_valve_does():
     trial = both_ends(np.random.default_rng([2, zlib.crc32(b"both_ends")]))
     linear = cr.fit_output_error(trial.records, structures=trial.structures).fit
     # from rest its dead time is right; no question has a good answer, and the reason is told
+    assert linear.interval[0] <= trial.dead_time <= linear.interval[1]
     assert "good" not in {verdict.level for verdict in linear.verdicts}
     assert "not_linear" in [flag.code for flag in linear.flags]
     fit = cr.fit_output_error(
