@@ -14,6 +14,7 @@ from benchmarks.worlds.simulation import (
     FINE,
     Case,
     H,
+    Plant,
     binary,
     coloured,
     drawn,
@@ -196,6 +197,14 @@ def stairs_up(rng: Rng) -> Case:
     return plant.case(record(u, noisy(rng, stepped(rng, plant, u), 0.005)))
 
 
+def load_beside_a_binary_input(rng: Rng) -> Case:
+    """Two lags, a random binary input, a load of 10 to 40 % of its range from 300 to 700 on."""
+    plant, u = drawn(rng, ((0.05, 0.15), (0.1, 0.25)), (0.06, 0.2)), binary(rng, 1000, 20)
+    load = rng.uniform(0.2, 0.8) * step(1000, int(rng.integers(300, 700)))
+    y = stepped(rng, plant, u) + stepped(rng, Plant(0.0, plant.lags, plant.gain), load)
+    return plant.case(record(u, noisy(rng, y)))
+
+
 def slow_disturbance(rng: Rng) -> Case:
     """A slow sine, or AR(1) noise with a pole at 0.998, as large as a third of the response."""
     plant, u = drawn(rng, ((0.05, 0.15), (0.1, 0.25)), (0.12, 0.3)), binary(rng, 1500, 8)
@@ -359,6 +368,7 @@ MADE_FOR = {
     Rule.INTEGRATOR: long_ramp,
     Rule.CORRELATION: far_away,
     Rule.FROM_REST: stairs_up,
+    Rule.SAMPLED_LOADS: load_beside_a_binary_input,
     Rule.RINGING: wandering_output,
     Rule.RECORD_NOISE: unequal_sensors,
     Rule.CURVES: step_behind_a_filter,

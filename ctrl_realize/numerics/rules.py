@@ -84,6 +84,7 @@ class Rule(Enum):
     MORE_LAGS = "fourth and fifth lag"
     CORRELATION = "start from the correlation"
     FROM_REST = "fits from rest"
+    SAMPLED_LOADS = "loads in records of any input"
     HELD_STEPS = "steps that are held"
     CURVES = "curves are no steps"
     SPIKES = "spikes left out"

@@ -206,12 +206,15 @@ def _summary(
         )
     if fit.averaged:
         reasons += loop_choices(records[0])
-        moved = []
-        for i, row, size in found.loads:
-            seen = float(used[i].time[data.offsets[i] + data.every * row])
-            moved.append(f"{size:.3g} seen from {in_time(seen, 4)} on")
-        if moved:
-            reasons.append(chosen("loop.load", moved=", ".join(moved)))
+    first = [record.time[offset] for record, offset in zip(used, data.offsets, strict=True)]
+    moved = ", ".join(
+        f"{size:.3g} seen from {in_time(first[i] + data.step * row, 4)} on"
+        for i, row, size in sorted(found.loads)
+    )
+    if moved and fit.averaged:
+        reasons.append(chosen("loop.load", moved=moved))
+    elif moved:
+        flags.append(flagged("load_disturbance.at_input", moved=moved))
     choices = (*reasons, *choices_of(fit))
     return OutputErrorFit(fit, shown, time, records, repeats, choices=choices, flags=tuple(flags))
 

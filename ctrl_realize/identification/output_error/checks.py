@@ -85,8 +85,9 @@ def checked(fit: OutputErrorFit, *, alone: bool = True) -> OutputErrorFit:
             low = max(low - held[0], 0.0)
             flags.append(held[1])
         white = bool(fit.estimate.residual.noise_lags)
-        # Neither do they hold for means over blocks of samples.
-        complete = complete if shown.rows is None else ()
+        # Neither do they hold for means over blocks of samples, nor beside loads.
+        loaded = "load_disturbance" in codes and not stepped
+        complete = complete if shown.rows is None and not loaded else ()
         # In a loop one step of generalised least squares is biased by the first estimate.
         coloured = (
             alone

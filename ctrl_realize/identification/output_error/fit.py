@@ -188,9 +188,10 @@ def fit_output_error(
 
     One step of a load that moves the output during a step test is looked for. Where the evidence
     for it is very strong, its response, through a lag of its own or through the plant, is part of
-    the model, and a flag tells its time and size. Before 2.5 times the time to 63 % of the response
-    it cannot be told from the response: the model is left as it is, and the gain is open. Of other
-    inputs loads are looked for in records of a loop alone; elsewhere they move the gain.
+    the model, and a flag tells its time and size. Before 1.5 times the time to 63 % of the response
+    it cannot be told from the response: the model is left as it is, and the gain is open. Beside
+    other inputs one step of a load is looked for, or two, at the input of the plant, where nothing
+    but white noise is left with them; in loops beside slow noise as well.
 
     A slope before the step is modelled as a drift, the free response of the plant, or not at all,
     as chosen by the information criterion. A free response begins a dead time after the last move

@@ -53,7 +53,7 @@ from ..signals.noise import correlation_time, mad_sigma
 from .step_data import StepData, stop_at
 
 _PARAMETERS = 3  # time, lag and size
-_LEAST_LOAD, _MOST_LAG = 0.03, 2.0
+LEAST_LOAD, _MOST_LAG = 0.03, 2.0
 """Part of a response from which on a load is one, and its longest lag, over what is left of the
 record: slower ones are drifts."""
 IN_SLOW_NOISE, _MOST_LEFT = 3 * VERY_STRONG, 0.75
@@ -145,7 +145,7 @@ def load_of(
     # Rounding moves a level by up to one step of a coarse converter, and noise with it by another:
     # four of ten 2 % steps of `bench.heater` had such a load.
     motion, least = loaded.motion, 2 * data.quantum if data.coarse else 0.0
-    small = motion is None or abs(load.size) < max(_LEAST_LOAD * motion.span, least)
+    small = motion is None or abs(load.size) < max(LEAST_LOAD * motion.span, least)
     if small or since < _SOONEST * rise or slowest > _MOST_LAG * (data.clock[-1] - load.time):
         return None
     also = refit(loaded, data.output.size, tuple(fits.candidates))

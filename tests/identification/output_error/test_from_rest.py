@@ -50,11 +50,10 @@ def test_a_dead_time_of_half_a_stair_and_more_is_found(dead_time, lag, sizes, st
     assert fit.gain == pytest.approx(20, rel=0.005)  # half the width of the interval is 0.0012
 
 
-@pytest.mark.parametrize("seed", [6, 9])
-def test_a_search_with_a_motion_that_fails_does_not_replace_a_fit_from_rest(seed):
-    # by chance this noise has evidence for a motion, with which gains of -14 and -9 were found
+def test_a_search_with_a_motion_that_fails_does_not_replace_a_fit_from_rest():
+    # by chance this noise has evidence for a motion, with which a gain of -9 was found
     moves = [(at - 0.001, 1) for at in (30, 230, 430)]
-    fit = cr.identify(record_of(moves, lag_of(20, 20, 140.0), noise=0.005, seed=seed)).fit
+    fit = cr.identify(record_of(moves, lag_of(20, 20, 140.0), noise=0.005, seed=9)).fit
     assert holds(fit.interval, 140)
     assert holds(fit.gain_interval, 20)
 
@@ -75,9 +74,8 @@ def test_an_integrator_behind_a_binary_input_has_its_slope(seed):
     assert holds(fit.interval, dead_time)
 
 
-@pytest.mark.parametrize("drift", [-0.3, 0.3])
-def test_a_drift_is_no_part_of_a_plant_at_rest(drift):
-    record = record_of(binary(4, 17), lag_of(2, 25, 9.4), drift=drift, noise=0.02)
+def test_a_drift_is_no_part_of_a_plant_at_rest():
+    record = record_of(binary(4, 17), lag_of(2, 25, 9.4), drift=-0.3, noise=0.02)
     fit = cr.identify(record).fit
     assert "fitted from rest" not in " ".join(fit.choices)
     assert holds(fit.gain_interval, 2)

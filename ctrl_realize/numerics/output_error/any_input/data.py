@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
+from typing import NamedTuple
 
 import numpy as np
 from scipy.signal import lfilter
@@ -42,6 +43,14 @@ MOST_MOVES = 200
 
 MOST_IN_ALL = 12000
 """Samples of all records together; beyond that every record is shortened proportionally."""
+
+
+class Load(NamedTuple):
+    """Step of a load: the record, the output from which on it is seen, and its size as an input."""
+
+    record: int
+    row: int
+    size: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)

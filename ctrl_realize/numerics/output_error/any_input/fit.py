@@ -46,15 +46,14 @@ from ..process_models import fit_requested
 from ..result import OutputErrorEstimate, followed_by
 from ..selection import chains_of
 from .condensed import MOST_LAGS, Condensed, condensed
-from .data import BEYOND, MOST_SAMPLES, SampledData, cut
+from .data import BEYOND, MOST_SAMPLES, Load, SampledData, cut
 from .lag_weights import posterior_of
 from .lags import fit_lags, plain_lags
-from .loads import Load
+from .loads import WHITE
 from .stretch import (
     DIED_AWAY,
     FOLLOWS,
     FOLLOWS_IN_LOOPS,
-    WHITE,
     explained,
     fit_stretch,
     made_white,
@@ -151,6 +150,9 @@ def fit_sampled(
     are given remain those of equal weights where others rule them out in such noise: the residual
     is what they cannot describe.
 
+    Where the residual is coloured a load is looked for, or two, that make it white (`loads`); all
+    that is fitted then is the part in which they are.
+
     Of a record of more than `data.MOST_SAMPLES` a part is fitted. If the response ends within
     `condensed.MOST_LAGS` samples, all samples are fitted afterwards; if the plant is slower, means
     over blocks of samples, with which the part is longer (`stretch`).
@@ -177,7 +179,7 @@ def fit_sampled(
     data, stretch = part.data, part.fit
     fits, sums = stretch, None
     long = any(y.size > every * kept.size for y, kept in zip(outputs, data.outputs, strict=True))
-    if long and complete:
+    if long and complete and not part.loads:
         y, u = (
             [x / scale for x, scale in zip(signals, data.scales, strict=True)]
             for signals in (outputs, inputs)
@@ -222,7 +224,7 @@ def fit_sampled(
     close = fit.close + close_to("adequate", correlation, WHITE)
     fitted = fit.fitted * np.repeat(data.scales, data.counts)
     fit = _at_rest(data, replace(fit, residual=residual, close=close, fitted=fitted))
-    return SampledFit(fit, data, explained(stretch), part.noise, sums, rests=part.rests)
+    return SampledFit(fit, data, explained(stretch), part.noise, sums, part.loads, part.rests)
 
 
 def _of_measured(

@@ -41,7 +41,7 @@ from ...families.lag_profiles import with_profiled_lags
 from ...families.process_form import ProcessForm
 from ...rules import Rule
 from ...signals.noise import correlation_time
-from ...signals.noise_model import coloured_criterion, noise_lags
+from ...signals.noise_model import noise_lags
 from ..load import IN_SLOW_NOISE
 from ..other_structures import Requested, line_of
 from ..profiles import profile_of
@@ -53,10 +53,10 @@ from ..result import (
     StructureFit,
     assembled,
 )
-from .data import SOUGHT, SampledData
+from .data import SOUGHT, Load, SampledData
 from .lag_weights import charged_misfit, known_dead_time, profiled, weighted, with_moves
-from .loads import Lags, Load, sized, sought, with_loads
-from .window import SampledWindow, fit_windows, noise_model, simulation_error
+from .loads import Lags, charge, gained, sized, sought, unlikely, with_loads, within_motion
+from .window import SampledWindow, fit_windows, left_of, noise_model
 
 LAGS = tuple(ProcessForm(f"P{n}D", n) for n in (1, 2, 3))
 FURTHER = ProcessForm("P4D", 4)  # where three lags are chosen
@@ -75,11 +75,6 @@ tenth to a fifth of the true ones. Ablation: first turn in slow noise."""
 _HIDDEN = 0.1
 """Of the record, that may come from before it and is left out for that: dead times longer than what
 is left out would be ruled out by samples that depend on an input that is not known."""
-_LASTING = 0.05, 0.95
-"""Quantiles of an input between which it moves for longer than a pulse. Of 194 loops beside a load
-that drifts eight had a load of three to six times the lasting motion in place of the response to
-the set point, and dead times of three to five times the true ones; four had with the range of the
-input, none has with these."""
 
 
 def plain_lags(requested: Requested) -> bool:
@@ -179,9 +174,7 @@ class _Turn(NamedTuple):
     @property
     def lags(self) -> Lags:
         """The best model with its numerator."""
-        best = self.best
-        state = evaluate(self.part.fit.problem, best.structure, best.parameters[None])
-        return Lags(best, state.numerator[0])
+        return Lags.of(self.part, self.best)
 
     @property
     def left(self) -> tuple[FloatArray, ...]:
@@ -214,7 +207,7 @@ def _turn(
     fits, fitted = _fitted(part.fit, forms, like.fitted if like else [])
     best = _plain(min(fitted, key=partial(charged_misfit, fits)))
     part = replace(part, fit=fits)
-    errors = _left(part, best)
+    errors = left_of(part, best)
     lags = noise_lags(min(part.data.counts)) if whiten else 0
     following = noise_model(part, best, np.concatenate(errors), lags)
     made = _Turn(part, fitted, best, errors, following, [])
@@ -235,16 +228,10 @@ def _beside(
 
 
 def _tells(made: _Turn, more: _Turn) -> bool:
-    """Whether a fit beside a load tells it: it is charged for its time and its size.
-
-    The controller answers a load by its opposite, for as long as the load stays: one that is larger
-    than the motion of the input, but for short pulses, takes the place of a response to that.
-    """
-    motions = [np.ptp(np.quantile(u, _LASTING)) for u in made.part.data.inputs]
-    answered = all(abs(load.size) < motions[load.record] for load in more.loads)
+    """Whether a fit beside a load tells it."""
+    excess = gained(made.errors, more.errors) - charge(made.errors)
     needed = VERY_STRONG if more.noise.size == 1 else IN_SLOW_NOISE
-    charge = 2 * np.log(sum(made.part.data.counts))
-    return answered and _gained(made, more) > needed + charge
+    return within_motion(more.part.data, more.loads) and excess > needed
 
 
 def _alike(before: Sequence[Load], after: Sequence[Load]) -> bool:
@@ -262,18 +249,7 @@ def _same(noise: FloatArray, following: FloatArray) -> bool:
 
 def _likelier(one: _Turn, other: _Turn) -> _Turn:
     """Of two turns the one whose errors are the likelier."""
-    return other if _gained(one, other) > 0 else one
-
-
-def _gained(before: _Turn, after: _Turn) -> float:
-    """Decrease of the criterion of what is left of the records."""
-    count = min(*before.part.data.counts, *after.part.data.counts)
-    return _unlikely(before.errors, count) - _unlikely(after.errors, count)
-
-
-def _unlikely(errors: Sequence[FloatArray], count: int) -> float:
-    """Criterion of the last samples that are left of every record, with noise of their own."""
-    return coloured_criterion([error[-count:] for error in errors])[0]
+    return other if gained(one.errors, other.errors) > 0 else one
 
 
 def _fitted(
@@ -297,11 +273,6 @@ def _robust(
     return _fitted(replace(fits, problem=window.with_output(pulled)), forms, fitted)
 
 
-def _left(part: SampledWindow, model: Candidate) -> list[FloatArray]:
-    """What a model leaves of every record."""
-    return np.split(simulation_error(part.data, model, part.fit), part.data.edges[1:-1])
-
-
 def _better(
     part: SampledWindow, lags: Candidate, within: tuple[float, float]
 ) -> StructureFit | None:
@@ -313,8 +284,8 @@ def _better(
     count = min(*part.data.counts, *rivals.data.counts)
 
     def value(window: SampledWindow, model: Candidate) -> float:
-        left = _left(window, model)
-        return _unlikely(left, count) + model.structure.free * float(np.log(count * len(left)))
+        left = left_of(window, model)
+        return unlikely(left, count) + model.structure.free * float(np.log(count * len(left)))
 
     every = [
         one

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -24,6 +25,7 @@ from ...rules import Rule
 from ..other_structures import Requested
 from .condensed import MOST_LAGS
 from .data import BEYOND, SOUGHT, SampledData, cut
+from .loads import WHITE, beside_loads
 from .window import (
     ORDERS,
     SampledWindow,
@@ -39,9 +41,6 @@ relation to the input reached 23 in 25 records, for the best of all delays and l
 FOLLOWS_IN_LOOPS = 25.0
 """That of lags and noise fitted together in a loop: five. 30 loops about nothing that responds
 reached 18; of 24 loops in AR(0.97) noise whose set point moves once, 36 refused nine."""
-WHITE = 3.0
-"""Correlation time of the residual, in samples, up to which a model is taken for right: twice what
-white noise scatters to. It decides on flags alone."""
 
 DIED_AWAY = 10.0  # slowest time constants in which a response ends, but for 5e-5 of it
 _SEEN = 40.0  # slowest time constants in the part that is fitted, if the record is as long
@@ -61,11 +60,24 @@ def fit_stretch(
     limit = SOUGHT * data.longest if requested.latest is None else requested.latest
     within = requested.earliest, max(limit, requested.earliest)
     part = fit_windows(data, structures, within, requested.huber, np.ones(1))
+    white = None
+    sought = requested.whiten and requested.compared and not requested.loop
+    if sought and Rule.SAMPLED_LOADS.on:
+        refit = partial(fit_windows, within=within, huber=requested.huber, noise=np.ones(1))
+        part, white = beside_loads(part, refit, partial(_white, requested))
     if data.rested:
         part = seen_at_rest(part)
         if not part.rests:
             return part
-    return part if requested.structures is not None else made_white(part, requested)
+    if requested.structures is not None:
+        return part
+    return made_white(part, requested) if white is None else replace(white, rests=part.rests)
+
+
+def _white(
+    requested: Requested, part: SampledWindow, structures: Sequence[Structure]
+) -> SampledWindow:
+    return made_white(part, replace(requested, structures=tuple(structures)))
 
 
 def made_white(part: SampledWindow, requested: Requested) -> SampledWindow:
@@ -77,7 +89,7 @@ def made_white(part: SampledWindow, requested: Requested) -> SampledWindow:
     # In a loop the noise model is needed for consistency [1]_.
     if requested.simulates and not requested.loop and simulates_worse(weighted, part):
         return part
-    return replace(weighted, unweighted=part.model, rests=part.rests)
+    return replace(weighted, unweighted=part.model, rests=part.rests, loads=part.loads)
 
 
 def samples_in_a_block(

@@ -48,7 +48,7 @@ from ...signals.noise import correlation_time, quantisation_step, winsorised_sig
 from ...signals.noise_model import noise_lags, whitening_filter
 from ...signals.onset import correlation_onset
 from ..step_data import step_data
-from .data import BEYOND, MOST_SAMPLES, SampledData
+from .data import BEYOND, MOST_SAMPLES, Load, SampledData
 
 ORDERS = tuple(Structure(n, r) for n in range(1, 4) for r in range(n, 0, -1))
 """Every sample counts here, so that orders 4 and 5 would take most of the time."""
@@ -71,7 +71,8 @@ class SampledWindow:
 
     `data` are the records before the filter, without the samples that depend on the unknown past;
     `unweighted` is the model before it, and `residual` as for `SampledData.whitened`. `rests` tells
-    whether records fitted from rest have neither a free response nor a drift.
+    whether records fitted from rest have neither a free response nor a drift; `loads` are those
+    that were found.
     """
 
     data: SampledData
@@ -82,6 +83,7 @@ class SampledWindow:
     unweighted: PlausibleModel | None = None
     residual: tuple[FloatArray, ...] = ()
     rests: bool = False
+    loads: tuple[Load, ...] = ()
 
     @property
     def model(self) -> PlausibleModel:
@@ -232,6 +234,11 @@ def simulation_error(data: SampledData, model: Candidate, fit: WindowFit) -> Flo
     """Error of a simulation with the best local terms, and the numerator that a fit gives."""
     state = evaluate(fit.problem, model.structure, model.parameters[None])
     return np.asarray(data.problem.data - modelled(data, model.parameters, state.numerator[0]))
+
+
+def left_of(part: SampledWindow, model: Candidate) -> list[FloatArray]:
+    """What a model leaves of every record."""
+    return np.split(simulation_error(part.data, model, part.fit), part.data.edges[1:-1])
 
 
 def _settles(static: StaticGain) -> bool:
