@@ -41,7 +41,7 @@ def loaded(*moves):
 
 @pytest.mark.parametrize("moves", [[(400, 0.5)], [(250, 0.5), (550, -0.5)]])
 def test_a_load_is_told_and_taken_out_of_the_gain(moves):
-    # without it the gain was 12 % off, and of one that comes and goes a hundred times too small
+    # the gains were -5 and -6.1
     fit = cr.identify(record(binary(4), loaded(*moves), seed=4)).fit
     assert fit.gain == pytest.approx(GAIN, rel=0.02)  # half the width of the interval is 0.007
     assert fit.gain_interval[0] <= GAIN <= fit.gain_interval[1]

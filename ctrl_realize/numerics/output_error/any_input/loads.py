@@ -116,7 +116,8 @@ def _beside_some(
 ) -> SampledWindow | None:
     """Fit beside the likeliest loads, if they are worth their parameters.
 
-    In coloured noise, which their own part of it is, their times show less, but noise less of them.
+    They are tried at two places, as the noise model of `white` has taken some of a load for noise,
+    and the poles of `part` some for a response: where either finds them likeliest.
     """
     found: list[Load] = []
     more, model = part, white
