@@ -21,7 +21,7 @@ from ....numerics.engine.problem import Structure
 from ....numerics.engine.static_gain import static_gain
 from ....numerics.engine.structures import Scales
 from ....numerics.families.physical import fitted_parameters
-from ....numerics.output_error.any_input.loads import WHITE
+from ....numerics.output_error.any_input.window import WHITE
 from ....numerics.output_error.result import (
     Followed,
     OutputErrorEstimate,

@@ -49,7 +49,6 @@ from .condensed import MOST_LAGS, Condensed, condensed
 from .data import BEYOND, MOST_SAMPLES, Load, SampledData, cut
 from .lag_weights import posterior_of
 from .lags import fit_lags, plain_lags
-from .loads import WHITE
 from .stretch import (
     DIED_AWAY,
     FOLLOWS,
@@ -60,7 +59,7 @@ from .stretch import (
     response_samples,
     samples_in_a_block,
 )
-from .window import ORDERS, SampledWindow, modelled, window_of
+from .window import ORDERS, WHITE, SampledWindow, modelled, window_of
 
 MORE_LAGS = (Structure(4, 4), Structure(5, 5))
 """Tried as well where three poles are chosen: zeros beside them imitate further lags. Ablation:

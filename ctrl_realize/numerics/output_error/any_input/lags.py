@@ -55,7 +55,7 @@ from ..result import (
 )
 from .data import SOUGHT, Load, SampledData
 from .lag_weights import charged_misfit, known_dead_time, profiled, weighted, with_moves
-from .loads import Lags, charge, gained, sized, sought, unlikely, with_loads, within_motion
+from .loads import Lags, charge, gained, over_motion, sized, sought, unlikely, with_loads
 from .window import SampledWindow, fit_windows, left_of, noise_model
 
 LAGS = tuple(ProcessForm(f"P{n}D", n) for n in (1, 2, 3))
@@ -231,7 +231,8 @@ def _tells(made: _Turn, more: _Turn) -> bool:
     """Whether a fit beside a load tells it."""
     excess = gained(made.errors, more.errors) - charge(made.errors)
     needed = VERY_STRONG if more.noise.size == 1 else IN_SLOW_NOISE
-    return within_motion(more.part.data, more.loads) and excess > needed
+    smaller = all(size < 1 for size in over_motion(more.part.data, more.loads))
+    return smaller and excess > needed
 
 
 def _alike(before: Sequence[Load], after: Sequence[Load]) -> bool:

@@ -38,11 +38,8 @@ from ...engine.structures import Candidate
 from ...signals.noise_model import coloured_criterion
 from ..load import LEAST_LOAD
 from .data import Load, SampledData
-from .window import SampledWindow, left_of
+from .window import WHITE, SampledWindow, left_of
 
-WHITE = 3.0
-"""Correlation time of the residual, in samples, up to which a model is taken for right: twice what
-white noise scatters to."""
 _MOST = 2
 """Loads of records without feedback: what more of them explain is another plant, as a hysteresis,
 which one in each direction imitates."""
@@ -56,7 +53,7 @@ _TIMES = 200  # of a load that are tried in a record, and then every sample abou
 
 
 Refit: TypeAlias = Callable[..., SampledWindow]
-Whiten: TypeAlias = Callable[[SampledWindow, Sequence[Structure]], SampledWindow]
+Whiten: TypeAlias = Callable[[SampledWindow], SampledWindow]
 
 
 class Lags(NamedTuple):
@@ -95,50 +92,43 @@ def beside_loads(
     """
     if part.fit.correlation <= WHITE:
         return part, part
-    every = list(part.fit.candidates)
-    white = whiten(part, every)
+    white = whiten(part)
     lags = Lags.of(white, white.fit.best)
-    _, score = _likeliest(part.data.without_loads, white, lags, [])
+    load, score = _likeliest(white.data.without_loads, white, lags, [])
     if score <= VERY_STRONG:
         return part, white
+    every = list(part.fit.candidates)
     few = [s for s in every if s in _SIMPLE or s == white.fit.best.structure]
-    for loads in range(1, _MOST + 1):
-        more = _beside_some(part, white, refit, few, loads)
-        if more is not None and _tells(part, more):
-            more = _again(more, refit, every)
-            if _tells(part, more):
-                return more, more
+    # The noise model of `white` has taken some of a load for noise, and the poles of `part` some
+    # for a response: loads are tried where either finds them likeliest.
+    found, more, like = [load], part, white
+    for _ in range(_MOST):
+        placed, another = _placed(more, like, more.loads)
+        if another is None:
+            break
+        more = like = _beside(more, like, [*placed, another], refit, few)
+        ways = [_again(one, refit, few) for one in (_beside(part, white, found, refit, few), more)]
+        best = max(ways, key=partial(_excess, part))
+        if _excess(part, best) > 0:
+            best = _again(_needed(best, refit, few), refit, few)
+            if _tells(part, best):
+                best = _again(best, refit, every)
+                if _tells(part, best):
+                    return best, best
+        found, another = _placed(white, white, found)
+        if another is None:
+            break
+        found.append(another)
     return part, white
 
 
-def _beside_some(
-    part: SampledWindow, white: SampledWindow, refit: Refit, few: Sequence[Structure], loads: int
-) -> SampledWindow | None:
-    """Fit beside the likeliest loads, if they are worth their parameters.
-
-    They are tried at two places, as the noise model of `white` has taken some of a load for noise,
-    and the poles of `part` some for a response: where either finds them likeliest.
-    """
-    found: list[Load] = []
-    more, model = part, white
-    for _ in range(loads):
-        found, another = _placed(white, white, found)
-        if another is None:
-            return None
-        found.append(another)
-        placed, another = _placed(more, model, more.loads)
-        if another is None:
-            return None
-        more = model = _beside(more, model, [*placed, another], refit, few)
-    ways = [_again(each, refit, few) for each in (_beside(part, white, found, refit, few), more)]
-    more = max(ways, key=partial(_excess, part))
-    if _excess(part, more) <= 0:
-        return None
-    if loads > 1:
-        largest = max(more.loads, key=lambda load: abs(load.size))
-        alone = _beside(more, more, [largest], refit, few)
-        more = more if _excess(alone, more) > VERY_STRONG else alone
-    return _again(more, refit, few)
+def _needed(part: SampledWindow, refit: Refit, few: Sequence[Structure]) -> SampledWindow:
+    """Leave out all loads but the largest if it explains as much alone."""
+    if len(part.loads) < 2:
+        return part
+    largest = max(part.loads, key=lambda load: abs(load.size))
+    alone = _beside(part, part, [largest], refit, few)
+    return part if _excess(alone, part) > VERY_STRONG else alone
 
 
 def _again(part: SampledWindow, refit: Refit, structures: Sequence[Structure]) -> SampledWindow:
@@ -166,9 +156,8 @@ def _beside(
 
 
 def _tells(part: SampledWindow, more: SampledWindow) -> bool:
-    motions = _motions(more.data)
-    large = all(abs(load.size) > LEAST_LOAD * motions[load.record] for load in more.loads)
-    right = large and within_motion(more.data, more.loads) and more.fit.correlation <= WHITE
+    sizes = over_motion(more.data, more.loads)
+    right = more.fit.correlation <= WHITE and all(LEAST_LOAD < size < 1 for size in sizes)
     return right and _excess(part, more) > VERY_STRONG
 
 
@@ -178,18 +167,14 @@ def _excess(part: SampledWindow, more: SampledWindow) -> float:
     return gained(before, after) - charge(after, len(more.loads) - len(part.loads))
 
 
-def within_motion(data: SampledData, loads: Sequence[Load]) -> bool:
-    """Whether loads are smaller than the motion of the input, but for short pulses.
+def over_motion(data: SampledData, loads: Sequence[Load]) -> list[float]:
+    """Sizes of loads over the motion of the input of their record, but for short pulses.
 
-    A controller answers a load by its opposite, for as long as the load stays: a larger one takes
-    the place of a response to that.
+    A controller answers a load by its opposite, for as long as the load stays: one that is larger
+    than the motion takes the place of a response to that.
     """
-    motions = _motions(data)
-    return all(abs(load.size) < motions[load.record] for load in loads)
-
-
-def _motions(data: SampledData) -> list[float]:
-    return [float(np.ptp(np.quantile(u, _LASTING))) for u in data.inputs]
+    motions = [float(np.ptp(np.quantile(u, _LASTING))) for u in data.inputs]
+    return [abs(load.size) / max(motions[load.record], SMALLEST) for load in loads]
 
 
 def charge(errors: Sequence[FloatArray], loads: int = 1) -> float:

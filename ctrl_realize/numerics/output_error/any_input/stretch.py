@@ -25,9 +25,10 @@ from ...rules import Rule
 from ..other_structures import Requested
 from .condensed import MOST_LAGS
 from .data import BEYOND, SOUGHT, SampledData, cut
-from .loads import WHITE, beside_loads
+from .loads import beside_loads
 from .window import (
     ORDERS,
+    WHITE,
     SampledWindow,
     fit_windows,
     in_coloured_noise,
@@ -60,24 +61,18 @@ def fit_stretch(
     limit = SOUGHT * data.longest if requested.latest is None else requested.latest
     within = requested.earliest, max(limit, requested.earliest)
     part = fit_windows(data, structures, within, requested.huber, np.ones(1))
-    white = None
+    white, whiten = None, partial(made_white, requested=requested)
     sought = requested.whiten and requested.compared and not requested.loop
     if sought and Rule.SAMPLED_LOADS.on:
         refit = partial(fit_windows, within=within, huber=requested.huber, noise=np.ones(1))
-        part, white = beside_loads(part, refit, partial(_white, requested))
+        part, white = beside_loads(part, refit, whiten)
     if data.rested:
         part = seen_at_rest(part)
         if not part.rests:
             return part
     if requested.structures is not None:
         return part
-    return made_white(part, requested) if white is None else replace(white, rests=part.rests)
-
-
-def _white(
-    requested: Requested, part: SampledWindow, structures: Sequence[Structure]
-) -> SampledWindow:
-    return made_white(part, replace(requested, structures=tuple(structures)))
+    return whiten(part) if white is None else replace(white, rests=part.rests)
 
 
 def made_white(part: SampledWindow, requested: Requested) -> SampledWindow:

@@ -52,6 +52,9 @@ from .data import BEYOND, MOST_SAMPLES, Load, SampledData
 
 ORDERS = tuple(Structure(n, r) for n in range(1, 4) for r in range(n, 0, -1))
 """Every sample counts here, so that orders 4 and 5 would take most of the time."""
+WHITE = 3.0
+"""Correlation time of the residual, in samples, up to which a model is taken for right: twice what
+white noise scatters to."""
 _FEW = (Structure(1, 1), Structure(2, 2))  # with which a motion is tried beside the best
 _NOISE_TURNS = 2
 """Noise models, each from the residual of the previous fit: the first residual contains what
