@@ -51,6 +51,17 @@ def test_a_load_is_told_and_taken_out_of_the_gain(moves):
         assert any(f" {at + late} s" in words for late in range(-3, 4))
 
 
+def test_what_a_simulation_follows_is_without_the_load():
+    data = record(binary(4), loaded((400, 0.5)), seed=4)
+    system = cr.identify(data)
+    y, simulated = np.ravel(data.output), system.simulate(np.ravel(data.input))
+    used = slice(-system.fit.time.size, None)  # the first samples may not be
+    alone = 100 * (1 - np.std((y - simulated)[used]) / np.std(y[used]))
+    assert system.fit.simulated_percent == pytest.approx(alone, abs=1e-6)  # the same sum
+    assert system.fit.fit_percent > alone + 20
+    assert "without loads" in system.fit.report()
+
+
 def test_a_load_beside_samples_that_are_missing_is_told():
     whole = record(binary(1), loaded((400, 0.5)), seed=1)
     y = np.ravel(whole.output).copy()

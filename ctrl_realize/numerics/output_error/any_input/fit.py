@@ -214,6 +214,8 @@ def fit_sampled(
         if fit.structure in fit.points:
             _, low, high = posterior_of(fit.points[fit.structure], fits.variance)
             fit = replace(fit, low=min(fit.low, low), high=max(fit.high, high))
+    elif part.loads:
+        fit = _of_measured(part, fit)
     elif fit.distributed.chain:
         left = correlation_time(fits.window.output - fit.fitted)
         fit = replace(fit, residual=fit.residual._replace(correlation=left), adequate=left <= WHITE)
