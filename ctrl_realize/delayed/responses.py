@@ -9,6 +9,7 @@ import numpy as np
 from .._checks import integer
 from ..numerics.arrays import ComplexArray, FloatArray, later
 from ..numerics.internal_delays.recurrence import recurrence
+from ..numerics.internal_delays.stability import in_s_plane
 from ..numerics.state_space import responses
 from .chains import powers
 from .host_responses import HostResponses
@@ -57,10 +58,7 @@ class DelayedResponses(HostResponses, CoreAndDelays):
 
     def features(self) -> tuple[ComplexArray, float]:
         """Poles in the s-plane where the response changes quickly, and the largest delay in s."""
-        poles = self._core.poles()
-        poles = poles[np.abs(poles) > 0.05]
-        dead_time = float(np.max(self.delay)) * self.dt
-        return np.asarray(np.log(poles) / self.dt, dtype=np.complex128), dead_time
+        return in_s_plane(self._core.poles(), self.dt), float(np.max(self.delay)) * self.dt
 
     def _with_delay(self, response: Any, count: int) -> FloatArray:
         free: FloatArray = response(*matrices_of(self._core), count)

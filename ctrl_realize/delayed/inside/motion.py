@@ -84,16 +84,7 @@ class Motion(InsidePoles):
         state = spread(initial_state, form.states, "initial_state")
         before = spread(history, len(form.delays), "history")
         try:
-            outputs, error = solve(
-                form,
-                signal,
-                times,
-                breaks,
-                initial_state=state,
-                history=before,
-                tolerance=wanted,
-                slope=slope,
-            )
+            outputs, error = solve(form, signal, times, breaks, state, before, wanted, slope=slope)
         except TooManyStepsError as needed:
             raise UnsuitableSystemError(
                 f"{times[-1]:g} s need {needed} steps, each no longer than the shortest delay "

@@ -12,6 +12,7 @@ import numpy as np
 from ...delayed import DelayedStateSpace, DelaySystem
 from ...errors import UnsuitableSystemError
 from ...numerics.arrays import ComplexArray, FloatArray
+from ...numerics.internal_delays.stability import in_s_plane
 from ...numerics.state_space.responses import frequency_response, schur_form
 from ..delay_line import DelayLineController
 
@@ -94,14 +95,6 @@ def pole_ratio(poles: ComplexArray, dt: float) -> Callable[[ComplexArray, float]
     return ratio
 
 
-def in_s_plane(points: ComplexArray, dt: float) -> ComplexArray:
-    """Map poles or zeros to the s-plane; those at z = 0 are left out."""
-    if not dt:
-        return points
-    # Far inside the circle there are no sharp features that the uniform part of a grid would miss.
-    return np.asarray(np.log(points[np.abs(points) > 0.05]) / dt, dtype=np.complex128)
-
-
 def _state_space_factor(core: ct.StateSpace, dt: float, delay: int) -> Factor:
     A = np.asarray(core.A, dtype=np.float64)
     shift = 1.0 if dt else 0.0
@@ -180,10 +173,7 @@ def shifted_polynomial(
     degree = coefficients.size - 1
     if shift == 0.0 or degree > 8:
         return lambda w: np.asarray(np.polyval(coefficients, w + shift), dtype=np.complex128)
-    moved = coefficients.astype(np.float64)
-    for stop in range(degree, 0, -1):
-        for i in range(1, stop + 1):
-            moved[i] += shift * moved[i - 1]
+    moved = np.poly1d(coefficients)(np.poly1d([1.0, shift])).coeffs
     return lambda w: np.asarray(np.polyval(moved, w), dtype=np.complex128)
 
 

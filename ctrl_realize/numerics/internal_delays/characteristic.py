@@ -46,22 +46,18 @@ def newton_steps(
     With `zeros` of Rosenbrock's system matrix, which is singular at the zeros of the system,
     instead.
     """
-    n, q = form.states, len(form.delays)
-    more = form.inputs if zeros else 0
-    d = np.asarray(form.delays, dtype=np.float64)
+    n, d = form.states, np.asarray(form.delays, dtype=np.float64)
     out = np.empty(points.size, dtype=np.complex128)
     for start in range(0, points.size, CHUNK):
         x = points[start : start + CHUNK]
         matrices = characteristic_matrices(form, x, discrete=discrete, ends=zeros)
         held, _ = turns(form.delays, x, discrete=discrete)
-        rates = np.zeros((x.size, n + q + more), dtype=np.complex128)
-        rates[:, :n] = 1.0
+        slopes = d * held
         if discrete:
             with np.errstate(divide="ignore", invalid="ignore"):
-                slope = np.where(x[:, None] == 0, 0.0, d * held / x[:, None])
-            rates[:, n : n + q] = np.where((x[:, None] == 0) & (d == 1), 1.0, slope)
-        else:
-            rates[:, n : n + q] = d * held
+                slopes = np.where(x[:, None] == 0, d == 1, slopes / x[:, None])
+        rates = np.zeros(matrices.shape[:2], dtype=np.complex128)
+        rates[:, :n], rates[:, n : n + d.size] = 1.0, slopes
         out[start : start + CHUNK] = _reciprocal_traces(matrices, rates)
     return out
 
@@ -144,21 +140,15 @@ def loops(form: DelayForm) -> list[DelayForm]:
         Without inputs and outputs; the poles of the system are those of the parts together.
     """
     n, m, p = form.states, form.inputs, form.outputs
-    links = np.block([[form.A, form.B[:, m:]], [form.C[p:], form.D[p:, m:]]])
+    A, B, C, D = form.A, form.B[:, m:], form.C[p:], form.D[p:, m:]
+    links = np.block([[A, B], [C, D]])
     count, label = connected_components(links != 0, directed=True, connection="strong")
     parts = []
     for k in range(count):
         (members,) = np.nonzero(label == k)
-        states, channels = members[members < n], members[members >= n] - n
-        parts.append(
-            DelayForm(
-                form.A[np.ix_(states, states)],
-                form.B[np.ix_(states, m + channels)],
-                form.C[np.ix_(p + channels, states)],
-                form.D[np.ix_(p + channels, m + channels)],
-                tuple(form.delays[i] for i in channels),
-            )
-        )
+        x, w = members[members < n], members[members >= n] - n  # states and delays
+        blocks = A[np.ix_(x, x)], B[np.ix_(x, w)], C[np.ix_(w, x)], D[np.ix_(w, w)]
+        parts.append(DelayForm(*blocks, tuple(form.delays[i] for i in w)))
     return parts
 
 

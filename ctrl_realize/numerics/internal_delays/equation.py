@@ -86,10 +86,10 @@ def solve(
     inputs: Signal,
     times: FloatArray,
     breaks: FloatArray,
-    *,
     initial_state: FloatArray,
     history: FloatArray,
     tolerance: float,
+    *,
     slope: bool = False,
 ) -> tuple[FloatArray, float]:
     """Solve a continuous system closed through delays.
@@ -166,9 +166,8 @@ def _distinct(times: FloatArray, close: float) -> FloatArray:
 
 def _shortest_time(form: DelayForm) -> float:
     """Time in which the core turns or grows; what decays fast needs no short steps."""
-    poles = np.linalg.eigvals(form.A) if form.states else np.zeros(0, dtype=np.complex128)
-    rates = np.maximum(np.abs(poles.imag), poles.real)
-    rate = float(rates.max(initial=0.0))
+    poles = np.linalg.eigvals(form.A)
+    rate = float(np.maximum(np.abs(poles.imag), poles.real).max(initial=0.0))
     return 2 / rate if rate > 0 else np.inf
 
 
@@ -187,8 +186,7 @@ def _mesh(points: FloatArray, longest: float, end: float) -> FloatArray:
 
 def _radau() -> tuple[FloatArray, FloatArray]:
     """Points in (0, 1], the last one 1, and the matrix of integrals of their polynomials."""
-    inner = (1 + roots_jacobi(STAGES - 1, 1.0, 0.0)[0]) / 2
-    c = np.append(inner, 1.0)
+    c = np.append((1 + roots_jacobi(STAGES - 1, 1.0, 0.0)[0]) / 2, 1.0)
     powers = np.arange(STAGES)
     values, integrals = c[:, None] ** powers, c[:, None] ** (powers + 1) / (powers + 1)
     weights = np.linalg.solve(values.T, integrals.T).T
@@ -252,16 +250,14 @@ def _stepped(
     channel = np.arange(q)
     for s in range(S):
         drive[:, :m] = u[s]
-        if q:
-            drive[:, m:] = (z[where[s], channel] * weights[s]).sum(axis=-1)
+        drive[:, m:] = (z[where[s], channel] * weights[s]).sum(axis=-1)
         found = matrices[same[s]] @ known
         seen = found[n:].reshape(K, p + q)
         y[s], z[s] = seen[:, :p], seen[:, p:].T
         known[:n] = found[:n]
     at = np.searchsorted(mesh, times + SNAP * (mesh[-1] or 1.0), side="right") - 1
     at = np.clip(at, 0, S - 1)
-    local = np.clip((times - mesh[at]) / lengths[at], 0.0, 1.0)
-    weights_there = _weights(local)
+    weights_there = _weights(np.clip((times - mesh[at]) / lengths[at], 0.0, 1.0))
     if slope:
         weights_there = weights_there @ SLOPES / lengths[at][:, None]
     return np.asarray(np.einsum("tk,tkp->pt", weights_there, y[at]), dtype=np.float64)
@@ -300,9 +296,7 @@ def _past(
         # Points next to an end belong to the step that the middle of this one falls beside.
         nudged = inner + 1e-7 * (middle - inner) - tau
         at = np.searchsorted(mesh, nudged, side="right") - 1
-        before = nudged < 0
         at = np.clip(at, 0, S - 1)
-        local = (inner - tau - mesh[at]) / lengths[at]
-        weights[:, :, i] = _weights(np.clip(local, 0.0, 1.0))
-        where[:, :, i] = np.where(before, -1, at)
+        weights[:, :, i] = _weights(np.clip((inner - tau - mesh[at]) / lengths[at], 0.0, 1.0))
+        where[:, :, i] = np.where(nudged < 0, -1, at)
     return where, weights

@@ -111,9 +111,8 @@ def append(first: DelayForm, second: DelayForm) -> DelayForm:
     columns += range(m + q + m2, m + q + m2 + q2)
     rows = [*range(p), *range(p + q, p + q + p2), *range(p, p + q)]
     rows += range(p + q + p2, p + q + p2 + q2)
-    return DelayForm(
-        A, B[:, columns], C[rows], D[np.ix_(rows, columns)], first.delays + second.delays
-    )
+    delays = first.delays + second.delays
+    return DelayForm(A, B[:, columns], C[rows], D[np.ix_(rows, columns)], delays)
 
 
 def _beside(one: FloatArray, other: FloatArray) -> FloatArray:

@@ -52,9 +52,8 @@ def recurrence(form: DelayForm, inputs: FloatArray, state: FloatArray | None = N
     N = inputs.shape[1]
     begin, lines_before = np.zeros(form.states), [np.zeros(int(d)) for d in form.delays]
     if state is not None:
-        begin, *lines_before = np.split(
-            state, form.states + np.cumsum([0, *map(len, lines_before)])[:-1]
-        )
+        ends = form.states + np.cumsum([0, *map(len, lines_before)])[:-1]
+        begin, *lines_before = np.split(state, ends)
     else:
         # Longer than the record they hold nothing back that could come out.
         keep = [i for i, delay in enumerate(form.delays) if delay < N]

@@ -80,13 +80,20 @@ def settled_frequency(form: DelayForm, low: float) -> float:
     """Find the frequency in rad/s from which on a continuous function stays near 1."""
     top = low
     for _ in range(80):
-        omega = top * np.geomspace(1, 1e4, 60)
-        points = np.asarray(1j * omega, dtype=np.complex128)
+        points = np.asarray(1j * top * np.geomspace(1, 1e4, 60), dtype=np.complex128)
         values = characteristic(form, points, discrete=False)
         if np.all(np.abs(values - 1) < NEAR_ONE):
             return top
         top *= 2
     return top
+
+
+def in_s_plane(points: ComplexArray, dt: float) -> ComplexArray:
+    """Map poles or zeros to the s-plane; those at z = 0 are left out."""
+    if not dt:
+        return points
+    # Far inside the circle there are no sharp features that the uniform part of a grid would miss.
+    return np.asarray(np.log(points[np.abs(points) > 0.05]) / dt, dtype=np.complex128)
 
 
 def features(form: DelayForm, dt: float, *, few: bool = True) -> tuple[ComplexArray, float]:
@@ -98,10 +105,7 @@ def features(form: DelayForm, dt: float, *, few: bool = True) -> tuple[ComplexAr
     if few:
         slow = dominant_discrete_poles(form, FEATURES) if dt else rightmost_poles(form, FEATURES)
         poles = np.concatenate([poles, slow])
-    if not dt:
-        return np.asarray(poles, dtype=np.complex128), float(sum(form.delays))
-    poles = poles[np.abs(poles) > 0.05]
-    return np.asarray(np.log(poles) / dt, dtype=np.complex128), float(sum(form.delays)) * dt
+    return in_s_plane(poles, dt), float(sum(form.delays)) * (dt or 1.0)
 
 
 def grid(form: DelayForm, dt: float, *, few: bool = True) -> FloatArray:
