@@ -31,16 +31,11 @@ class DelayedAlgebra(CoreAndDelays, DelayOperators):
     def __getitem__(self, key: Any) -> Self:
         """Select channels, by number or name; each keeps its delay."""
         chosen = selected(self.delay_free, key)
-        inputs = [self.input_index[name] for name in chosen.input_labels]
-        outputs = [self.output_index[name] for name in chosen.output_labels]
+        before = [self.input_delays[self.input_index[name]] for name in chosen.input_labels]
+        behind = [self.output_delays[self.output_index[name]] for name in chosen.output_labels]
         prefix, suffix = (ct.config.defaults[f"iosys.indexed_system_name_{end}"] for end in _ENDS)
-        return self._around(
-            chosen,
-            delay=tuple(self.input_delays[j] for j in inputs),
-            output_delay=tuple(self.output_delays[i] for i in outputs),
-            **signals_of(chosen),
-            name=f"{prefix}{self.name}{suffix}",
-        )
+        names = {**signals_of(chosen), "name": f"{prefix}{self.name}{suffix}"}
+        return self._around(chosen, delay=before, output_delay=behind, **names)
 
     def minreal(self, tol: float = 0.0) -> Self:
         """Minimal realization of the core; the delays are unchanged."""

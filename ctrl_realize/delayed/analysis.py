@@ -47,7 +47,7 @@ class DelayedAnalysis(CoreAndDelays):
 
     def zeros(self) -> ComplexArray:
         """Finite zeros; for one input and output, those of the core."""
-        if self.issiso() or isinstance(self.delay, int):
+        if isinstance(self.delay, int):
             return np.asarray(self._core.zeros(), dtype=np.complex128)
         return np.asarray(super().zeros(), dtype=np.complex128)
 
@@ -70,13 +70,9 @@ class DelayedAnalysis(CoreAndDelays):
         _warn_of_cancellation(den, poles)
         pulses = markov(*matrices_of(core), n + 1)
         total = np.add.outer(self.output_delays, self.input_delays)
-        return ct.TransferFunction(
-            [[_numerator(den, channel) for channel in row] for row in pulses],
-            [[np.concatenate([den, np.zeros(delay)]) for delay in row] for row in total],
-            self.dt,
-            name=self.name,
-            **signals_of(self),
-        )
+        nums = [[_numerator(den, channel) for channel in row] for row in pulses]
+        dens = [[np.concatenate([den, np.zeros(delay)]) for delay in row] for row in total]
+        return ct.TransferFunction(nums, dens, self.dt, name=self.name, **signals_of(self))
 
 
 def _warn_of_cancellation(den: FloatArray, poles: ComplexArray) -> None:

@@ -76,9 +76,8 @@ class DelayedCards(CoreCards, CoreAndDelays):
         ]
         if self._core.issiso():
             gain = float(np.real(self._core.dcgain()))
-            rows.append(
-                ("DC gain", f"{gain:.6g}" if np.isfinite(gain) else "none: the model integrates")
-            )
+            told = f"{gain:.6g}" if np.isfinite(gain) else "none: the model integrates"
+            rows.append(("DC gain", told))
         if self.fit is not None:
             rows.append(("fit", repr(self.fit).strip("<>")))
         return self._with_signals(rows)

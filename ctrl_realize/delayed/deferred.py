@@ -34,8 +34,8 @@ class DeferredMatrices(ct.StateSpace, ABC):  # type: ignore[misc]  # control is 
     _state_names: dict[str, int] | None
     _registers: int
 
-    def _begin(self, states: list[str] | int, nstates: int, dt: float | None, **names: Any) -> None:
-        """Set up the system without matrices; `states` are those without the delay line."""
+    def _begin(self, states: int, nstates: int, dt: float | None, **names: Any) -> None:
+        """Set up the system without matrices; `states` is their number without the delay line."""
         self._locked = False
         self._time_unit = checked_time_unit(names.pop("time_unit", "s"))
         # Not StateSpace.__init__, which needs the matrices.
@@ -44,7 +44,7 @@ class DeferredMatrices(ct.StateSpace, ABC):  # type: ignore[misc]  # control is 
         )
         # The names of the delay line's states are made on demand.
         self.nstates = nstates
-        self._registers = nstates - (states if isinstance(states, int) else len(states))
+        self._registers = nstates - states
         self._state_names = None
         self._augmented = None
 

@@ -113,9 +113,9 @@ class HostMargins(DeferredMatrices):
         """Find a frequency above which the gain of a system is too low for any margin."""
         omega = fastest * np.geomspace(1e-3, 1e5, 4000)
         size = np.abs(self._at(omega))
-        (large,) = np.nonzero(
-            ~(size < 0.1 * DECIDES * min(1.0, float(np.median(size[:100])) or 1.0))
-        )  # a gain that does not roll off is evaluated up to ten times the fastest pole
+        level = 0.1 * DECIDES * min(1.0, float(np.median(size[:100])) or 1.0)
+        (large,) = np.nonzero(~(size < level))
+        # a gain that does not roll off is evaluated up to ten times the fastest pole
         last = int(large[-1]) if large.size else 0
         return float(omega[last + 1]) if last + 1 < omega.size else 10 * fastest
 

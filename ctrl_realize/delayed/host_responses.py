@@ -95,9 +95,8 @@ class HostResponses(HostMargins):
             raise ValueError("input list must be 1D")
         if self._schur is None:
             self._schur = schur_form(self._core.A)
-        return settled_values(
-            self._values(self._schur, points), points, warn_infinite=warn_infinite
-        )
+        values = self._values(self._schur, points)
+        return settled_values(values, points, warn_infinite=warn_infinite)
 
     def simulate(self, inputs: ArrayLike) -> FloatArray:
         """Compute the response to any input from zero initial state, sample by sample.
@@ -305,15 +304,10 @@ class HostResponses(HostMargins):
         self, times: FloatArray, outputs: FloatArray, drive: FloatArray, kind: str, **settings: Any
     ) -> ct.TimeResponseData:
         """Response data, one trace for each input, as python-control makes them."""
-        return self._data(
-            times,
-            outputs,
-            inputs=drive if kind == "step" else None,
-            trace_labels=[f"From {label}" for label in self.input_labels],
-            trace_types=[kind] * self.ninputs,
-            plot_inputs=False,
-            **settings,
-        )
+        labels = [f"From {label}" for label in self.input_labels]
+        traces = {"trace_labels": labels, "trace_types": [kind] * self.ninputs}
+        inputs = drive if kind == "step" else None
+        return self._data(times, outputs, inputs, plot_inputs=False, **traces, **settings)
 
     def _times(self, timepts: ArrayLike | None, count: int) -> FloatArray:
         """Check that times are all samples from 0, or make as many as there are inputs."""

@@ -109,8 +109,7 @@ class DelayOperators(DeferredMatrices):
         if (mine.outputs, mine.inputs) != (theirs.outputs, theirs.inputs):
             raise OptionError(f"systems {shapes(mine, theirs)} cannot be added")
         total = forms.parallel(mine, theirs)
-        base = time_base(self, other)
-        return self._joined(total, self.input_labels, self.output_labels, **base)
+        return self._joined(total, self.input_labels, self.output_labels, **time_base(self, other))
 
     def __radd__(self, other: Any) -> Any:
         return self + other
@@ -181,8 +180,7 @@ class DelayOperators(DeferredMatrices):
             )
         with solvable("the direct terms of both"):
             form = forms.feedback(forward, back, float(sign))
-        base = time_base(self, other)
-        return self._joined(form, self.input_labels, self.output_labels, **base)
+        return self._joined(form, self.input_labels, self.output_labels, **time_base(self, other))
 
     def append(self, other: Any) -> Any:
         """Append `other`; see `control.append`."""
@@ -242,8 +240,7 @@ def _delayed(system: Any, beside: Any) -> Any:
     if form.states == 0 and is_single(form) and sizes != (1, 1):
         # the number 1 in ct.feedback(1, L), which python-control has made a system
         form, names = form_of(float(form.D[0, 0]) * np.eye(*sizes)), {}
-    inside = DelayOperators._kinds[INSIDE]
-    return inside(plain(form, common_dt(system, beside)), (), **names)
+    return DelayOperators._kinds[INSIDE](plain(form, common_dt(system, beside)), (), **names)
 
 
 class BesideDelays(ct.StateSpace):  # type: ignore[misc]  # control is untyped

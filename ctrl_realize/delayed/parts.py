@@ -116,15 +116,9 @@ def named(
     name: str | None = None,
 ) -> ct.StateSpace:
     """Copy the core, with read-only matrices and these names."""
-    made = ct.StateSpace(
-        *matrices_of(core),
-        core.dt,
-        inputs=list(inputs),
-        outputs=list(outputs),
-        states=list(states),
-        name=name,
-        remove_useless_states=False,
-    )
+    names = {"inputs": list(inputs), "outputs": list(outputs), "states": list(states)}
+    settings = {"name": name, "remove_useless_states": False, **names}
+    made = ct.StateSpace(*matrices_of(core), core.dt, **settings)
     for M in matrices_of(made):
         M.flags.writeable = False
     return made

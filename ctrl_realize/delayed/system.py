@@ -155,9 +155,7 @@ class DelayedStateSpace(
         called = None if name is None else system_name(name)
         names = {"name": called, "inputs": input_names, "outputs": output_names}
         self._begin(core.nstates, states, core.dt, time_unit=time_unit, **names)
-        self._core = named(
-            core, input_names, output_names, core.state_labels, name=f"{self.name}_core"
-        )
+        self._core = named(core, input_names, output_names, core.state_labels, f"{self.name}_core")
         self.input_delays = before
         self.output_delays = behind
         self.fit: ModelFit | None = fit

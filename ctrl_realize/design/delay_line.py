@@ -89,8 +89,7 @@ class DelayLineController(ShownSystem, DelayOperators):
         pulses: Pulses | None = None,
     ) -> None:
         n, d = E.shape
-        states = [f"x[{i}]" for i in range(n)]
-        self._begin(states, n + d, float(dt), name=name, inputs=[inputs], outputs=[outputs])
+        self._begin(n, n + d, float(dt), name=name, inputs=[inputs], outputs=[outputs])
         self._parts = tuple(read_only(M) for M in (A, B, C, D, E, h))
         self._pulses = None if pulses is None else tuple(read_only(M) for M in pulses)
         self._schur = schur_form(self._parts[0])
@@ -169,12 +168,8 @@ class DelayLineController(ShownSystem, DelayOperators):
         return self._card().text()
 
     def _made_by(self) -> tuple[Any, ...]:
-        settings = {
-            "name": self.name,
-            "inputs": self.input_labels[0],
-            "outputs": self.output_labels[0],
-            "pulses": self._pulses,
-        }
+        signals = {"inputs": self.input_labels[0], "outputs": self.output_labels[0]}
+        settings = {"name": self.name, "pulses": self._pulses, **signals}
         return type(self), (*self._parts, self.dt), settings
 
     def paths(self, z: ComplexArray) -> tuple[ComplexArray, ComplexArray]:
@@ -187,18 +182,15 @@ class DelayLineController(ShownSystem, DelayOperators):
         """
         A, B, C, D, _, _ = self._parts
         n = A.shape[0]
-        forward = np.empty(z.size, dtype=np.complex128)
-        back = np.empty(z.size, dtype=np.complex128)
-        eye = np.eye(n)
+        forward, back = np.empty((2, z.size), dtype=np.complex128)
+        inputs, direct = np.hstack([B, np.eye(n)]), np.hstack([D, np.zeros((1, n))])
         for start in range(0, z.size, CHUNK):
             part = slice(start, start + CHUNK)
             points = z[part]
             line = self._taps(points)
             # At an inner pole (z = 1 with a PI controller) both are infinite.
             with np.errstate(divide="ignore", invalid="ignore"):
-                rows = frequency_response(
-                    self._schur, np.hstack([B, eye]), C, np.hstack([D, np.zeros((1, n))]), points
-                )[0]
+                rows = frequency_response(self._schur, inputs, C, direct, points)[0]
                 forward[part] = rows[0]
                 back[part] = 1 - line[-1] - np.sum(rows[1:] * line[:-1], axis=0)
         return forward, back

@@ -47,15 +47,13 @@ def check_core(core: Any, delays: tuple[float, ...] = ()) -> float | None:
             f"core is a {type(core).__name__}, which already has delays; expected a plain "
             "control.StateSpace"
         )
-    if core.dt is None and core.nstates == 0 and not delays:
-        check_entries(core)
-        return None
-    if core.dt is None or core.dt is True:
+    gain = core.dt is None and core.nstates == 0 and not delays
+    if core.dt is True or (core.dt is None and not gain):
         raise UnsuitableSystemError(
             f"the core's dt is {core.dt!r}; expected a sample time in s, or 0 for continuous time"
         )
     check_entries(core)
-    return float(core.dt)
+    return None if gain else float(core.dt)
 
 
 def check_delays(delays: tuple[float, ...], core: ct.StateSpace, dt: float | None) -> None:

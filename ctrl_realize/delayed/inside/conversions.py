@@ -62,8 +62,7 @@ class InsideConversions(DelayOperators):
             gain = np.zeros((opened.inputs, opened.outputs))
             gain[-1, p + i] = gain[m + i, -1] = 1.0
             opened = forms.wired(opened, gain, slice(p + q), slice(m + q))
-        ends = forms.through(opened, np.eye(p, p + q), np.eye(m, m + q).T)
-        made = plain(ends, 0)
+        made = plain(forms.through(opened, np.eye(p, p + q), np.eye(m, m + q).T), 0)
         made.update_names(inputs=self.input_labels, outputs=self.output_labels)
         return made
 

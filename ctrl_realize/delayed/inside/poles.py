@@ -78,10 +78,8 @@ class InsidePoles(HostResponses, DelayOperators):
         >>> loop.nstates, abs(loop.dominant_poles(1)).round(6)
         (10001, array([0.999931, 0.999931]))
         """
-        wanted = integer(count, "count", 1)
-        if self.dt:
-            return dominant.dominant_discrete_poles(self._form(), wanted)
-        return spectrum.rightmost_poles(self._form(), wanted)
+        find = dominant.dominant_discrete_poles if self.dt else spectrum.rightmost_poles
+        return find(self._form(), integer(count, "count", 1))
 
     def is_stable(self) -> bool:
         """Whether all poles are inside the stability region.
@@ -134,17 +132,15 @@ class InsidePoles(HostResponses, DelayOperators):
             Several channels with long delays.
         """
         form = self._form()
-        if self.ninputs == self.noutputs:
-            try:
-                opposite = inverse(form)
-            except np.linalg.LinAlgError:
-                pass
-            else:
-                if self.dt:
-                    return characteristic.discrete_poles(opposite)
+        try:
+            opposite = inverse(form)
+        except np.linalg.LinAlgError:
+            if not self.dt:
+                return spectrum.rightmost_zeros(form, FIRST_POLES)
+        else:
+            if not self.dt:
                 return spectrum.rightmost_poles(opposite, FIRST_POLES)
-        if not self.dt:
-            return spectrum.rightmost_zeros(form, FIRST_POLES)
+            return characteristic.discrete_poles(opposite)
         if self.issiso():
             pulses = self.markov(self.nstates + 1)
             (seen,) = np.nonzero(np.abs(pulses) > 1e-14 * np.abs(pulses).max(initial=0.0))
