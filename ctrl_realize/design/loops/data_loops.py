@@ -79,8 +79,7 @@ class DataLoop:
         if abs(last) > 0.9:
             yield flagged("band_ends_early", size=abs(last), omega=omega[-1])
         if self.integrators == 0 and abs(np.sin(np.angle(first))) > 0.5:
-            phase = np.degrees(np.angle(first))
-            yield flagged("band_starts_late", omega=omega[0], phase=phase)
+            yield flagged("band_starts_late", omega=omega[0], phase=np.degrees(np.angle(first)))
 
 
 def data_loop(
@@ -117,14 +116,9 @@ def data_loop(
     phase = unwrap_with_dead_time(omega, values, dead_time) + omega * dead_time
     if integrators is None:
         integrators = _read_integrators(omega, values)
-    return DataLoop(
-        points,
-        dead_time,
-        PchipInterpolator(np.log(omega), np.stack([np.log(np.abs(values)), phase], axis=1)),
-        integer(unstable_poles, "unstable_poles", 0),
-        integer(integrators, "integrators", 0),
-        left_out,
-    )
+    counts = integer(unstable_poles, "unstable_poles", 0), integer(integrators, "integrators", 0)
+    course = PchipInterpolator(np.log(omega), np.stack([np.log(np.abs(values)), phase], axis=1))
+    return DataLoop(points, dead_time, course, *counts, left_out)
 
 
 def _above_zero(data: ct.FrequencyResponseData) -> MeasuredPoints:

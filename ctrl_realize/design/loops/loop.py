@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from math import prod
 from typing import Any
 
 import control as ct
@@ -67,12 +68,9 @@ class Loop:
 
     def delay_free(self, omega: FloatArray) -> ComplexArray:
         """Response without the pure delay."""
-        w = self.variable(omega)
-        value = np.ones(omega.size, dtype=np.complex128)
+        w, one = self.variable(omega), np.ones(omega.size, dtype=np.complex128)
         with np.errstate(invalid="ignore"):
-            for part in self.factors:
-                value = value * part.response(w)
-        return value
+            return prod((part.response(w) for part in self.factors), start=one)
 
     def __call__(self, omega: FloatArray) -> ComplexArray:
         """Loop response L at frequencies in rad/s."""
@@ -85,11 +83,8 @@ class Loop:
 
     def open_characteristic(self, omega: FloatArray) -> ComplexArray:
         """Open-loop characteristic function: the product of those of the factors."""
-        w = self.variable(omega)
-        value = np.ones(omega.size, dtype=np.complex128)
-        for part in self.factors:
-            value = value * part.characteristic(w, self.rate)
-        return np.asarray(value, dtype=np.complex128)
+        w, one = self.variable(omega), np.ones(omega.size, dtype=np.complex128)
+        return prod((part.characteristic(w, self.rate) for part in self.factors), start=one)
 
     def beyond(self, top: float) -> FloatArray:
         """Frequencies from `top` to where no factor of a continuous loop turns any more."""
@@ -145,9 +140,7 @@ class Loop:
 
     def _start(self) -> float:
         slowest = 1 / self.turn_time if self.turn_time else np.pi / self.dt if self.dt else 1.0
-        return self._low_end(1e-3 * float(self._sizes().min(initial=slowest)))
-
-    def _low_end(self, low: float) -> float:
+        low = 1e-3 * float(self._sizes().min(initial=slowest))
         # An integrating loop must start above gain 1, however slow it is. If the gain does not
         # increase towards 0, a zero cancels the integrator.
         if self.integrators():

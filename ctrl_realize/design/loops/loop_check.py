@@ -7,6 +7,7 @@ from the identification.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -168,19 +169,20 @@ def loop_check(plant: Any, controller: Any, *, models: bool = True) -> LoopCheck
         return LoopCheck(found, flags=flags)
     interval = interval_of_dead_time(plant, None)
     robust = None if interval is None else over_interval(plant, loop, found, interval, TRIED)
-    models = models and fit.plausible_models is not None
-    corners = _corners(plant, fit, loop, found, robust, models=models)
-    made = LoopCheck(found, robust, corners, by_models=models)
+    others = fit.plausible_models if models else None
+    if others is None:
+        corners = _corners(plant, fit, loop, found, robust)
+    else:
+        corners = _of_models(loop, others, fit.integrators)
+    made = LoopCheck(found, robust, corners, by_models=others is not None)
     return replace(made, flags=(*flags, *_left_open(made)))
 
 
 def _corners(
     plant: DelayedStateSpace, fit: ModelFit, loop: Loop, found: Margins,
-    robust: DelayRobustness | None, *, models: bool,
+    robust: DelayRobustness | None,
 ) -> tuple[Corner, ...]:  # fmt: skip
     """Ms at the ends of the intervals of dead time and gain; the gain scales the whole loop."""
-    if models and fit.plausible_models is not None:
-        return _of_models(loop, fit.plausible_models, fit.integrators)
     gains = _gains(fit)
     if robust is None and not gains:
         return ()
@@ -233,32 +235,26 @@ def _moved(loop: Loop, delay: int, factor: float) -> Loop:
     return replace(loop, factors=(scaled, *loop.factors[1:]))
 
 
-def _left_open(made: LoopCheck) -> tuple[Flag, ...]:
+def _left_open(made: LoopCheck) -> Iterator[Flag]:
     """What the identification leaves open does to the loop: its models, or else its intervals.
 
     The interval of a dead time alone is for fits that say nothing on the lags that go with it.
     """
-    models = made.by_models
+    models, worst, most = made.by_models, made.worst, MOST_SENSITIVE
     if not models and made.robustness is not None and not made.robustness.stable:
         interval = interval_in_time(*made.robustness.dead_time_interval)
         stable = interval_in_time(made.robustness.stable_from, made.robustness.stable_to)
-        return (flagged("unstable_within_interval", interval=interval, stable=stable),)
-    worst = made.worst
-    if worst is None or worst.ms <= MOST_SENSITIVE * (1 + ROUNDED):
-        return ()
-    if worst.ms == float("inf"):
-        found = flagged(
-            "unstable_within_interval.model" if models else "unstable_within_interval.corner",
-            corner=worst,
-        )
+        yield flagged("unstable_within_interval", interval=interval, stable=stable)
+    elif worst is None or worst.ms <= most * (1 + ROUNDED):
+        return
+    elif worst.ms == float("inf") and models:
+        yield flagged("unstable_within_interval.model", corner=worst)
+    elif worst.ms == float("inf"):
+        yield flagged("unstable_within_interval.corner", corner=worst)
+    elif models:
+        yield flagged("sensitive_within_interval.model", ms=worst.ms, most=most, corner=worst)
     else:
-        found = flagged(
-            "sensitive_within_interval.model" if models else "sensitive_within_interval",
-            ms=worst.ms,
-            most=MOST_SENSITIVE,
-            corner=worst,
-        )
-    return (found,)
+        yield flagged("sensitive_within_interval", ms=worst.ms, most=most, corner=worst)
 
 
 def verified(

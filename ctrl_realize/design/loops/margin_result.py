@@ -98,16 +98,12 @@ class Margins(Result):
     @property
     def gain_crossover(self) -> float:
         """Gain crossover of the phase margin, rad/s; nan without one."""
-        if self.phase_margins.size == 0:
-            return float("nan")
-        return float(self.gain_crossovers[np.argmin(np.abs(self.phase_margins))])
+        return _where_least(self.phase_margins, self.gain_crossovers)
 
     @property
     def phase_crossover(self) -> float:
         """Phase crossover of the gain margin, rad/s; nan without one."""
-        if self.gain_margins.size == 0:
-            return float("nan")
-        return float(self.phase_crossovers[np.argmin(np.abs(np.log(self.gain_margins)))])
+        return _where_least(np.log(self.gain_margins), self.phase_crossovers)
 
     _heading = "Stability margins"
 
@@ -136,6 +132,11 @@ class Margins(Result):
             f"<Margins {state}: gain {self.gain_margin:.4g}, phase {self.phase_margin:.4g} deg, "
             f"modulus {self.modulus_margin:.4g}, delay {in_time(self.delay_margin, 4)}>"
         )
+
+
+def _where_least(sizes: FloatArray, crossovers: FloatArray) -> float:
+    """Crossover whose size is nearest to 0; nan without one."""
+    return float(crossovers[np.argmin(np.abs(sizes))]) if sizes.size else float("nan")
 
 
 def _gain_in_words(margin: float, crossover: float) -> str:

@@ -245,11 +245,8 @@ def _from_data(loop: DataLoop) -> Margins:
     closest = _closest(loop, omega, values)
     phases = negative_axis_crossings(loop, omega, values)
     plain = _collect(loop, omega, values, phases, closest, *loop.closed_loop_count(), 0.0)
-    plain = replace(plain, flags=(*plain.flags, *loop.flags()))
-    if loop.points.std is None:
-        return plain
-    intervals = margin_intervals(loop, plain)
-    flags = plain.flags
-    if plain.stable and intervals["modulus_margin"][0] == 0:
+    flags = (*plain.flags, *loop.flags())
+    intervals = {} if loop.points.std is None else margin_intervals(loop, plain)
+    if intervals and plain.stable and intervals["modulus_margin"][0] == 0:
         flags = (*flags, flagged("within_noise"))
     return replace(plain, intervals=intervals, flags=flags)

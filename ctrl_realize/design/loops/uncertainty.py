@@ -86,8 +86,7 @@ def uncertainty_bound(
     """
     models = _models(systems)
     if nominal is None:
-        first = models[0] if models else None
-        nominal = systems.system if isinstance(systems, Campaign) else first
+        nominal = systems.system if isinstance(systems, Campaign) else next(iter(models), None)
     if nominal is None:
         raise OptionError(
             "expected systems or a nominal system, got neither; give nominal and dead_time_interval"
