@@ -153,12 +153,8 @@ def _locus_plot(original: Call, sysdata: Any, gains: Any = None, **settings: Any
     return original(_locus(original, sysdata, gains), **settings)
 
 
-def _gang(
-    original: Call, P: Any, C: Any, omega: Any = None, omega_limits: Any = None,
-    omega_num: Any = None, Hz: bool = False,
-) -> Any:  # fmt: skip
-    four = gang_of_four(P, C)
-    data = ct.frequency_response(four, omega, omega_limits=omega_limits, omega_num=omega_num, Hz=Hz)
+def _gang(original: Call, P: Any, C: Any, *band: Any, **more: Any) -> Any:
+    data = ct.frequency_response(gang_of_four(P, C), *band, **more)
     return ct.FrequencyResponseData(
         data.frdata, data.omega, outputs=["y", "u"], inputs=["r", "d"], plot_phase=False,
         title=f"Gang of Four for P={P.name}, C={C.name}", sysname=f"P={P.name}, C={C.name}",

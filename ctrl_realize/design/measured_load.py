@@ -126,19 +126,15 @@ def feedforward(plant: Any, disturbance: Any, *, dt: float | None = None) -> Fee
     >>> cr.design.feedforward(plant, load, dt=1.0).system
     <DelayedStateSpace 'feedforward': load -> u, order 1, z^-4 (4 s), dt = 1 s>
     """
-    paths = [
-        path if isinstance(path, ProcessModel) else reduce_fopdt(path)
-        for path in (plant, disturbance)
-    ]
+    given = plant, disturbance
+    paths = [path if isinstance(path, ProcessModel) else reduce_fopdt(path) for path in given]
     first, second = paths
     if first.integrating != second.integrating:
         raise UnsuitableSystemError(
             "one of plant and load integrates and the other does not; expected both or neither: "
             "otherwise the compensator differentiates, or drifts away"
         )
-    known = [
-        getattr(path, "dt", None) for path in (plant, disturbance) if getattr(path, "dt", None)
-    ]
+    known = [path.dt for path in given if getattr(path, "dt", None)]
     if dt is None and not known:
         raise UnsuitableSystemError("neither model has a sample time; give dt, in s")
     step = positive(dt if dt is not None else known[0], "dt", "sample time in s")

@@ -186,14 +186,8 @@ def reduce(system: Any, order: int) -> DelayedStateSpace:
         )
     A, B, C, values = balanced_truncation(A, B, C, wanted)
     n = A.shape[0]
-    reduced = ct.StateSpace(
-        block_diag(A, rest[0]),
-        np.vstack([B, rest[1]]),
-        np.hstack([C, rest[2]]),
-        np.asarray(core.D),
-        core.dt,
-        remove_useless_states=False,
-    )
+    both = block_diag(A, rest[0]), np.vstack([B, rest[1]]), np.hstack([C, rest[2]])
+    reduced = ct.StateSpace(*both, np.asarray(core.D), core.dt, remove_useless_states=False)
     fit = BalancedReduction(
         singular_values=read_only(values),
         order=n + kept,

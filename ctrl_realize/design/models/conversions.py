@@ -14,7 +14,7 @@ from ..._wording import in_time
 from ...delayed import DelayedStateSpace, DelaySystem, delayed_ss
 from ...delayed.inside.conversions import check_logarithm
 from ...delayed.operands import plain
-from ...delayed.parts import signals_of
+from ...delayed.parts import matrices_of, signals_of
 from ...errors import OptionError, UnsuitableSystemError
 from ...numerics.arrays import FloatArray
 from ...numerics.blas_threads import single_threaded
@@ -106,14 +106,13 @@ class ContinuousModel(Result):
         core = self.core
         names = {"name": core.name, **signals_of(core)}
         rest = self.input_delays, self.output_delays, self.dt, self.time_unit
-        return _rebuild_model, ((core.A, core.B, core.C, core.D), names, *rest)
+        return _rebuild_model, (matrices_of(core), names, *rest)
 
     @property
     def system(self) -> DelaySystem:
         """Core and dead time as one continuous system, exact in loops; see `DelaySystem`."""
         core = self.core
-        form = DelayForm(core.A, core.B, core.C, core.D)
-        form = delayed_ends(form, self.input_delays, self.output_delays)
+        form = delayed_ends(DelayForm(*matrices_of(core)), self.input_delays, self.output_delays)
         names = {"name": core.name, **signals_of(core), "time_unit": self.time_unit}
         return DelaySystem(plain(form, 0), form.delays, **names)
 
@@ -199,7 +198,7 @@ def to_continuous(system: DelayedStateSpace) -> ContinuousModel:
     core, dt = plant.delay_free, float(plant.dt)
     check_logarithm(core.A)
     ends = plant.input_delays, plant.output_delays
-    matrices, before, behind = continuous_ends((core.A, core.B, core.C, core.D), dt, *ends)
+    matrices, before, behind = continuous_ends(matrices_of(core), dt, *ends)
     names = {"name": f"{plant.name}_continuous", **signals_of(plant)}
     continuous = ct.StateSpace(*matrices, 0, remove_useless_states=False, **names)
     return ContinuousModel(continuous, before, behind, dt, plant.time_unit)

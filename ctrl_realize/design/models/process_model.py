@@ -90,11 +90,8 @@ class ProcessModel(Result):
 
     def step(self, time: ArrayLike) -> FloatArray:
         """Step response at given times in s."""
-        at = finite(time, "time")
-        shape = process_step(
-            at, self.lag, self.second_lag, self.dead_time, integrating=self.integrating
-        )
-        return self.gain * shape
+        times = self.lag, self.second_lag, self.dead_time
+        return self.gain * process_step(finite(time, "time"), *times, integrating=self.integrating)
 
     @property
     def total_time(self) -> float:

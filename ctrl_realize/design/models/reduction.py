@@ -132,11 +132,12 @@ def _reduce(system: Any, method: str, dead_time: float | None, order: int) -> Pr
         system = ContinuousModel(core, (system.dead_time,), (0.0,), resolution)
     continuous, plant = both_forms(system, dead_time)
     time, step, integrating, gain = _step_record(plant)
+    lags = order - int(integrating)
     if method == "half_rule":
-        model = _by_half_rule(continuous or to_continuous(plant), order, integrating, gain)
+        model = _by_half_rule(continuous or to_continuous(plant), lags, integrating, gain)
     else:
         least = continuous.dead_time if continuous else _dead_time(plant)
-        model = _by_fit(time, step / gain, order, integrating, gain, least)
+        model = _by_fit(time, step / gain, lags, integrating, gain, least)
     total = _total(time, step / gain, integrating)
     square = np.trapezoid((model.step(time) - step) ** 2, time) / total
     scale = total if integrating else 1.0
@@ -215,7 +216,7 @@ def _slope(core: ct.StateSpace) -> float:
 
 
 def _by_half_rule(
-    model: ContinuousModel, order: int, integrating: bool, gain: float
+    model: ContinuousModel, count: int, integrating: bool, gain: float
 ) -> ProcessModel:
     poles, zeros = np.asarray(model.core.poles()), np.asarray(model.core.zeros())
     if integrating:
@@ -226,28 +227,18 @@ def _by_half_rule(
     # A complex pair is replaced by two equal lags with the same sum: each has tau = -Re p / |p|^2.
     lags = -poles.real / np.abs(poles) ** 2
     times = -zeros.real / np.abs(zeros) ** 2
+    leads, inverse = times[times > 0], -times[times < 0]
     factor, kept, remaining = half_rule(
-        lags,
-        times[times > 0],
-        -times[times < 0],
-        model.dead_time,
-        order - int(integrating),
-        integrating=integrating,
+        lags, leads, inverse, model.dead_time, count, integrating=integrating
     )
     lag, second = [*sorted(kept, reverse=True), 0.0, 0.0][:2]
     return ProcessModel(gain * factor, lag, remaining, second, integrating, "half rule")
 
 
 def _by_fit(
-    time: FloatArray,
-    shape: FloatArray,
-    order: int,
-    integrating: bool,
-    gain: float,
-    dead_time: float,
+    time: FloatArray, shape: FloatArray, lags: int, integrating: bool, gain: float, dead_time: float
 ) -> ProcessModel:
     """Fit lags and a dead time of at least `dead_time`."""
-    lags = order - int(integrating)
     # in units of the span: differences and tolerances of least_squares are absolute below 1
     span = time[-1]
     time, dead_time, shape = time / span, dead_time / span, shape / (span if integrating else 1)

@@ -58,7 +58,6 @@ def continuous_smith_predictor(
     late = filtered * delay(dead_time)
     # the inner loop sees G (1 - F exp(-tau s)), with one G
     made = (DelaySystem(ct.ss(primary))).feedback((1 - late) * core) * filtered
-    advice = STABILIZE, more_robust(filter_time, dead_time)
-    verified(plant, made, "the Smith predictor", *advice)
+    verified(plant, made, "the Smith predictor", STABILIZE, more_robust(filter_time, dead_time))
     names = {"inputs": ["e"], "outputs": plant.input_labels, "name": name}
     return DelaySystem(made.core, made.internal_delays, **names)

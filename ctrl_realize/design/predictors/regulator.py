@@ -9,7 +9,6 @@ state feedback from the core and the past inputs, see `numerics.delayed_regulato
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any
 
 import control as ct
 import numpy as np
@@ -178,8 +177,8 @@ def predictor_lqr(system: DelayedStateSpace, Q: ArrayLike, R: ArrayLike) -> Pred
     >>> cr.design.predictor_lqr(both, 1.0, np.eye(2))
     <PredictorLQR order 1, delay (0, 4), gain (2, 5)>
     """
-    found = regulator(system, Q, R)
     plant = delayed_system(system, "predictor_lqr", siso=False)
+    found = regulator(plant, Q, R)
     if plant.ninputs > 1:
         refuse_poles(found.poles, "the regulator", TOO_LONG)
         return found
@@ -189,9 +188,8 @@ def predictor_lqr(system: DelayedStateSpace, Q: ArrayLike, R: ArrayLike) -> Pred
     return replace(found, check=check)
 
 
-def regulator(system: Any, Q: ArrayLike, R: ArrayLike) -> PredictorLQR:
+def regulator(plant: DelayedStateSpace, Q: ArrayLike, R: ArrayLike) -> PredictorLQR:
     """Compute the gain, see `predictor_lqr`, without a check of the loop."""
-    plant = delayed_system(system, "predictor_lqr", siso=False)
     check_sign(plant, "predictor_lqr")
     warn_unresolved(plant, predicts=True)
     delays = tuple(plant.input_delays)
@@ -205,11 +203,10 @@ def regulator(system: Any, Q: ArrayLike, R: ArrayLike) -> PredictorLQR:
     gain, cost, poles = riccati(ct.dlqr, A, B, weight, price, "Q and R")
     shared = len(set(delays)) == 1
     with np.errstate(over="ignore", invalid="ignore"):
-        lines = (
-            _predicted(A, B, gain, delays[0])
-            if shared
-            else line_gain(A, B, (weight, price), (gain, cost), delays)
-        )
+        if shared:
+            lines = _predicted(A, B, gain, delays[0])
+        else:
+            lines = line_gain(A, B, (weight, price), (gain, cost), delays)
     if not np.all(np.isfinite(lines)):
         raise UnsuitableSystemError(
             f"the core is unstable and overflows within the delay of {max(delays)} samples: "

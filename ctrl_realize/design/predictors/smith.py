@@ -168,9 +168,8 @@ def smith_predictor(
         )
     A, B, C = (np.asarray(M) for M in (core.A, core.B, core.C))
     removed, kept = split_modes(A, B, C, lambda z: integrating and abs(z - 1) < 2 * ON_CIRCLE)
-    *parts, pulses = _assemble(
-        plant, primary, removed, kept, _filter(seconds, plant, integrating=integrating)
-    )
+    filter_ = _filter(seconds, plant, integrating=integrating)
+    *parts, pulses = _assemble(plant, primary, removed, kept, filter_)
 
     design = {
         "model": plant,

@@ -380,15 +380,6 @@ class PIDController(ShownSystem, BesideDelays):
                 ".discretised(dt), with dt the cycle time of the controller in s"
             )
         return PIDAlgorithm(
-            *self.ideal,
-            self.dt,
-            self.method,
-            setpoint_weight,
-            derivative_weight,
-            output_limits,
-            tracking_time,
-            bias,
-            str(self.name),
-            self.gain_unit,
-            self.time_unit,
-        )
+            *self.ideal, self.dt, self.method, setpoint_weight, derivative_weight, output_limits,
+            tracking_time, bias, str(self.name), self.gain_unit, self.time_unit,
+        )  # fmt: skip

@@ -211,15 +211,12 @@ def _shown(
     shown = [FormValue(layout.gain, 100 / gain, "%") if layout.band else
              FormValue(layout.gain, gain, gain_unit)]  # fmt: skip
     if ideal[1] < INF:
+        value, name = integral / seconds, unit
         if parallel:
-            written = FormValue(
-                layout.integral, integral * scale * seconds, slope_unit(gain_unit, unit)
-            )
+            value, name = integral * scale * seconds, slope_unit(gain_unit, unit)
         elif layout.rate:
-            written = FormValue(layout.integral, seconds / integral, f"repeats/{unit}")
-        else:
-            written = FormValue(layout.integral, integral / seconds, unit)
-        shown.append(written)
+            value, name = seconds / integral, f"repeats/{unit}"
+        shown.append(FormValue(layout.integral, value, name))
     if ideal[2]:
         size, name = (scale, f"{unit} {gain_unit}".rstrip()) if parallel else (1.0, unit)
         shown.append(FormValue(layout.derivative, derivative * size / seconds, name))

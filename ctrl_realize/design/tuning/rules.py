@@ -8,8 +8,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from functools import partial
 
-import numpy as np
-
 from ...errors import OptionError, UnsuitableSystemError
 from ..models.process_model import ProcessModel
 
@@ -174,7 +172,7 @@ def _dead_time(model: ProcessModel, rule: str) -> float:
 
 
 def _needs_lag(model: ProcessModel, rule: str) -> None:
-    if model.integrating or not np.isfinite(model.lag):
+    if model.integrating:
         raise UnsuitableSystemError(
             f"rule={rule!r} is for models with a lag, not for integrating models; use 'simc', "
             "'lambda', 'amigo' or 'optimal'"
