@@ -125,7 +125,7 @@ class Actuator(ABC):
             return self._advance(tuple((x + rest).tolist()), float(u[0]), step)
 
         def update(_t: float, x: FloatArray, u: FloatArray, _params: Any) -> FloatArray:
-            return np.array(moved(x, u)[0], dtype=np.float64) - rest
+            return np.subtract(moved(x, u)[0], rest)
 
         def output(_t: float, x: FloatArray, u: FloatArray, _params: Any) -> FloatArray:
             return np.array([moved(x, u)[1]])
@@ -157,8 +157,7 @@ class Actuator(ABC):
         >>> cr.actuators.Backlash(2.0).initial_state(50.0).tolist()
         [50.0]
         """
-        rest = np.array(self._rest(0.0), dtype=np.float64)
-        return np.asarray(np.array(self._rest(float(command)), dtype=np.float64) - rest)
+        return np.subtract(self._rest(float(command)), self._rest(0.0))
 
     def steady_state(self, command: float) -> State:
         """State of `advance` at rest at a command.

@@ -32,9 +32,8 @@ class _StickAndJump(Actuator):
         return f"stiction ({self._author}): S = {self.S:g}, J = {self.J:g}"
 
     def _rest(self, command: float) -> State:
-        return tuple(
-            map(float, stem_at_rest(command, self.S, self.J, self.start, sided=self._sided))
-        )
+        stem = stem_at_rest(command, self.S, self.J, self.start, sided=self._sided)
+        return tuple(map(float, stem))
 
     def _advance(self, state: State, command: float, dt: float) -> tuple[State, float]:
         last, position, way, rest, moving, paused, slope = state

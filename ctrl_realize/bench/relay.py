@@ -77,9 +77,8 @@ def relay_test(
     [8.0, 20.0, 38.0]
     """
     check_type(plant, Plant, "plant", "a Plant, such as bench.heater()", OptionError)
-    size = positive(
-        0.5 * plant.amplitude if amplitude is None else amplitude, "amplitude", "height"
-    )
+    height = 0.5 * plant.amplitude if amplitude is None else amplitude
+    size = positive(height, "amplitude", "height")
     width = 3 * plant.noise
     if hysteresis is not None:
         width = not_negative(hysteresis, "hysteresis", "in units of the output")

@@ -50,6 +50,7 @@ def pid_program(algorithm: PIDAlgorithm, name: str) -> Program:
         Variable("bias", "output at zero error", value=c.bias),
     ]
     states: list[Variable] = []
+    scratch: list[Variable] = []
     before: list[Statement] = []
     first: list[Statement] = []
     body: list[Statement] = []
@@ -65,6 +66,7 @@ def pid_program(algorithm: PIDAlgorithm, name: str) -> Program:
             Variable("d_part", "derivative part"),
             Variable("rate_before", "input of the derivative at the last call"),
         ]
+        scratch.append(Variable("rate"))
         first.append(Assign("rate_before", "rate"))
         before.append(Assign("rate", "d_setpoint * setpoint - measured"))
         body += [
@@ -79,6 +81,7 @@ def pid_program(algorithm: PIDAlgorithm, name: str) -> Program:
             Variable("tracking", "dt / tracking time of the anti-windup", value=c.tracking),
         ]
         states.append(Variable("i_part", "integral part"))
+        scratch.append(Variable("deviation"))
         first.append(Assign("i_part", "(p_measured - p_setpoint) * setpoint"))
         body.append(Assign("deviation", "setpoint - measured"))
     if first:
@@ -113,15 +116,10 @@ def pid_program(algorithm: PIDAlgorithm, name: str) -> Program:
             Variable("manual_output", "output in manual operation"),
         ),
         (Variable("u", "output of the controller"),),
-        tuple(constants),
         tuple(states),
-        (
-            *([Variable("rate")] if c.slope else []),
-            *([Variable("deviation")] if c.integral else []),
-            Variable("base"),
-            Variable("wanted"),
-        ),
         tuple(body),
+        tuple(constants),
+        (*scratch, Variable("base"), Variable("wanted")),
     )
 
 
@@ -192,10 +190,9 @@ def plant_program(plant: DelayedStateSpace, name: str) -> Program:
         ),
         tuple(map(Variable, inputs, map(str, plant.input_labels))),
         tuple(map(Variable, outputs, map(str, plant.output_labels))),
-        (),
         tuple(states),
-        tuple(scratch),
         tuple(body),
+        scratch=tuple(scratch),
     )
 
 
@@ -218,9 +215,7 @@ def test_program(plan: ExperimentPlan, name: str) -> Program:
         ),
         (Variable("run", "the test is running", "boolean"),),
         (Variable("u", "input of the plant"),),
-        (),
         (Variable("at", "sample of the test", "integer"),),
-        (),
         (
             rest,
             If(

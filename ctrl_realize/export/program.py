@@ -50,19 +50,20 @@ class Program:
         Identifier in all languages.
     words : tuple of str
         Lines of the comment at its head.
-    inputs, outputs, constants, states, scratch : tuple of Variable
+    inputs, outputs, states : tuple of Variable
         `states` keep their values from call to call.
     body : tuple of Statement
+    constants, scratch : tuple of Variable
     """
 
     name: str
     words: tuple[str, ...]
     inputs: tuple[Variable, ...]
     outputs: tuple[Variable, ...]
-    constants: tuple[Variable, ...]
     states: tuple[Variable, ...]
-    scratch: tuple[Variable, ...]
     body: tuple[Statement, ...]
+    constants: tuple[Variable, ...] = ()
+    scratch: tuple[Variable, ...] = ()
 
 
 def literal(value: float) -> str:
