@@ -3,22 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 
-from ..data import MeasuredFRF
 from ..delayed import DelayedStateSpace, fit_of
 from ..errors import CtrlRealizeError, DataError, OptionError, UnsuitableSystemError
 from ..frequency import compare_frf
 from ..identification.campaign.campaign import Campaign
 from ..identification.campaign.run import identify_campaign
+from ..identification.methods import METHODS
 from ..identification.methods import identify as identify_record
 from ..io import load_model, read_frf
 from ..io.models import holds_model
 from ..results import ModelFit
 from .arguments import option_of
-from .inputs import Reading, Settings, Source, calls_again
+from .inputs import Reading, Source, python_keywords, reading_in_python
 from .machine import Told, told_as_json
 from .manifest import Run, refuse_other_results
 from .results import (
@@ -37,18 +37,20 @@ _QUESTIONS = {"dead-time": "dead time", "gain": "gain", "tuning": "tuning"}
 """Questions as options -> as verdicts."""
 _MANY = 12
 """Number of records from which on all cores are used."""
+Calls: TypeAlias = list[tuple[str, str]]
+"""How to do the same again: where, and what is typed there."""
 
 
 def run_identify(
     files: list[Path], folder: Path | None, *, tune: str | None, json: str | None, **given: Any
 ) -> int:
     """Identify, write the results, and return the exit code."""
-    tuning = None if tune is None else _tuning(tune)
+    given["tuning"] = None if tune is None else _tuning(tune)
     if json is not None:
         return told_as_json(
-            json, lambda told: identified(files, folder, tuning=tuning, told=told, **given)
+            json, lambda told: _identified(_Task(told=told, **given), files, folder)
         )
-    code = identified(files, folder, tuning=tuning, **given)
+    code = _identified(_Task(**given), files, folder)
     if folder is None:
         say_not_written()
     return code
@@ -72,7 +74,7 @@ def run_tune(
     """Tune for one model of all records, or for a saved one, and return the exit code."""
     tuning = Tuning(tuned, entered)
     if len(files) > 1 or not holds_model(files[0]):
-        return identified(files, folder, joint=True, tuning=tuning, **given)
+        return _identified(_Task(joint=True, tuning=tuning, **given), files, folder)
     unused = [option_of(name) for kind in ("chosen", "tests", "record") for name in given[kind]]
     if folder is not None:
         unused.append("--output")
@@ -92,72 +94,56 @@ def run_tune(
     return _judged(system, required) if required else 0
 
 
-def identified(
-    files: list[Path],
-    folder: Path | None,
-    *,
-    chosen: Mapping[str, Any],
-    frf: Path | None = None,
-    joint: bool = False,
-    separate: bool = False,
-    tests: Mapping[str, Any],
-    record: Mapping[str, Any],
-    response: Mapping[str, Any] | None = None,
-    jobs: int | None = None,
-    require: Sequence[str] | None,
-    run: Run,
-    tuning: Tuning | None = None,
-    told: Told | None = None,
-) -> int:
-    """Identify, and tune; results are written if there is a folder, and `told` is filled."""
-    joint = joint or "gains" in chosen
-    if joint and separate:
-        raise OptionError("expected --joint or --separate, got both")
-    if len(tests) > 1:
-        raise OptionError("expected --by or --split, got both")
-    required = _required(require)
-    settings = Settings(chosen, joint)
-    how = Reading(record, tests)
-    response = response or {}
-    measured = None if frf is None else read_frf(frf, **response)
-    calls = calls_again(files, settings, how, run.typed, None if frf is None else (frf, response))
-    sources = how.sources(files)
-    task = _Task(settings, measured, frf, required, run, tuning, told)
-    if (folder is None or told is not None) and len(sources) > 1 and not joint:
-        alone = "without --output" if told is None else "with --json"
-        raise OptionError(
-            f"{alone} there is one model: expected one record or --joint, got {len(sources)}"
-        )
-    if folder is None:
-        return _one(task, sources, None, calls)
-    if separate and len(sources) > 1:
-        return _each_alone(task, sources, folder, how)
-    refuse_other_results(folder, run)
-    if len(sources) > 1 and not joint:
-        return _many(task, sources, folder, calls, jobs)
-    with appearing(folder, run) as staged:
-        code = _one(task, sources, staged, calls)
-    say_written(folder, ["model.json"], run.report and code != 1)
-    return code
-
-
-@dataclass(frozen=True)
+@dataclass
 class _Task:
-    """What is the same for all records of a command."""
+    """What a command is asked for: the same for all of its records."""
 
-    settings: Settings
-    frf: MeasuredFRF | None
-    frf_file: Path | None
-    required: list[str]
     run: Run
+    chosen: Mapping[str, Any]
+    tests: Mapping[str, Any]
+    record: Mapping[str, Any]
+    require: Sequence[str] | None
+    frf: Path | None = None
+    response: Mapping[str, Any] = field(default_factory=dict)
+    joint: bool = False
+    separate: bool = False
+    jobs: int | None = None
     tuning: Tuning | None = None
     told: Told | None = None
 
-    def told_of(
-        self, system: DelayedStateSpace, sources: list[Source], calls: list[tuple[str, str]]
-    ) -> Provenance:
+    def __post_init__(self) -> None:
+        """Check the options, and read the frequency response, before a record is read."""
+        self.joint = self.joint or "gains" in self.chosen
+        if self.joint and self.separate:
+            raise OptionError("expected --joint or --separate, got both")
+        if len(self.tests) > 1:
+            raise OptionError("expected --by or --split, got both")
+        self.required = _required(self.require)
+        self.settings = {"method": METHODS[0], **self.chosen}
+        self.how = Reading(self.record, self.tests)
+        self.measured = None if self.frf is None else read_frf(self.frf, **self.response)
+
+    def calls(self, files: Sequence[Path], test: int | None = None) -> Calls:
+        """Return the commands that reproduce a run, for a terminal and in Python.
+
+        `test` is the number of a test in its file, if that is identified alone.
+        """
+        chosen = python_keywords(self.settings)
+        lines, name = reading_in_python(files, self.how)
+        if self.joint and self.frf is not None:
+            lines.append(f"frf = cr.read_frf({str(self.frf)!r}{python_keywords(self.response)})")
+            chosen += ", frf=frf"
+        if self.tests and test is not None:
+            lines.append(f"sys = cr.identify(records[{test}]{chosen})")
+        elif name == "records" and not self.joint:
+            lines += [f"campaign = cr.identify_campaign(records{chosen})", "sys = campaign.system"]
+        else:
+            lines.append(f"sys = cr.identify({name}{chosen})")
+        return [("In a terminal", self.run.typed), ("In Python", "\n".join(lines))]
+
+    def told_of(self, system: DelayedStateSpace, sources: list[Source], calls: Calls) -> Provenance:
         """Tell of a model, compare and tune it if asked, and return what its files say."""
-        comparison = None if self.frf is None else compare_frf(system, self.frf)
+        comparison = None if self.measured is None else compare_frf(system, self.measured)
         say(fit_of(system, ModelFit).report())
         if comparison is not None:
             say(f"\n{comparison.report()}")
@@ -172,8 +158,30 @@ class _Task:
             terminal, (name, lines) = calls
             calls = [terminal, (name, f"{lines}\n{self.tuning.in_python()}")]
         files = [source.file for source in sources]
-        shown = self.settings.given, calls, self.run.report, tuned, self.frf_file
-        return Provenance(files, self.frf, comparison, *shown)
+        shown = self.settings, calls, self.run.report, tuned, self.frf
+        return Provenance(files, self.measured, comparison, *shown)
+
+
+def _identified(task: _Task, files: list[Path], folder: Path | None) -> int:
+    """Identify, and tune; results are written if there is a folder, and `told` is filled."""
+    calls, sources = task.calls(files), task.how.sources(files)
+    several = len(sources) > 1 and not task.joint
+    if (folder is None or task.told is not None) and several:
+        alone = "without --output" if task.told is None else "with --json"
+        raise OptionError(
+            f"{alone} there is one model: expected one record or --joint, got {len(sources)}"
+        )
+    if folder is None:
+        return _one(task, sources, None, calls)
+    if task.separate and several:
+        return _each_alone(task, sources, folder)
+    refuse_other_results(folder, task.run)
+    if several:
+        return _many(task, sources, folder, calls)
+    with appearing(folder, task.run) as staged:
+        code = _one(task, sources, staged, calls)
+    say_written(folder, ["model.json"], task.run.report and code != 1)
+    return code
 
 
 def _required(require: Sequence[str] | None) -> list[str]:
@@ -196,18 +204,16 @@ def _judged(system: DelayedStateSpace, required: Sequence[str]) -> int:
     return 4 if missed else 0
 
 
-def _one(
-    task: _Task, sources: list[Source], folder: Path | None, calls: list[tuple[str, str]]
-) -> int:
+def _one(task: _Task, sources: list[Source], folder: Path | None, calls: Calls) -> int:
     """Identify one model, into a folder if there is one; return the exit code.
 
     It is 1 if the report was not written.
     """
-    settings, records = task.settings, [source.record() for source in sources]
-    frf = {"frf": task.frf} if settings.joint and task.frf is not None else {}
+    records = [source.record() for source in sources]
+    frf = {"frf": task.measured} if task.joint and task.measured is not None else {}
     with working("identifying"):
         given = records[0] if len(records) == 1 else records
-        system = identify_record(given, **settings.choices, **frf)
+        system = identify_record(given, **task.chosen, **frf)
     for source, record in zip(sources, records, strict=True):
         say(printable(f"{source.file}: {record!r}"))
     provenance = task.told_of(system, sources, calls)
@@ -219,15 +225,12 @@ def _one(
     return _judged(system, task.required) if written else 1
 
 
-def _many(
-    task: _Task, sources: list[Source], output: Path, calls: list[tuple[str, str]], jobs: int | None
-) -> int:
-    n_jobs = jobs if jobs is not None else -1 if len(sources) >= _MANY else 1
+def _many(task: _Task, sources: list[Source], output: Path, calls: Calls) -> int:
+    n_jobs = task.jobs if task.jobs is not None else -1 if len(sources) >= _MANY else 1
     with kept_rows(output) as store:
         campaign = identify_campaign(
-            [source.content for source in sources],
-            n_jobs=n_jobs, store=store, **task.settings.choices,
-        )  # fmt: skip
+            [source.content for source in sources], n_jobs=n_jobs, store=store, **task.chosen
+        )
         _refuse_useless(campaign)
         say(f"{campaign_table(campaign)}\n\n{campaign.report()}\n\nFinal model")
         provenance = task.told_of(campaign.system, sources, calls)
@@ -249,7 +252,7 @@ def _refuse_useless(campaign: Campaign) -> None:
         raise DataError(f"{error}; --separate identifies each record on its own") from error
 
 
-def _each_alone(task: _Task, sources: list[Source], output: Path, how: Reading) -> int:
+def _each_alone(task: _Task, sources: list[Source], output: Path) -> int:
     """Identify each record into its own folder; failures do not stop the rest."""
     refuse_a_file(output)
     failed = unlike = 0
@@ -262,9 +265,7 @@ def _each_alone(task: _Task, sources: list[Source], output: Path, how: Reading) 
             with appearing(output / name, task.run) as folder:
                 # number of a test in its file
                 test = [one for one in sources if one.file == source.file].index(source)
-                typed = task.run.typed
-                calls = calls_again([source.file], task.settings, how, typed, None, test)
-                code = _one(task, [source], folder, calls)
+                code = _one(task, [source], folder, task.calls([source.file], test))
                 failed, unlike = failed + (code == 1), unlike + (code == 4)
         except (CtrlRealizeError, OSError) as error:
             failed += 1

@@ -1,4 +1,4 @@
-"""Records of the commands, and the calls that reproduce a run."""
+"""Records of the commands, and the lines of Python that read them."""
 
 from __future__ import annotations
 
@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any
 
 from ..data import Record
-from ..identification.methods import METHODS
 from ..io import read_record, read_records
 
 
@@ -50,19 +49,6 @@ class Reading:
         ]
 
 
-@dataclass(frozen=True)
-class Settings:
-    """How to identify: the arguments of `identify` that were given."""
-
-    choices: Mapping[str, Any]
-    joint: bool = False
-
-    @property
-    def given(self) -> dict[str, object]:
-        """Names and values of the given arguments, for files and reports."""
-        return {"method": METHODS[0], **self.choices}
-
-
 def folder_name(file: Path) -> str:
     """Name of a record's folder: that of the file without extension, and never "." or ".."."""
     return file.stem if file.stem.strip(".") else "record"
@@ -86,30 +72,3 @@ def reading_in_python(files: Sequence[Path], how: Reading) -> tuple[list[str], s
     else:
         reader = f"cr.read_record(file{keywords}) for file in files"
     return [*lines, f"records = [{reader}]"], "records"
-
-
-def calls_again(
-    files: list[Path],
-    settings: Settings,
-    how: Reading,
-    typed: str,
-    frf: tuple[Path, Mapping[str, Any]] | None,
-    test: int | None = None,
-) -> list[tuple[str, str]]:
-    """Return the commands that reproduce a run, for a terminal and in Python.
-
-    `test` is the number of a test in its file, if that is identified alone.
-    """
-    chosen = python_keywords(settings.given)
-    lines, name = reading_in_python(files, how)
-    if settings.joint and frf is not None:
-        path, response = frf
-        lines.append(f"frf = cr.read_frf({str(path)!r}{python_keywords(response)})")
-        chosen += ", frf=frf"
-    if how.tests and test is not None:
-        lines.append(f"sys = cr.identify(records[{test}]{chosen})")
-    elif name == "records" and not settings.joint:
-        lines += [f"campaign = cr.identify_campaign(records{chosen})", "sys = campaign.system"]
-    else:
-        lines.append(f"sys = cr.identify({name}{chosen})")
-    return [("In a terminal", typed), ("In Python", "\n".join(lines))]
