@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import functools
 import signal
-import threading
 import traceback
 import warnings
 from collections.abc import Iterator, Sequence
@@ -17,6 +16,7 @@ from threadpoolctl import threadpool_limits
 from typer.main import get_command
 
 from ..errors import CtrlRealizeError
+from .loading import handled
 from .signatures import app as app_command
 from .signatures import compare, identify, look, loop, tune, valve
 from .terminal import EXIT_CODES, complain, one_line, plain_warning
@@ -66,9 +66,8 @@ def stopped_by_signals() -> Iterator[list[int]]:
     remain, and workers would continue.
     """
     codes: list[int] = []
-    # only the main thread may handle signals, which depend on the operating system
-    main = threading.current_thread() is threading.main_thread()
-    known = [getattr(signal, name) for name in _SIGNALS if main and hasattr(signal, name)]
+    # which there are depends on the operating system
+    known = [getattr(signal, name) for name in _SIGNALS if hasattr(signal, name)]
 
     def stop(number: int, frame: FrameType | None) -> None:
         for one in known:
@@ -77,14 +76,8 @@ def stopped_by_signals() -> Iterator[list[int]]:
         raise Stopped
 
     # a signal that is ignored (nohup), or handled by other code, is left unchanged
-    mine = [one for one in known if signal.getsignal(one) is signal.SIG_DFL]
-    try:
-        for one in mine:
-            signal.signal(one, stop)
+    with handled(known, signal.SIG_DFL, stop):
         yield codes
-    finally:
-        for one in mine:
-            signal.signal(one, signal.SIG_DFL)
 
 
 @functools.cache
