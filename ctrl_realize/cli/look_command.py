@@ -58,15 +58,11 @@ def _uses(shown: Table, how: Reading, *, is_long: bool) -> dict[int, str]:
     """What each column is used as."""
     qualities = [] if is_long else how.rules.columns(shown)
     parts = how.parts(shown, None if is_long else qualities)
-    clock, mode = (
-        [k for k in columns if k is not None]
-        for columns in ((parts.time, parts.date), (parts.mode,))
-    )
     named = (
-        ("quality", qualities), ("time", clock), ("input", parts.inputs),
-        ("output", parts.outputs), ("set point", parts.references), ("mode", mode),
+        ("quality", qualities), ("time", [parts.time, parts.date]), ("input", parts.inputs),
+        ("output", parts.outputs), ("set point", parts.references), ("mode", [parts.mode]),
     )  # fmt: skip
-    return {k: name for name, columns in named for k in columns}
+    return {k: name for name, columns in named for k in columns if k is not None}
 
 
 def _ends(cells: np.ndarray[Any, np.dtype[Any]]) -> tuple[str, str]:

@@ -92,67 +92,60 @@ Given: TypeAlias = dict[str, Any]
 """Arguments of Python for the options of a group that were given, see `files.with_options`."""
 
 
+def _option(kind: Any, said: str, *names: str) -> Any:
+    """Return an option of a group; its name is that in the group, unless it is given."""
+    return Annotated[kind, typer.Option(*names, help=said)]
+
+
 _RECORD = options_of("io/records.py", "read_record", "name")
-_FREQUENCY_RESPONSE = options_of("io/frf.py", "read_frf", "response coherence std name")
+_RESPONSE = options_of("io/frf.py", "read_frf", "response coherence std name")
 GROUPS: dict[str, dict[str, Any]] = {
     "chosen": options_of(
         "identification/methods.py", "identify", "known loss noise include_known feedthrough frf"
     ),
     "tests": {
         **options_of("io/records.py", "read_records"),
-        "split": Annotated[
-            bool, _OPTION("--split", help="A file holds several tests: split it where its time "
-                          "jumps."),
-        ],
+        "split": _option(bool, "A file holds several tests: split it where its time jumps.",
+                         "--split"),
     },
     "record": _RECORD,
     "trend": options_of("io/records.py", "read_record", "name missing rest"),
-    "response": {
-        name: option for name, option in _FREQUENCY_RESPONSE.items() if name not in _RECORD
-    },
-    "response_file": {
-        name: _RECORD.get(name, option) for name, option in _FREQUENCY_RESPONSE.items()
-    },
+    "response": {name: one for name, one in _RESPONSE.items() if name not in _RECORD},
+    "response_file": {name: _RECORD.get(name, one) for name, one in _RESPONSE.items()},
     "tuned": {
-        "rule": Annotated[
-            str | None,
-            _OPTION(help="simc (default: as fast as is robust), lambda, imc, amigo, "
-                    "ziegler_nichols, cohen_coon, "
-                    "tyreus_luyben, optimal, ...; see design.pid."),
-        ],
-        "kind": Annotated[str | None, _OPTION(help="P, PI (default), PD or PID.")],
+        "rule": _option(
+            str | None, "simc (default: as fast as is robust), lambda, imc, amigo, "
+            "ziegler_nichols, cohen_coon, tyreus_luyben, optimal, ...; see design.pid.",
+        ),
+        "kind": _option(str | None, "P, PI (default), PD or PID."),
         **options_of("design/tuning/pid.py", "pid", "method dt name"),
     },
     "entered": {
-        "form": Annotated[
-            str | None,
-            _OPTION(help="Form in which the numbers are entered: ideal (default), series, "
-                    "parallel, proportional_band, siemens_pid_compact, rockwell_pide_dependent, "
-                    "emerson_deltav_series, ...; see design.pid_forms."),
-        ],
+        "form": _option(
+            str | None, "Form in which the numbers are entered: ideal (default), series, "
+            "parallel, proportional_band, siemens_pid_compact, rockwell_pide_dependent, "
+            "emerson_deltav_series, ...; see design.pid_forms.",
+        ),
         **options_of("design/tuning/controller.py", "as_form", "time_unit"),
     },
     "compared": options_of("frequency/compare.py", "compare_frf"),
     "measured": options_of("valves/evaluate.py", "valve_report", "limits"),
     "diagnosed": options_of("valves/loops/diagnose.py", "diagnose_loop"),
     "written": {
-        "no_report": Annotated[
-            bool, _OPTION("--no-report", help="Write models and tables alone, without report and "
-                          "figures."),
-        ],
-        "overwrite": Annotated[
-            bool, _OPTION("--overwrite", help="Overwrite the results of another run in the "
-                          "folder."),
-        ],
+        "no_report": _option(
+            bool, "Write models and tables alone, without report and figures.", "--no-report"
+        ),
+        "overwrite": _option(
+            bool, "Overwrite the results of another run in the folder.", "--overwrite"
+        ),
     },
 }  # fmt: skip
 """Options that several commands share, or that go together to one function of Python."""
 
-ARGUMENTS = frozenset(name.removeprefix("no_") for group in GROUPS.values() for name in group) - {
-    "split",
-    "report",
-    "overwrite",
-}
+_OWN = {"split", "report", "overwrite"}
+"""Options that are no arguments of Python."""
+
+ARGUMENTS = {name.removeprefix("no_") for group in GROUPS.values() for name in group} - _OWN
 """Arguments of Python that have an option."""
 
 COLUMNS = ("time", "input", "output", "quality", "by", "frequency", "magnitude", "phase", "real",

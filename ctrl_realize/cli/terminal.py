@@ -93,19 +93,13 @@ def table(columns: Sequence[str], rows: Sequence[Sequence[str]], numbers: Sequen
     a          37
     bc          4
     """
-    cells = [list(columns), *(list(row) for row in rows)]
-    widths = [max(len(line[k]) for line in cells) for k in range(len(columns))]
-    lines = [_aligned(line, widths, numbers) for line in cells]
-    lines.insert(1, "  ".join("-" * width for width in widths))
-    return "\n".join(lines)
-
-
-def _aligned(cells: Sequence[str], widths: Sequence[int], numbers: Sequence[int]) -> str:
-    placed = [
-        cell.rjust(width) if k in numbers else cell.ljust(width)
-        for k, (cell, width) in enumerate(zip(cells, widths, strict=True))
-    ]
-    return "  ".join(placed).rstrip()
+    lines = [list(columns), *map(list, rows)]
+    for k in range(len(columns)):
+        width = max(len(line[k]) for line in lines)
+        for line in lines:
+            line[k] = line[k].rjust(width) if k in numbers else line[k].ljust(width)
+    lines.insert(1, ["-" * len(cell) for cell in lines[0]])
+    return "\n".join("  ".join(line).rstrip() for line in lines)
 
 
 def printable(text: str) -> str:
