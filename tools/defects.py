@@ -207,8 +207,8 @@ DEFECTS = (
     _d("hold in comparison", "half a sample of the hold stays in the model's phase",
        "model = model / hold_response(omega, dt)", "model = model * 1.0", "compare", FREQUENCY),
     _d("stepped sine", "repeats are averaged without their phases",
-       "response[k] = (y @ u.conj()) / (u @ u.conj()).real",
-       "response[k] = (np.abs(y) @ np.abs(u)) / (u @ u.conj()).real", "stepped", FREQUENCY),
+       "response = (y @ u.conj()) / (u @ u.conj()).real",
+       "response = (np.abs(y) @ np.abs(u)) / (u @ u.conj()).real", "stepped", FREQUENCY),
     # --- systems with delay, design, files, tracker
     _d("output delays", "responses leave out the delays of the outputs",
        "later(free[i, j], before + behind)", "later(free[i, j], before)", "delayed", SYSTEMS),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
@@ -12,6 +12,13 @@ from ..results import Flag, Result
 
 if TYPE_CHECKING:
     import pandas as pd
+
+
+_COLUMNS = (
+    "frequency_hz", "measured_gain_db", "model_gain_db", "measured_phase_deg", "model_phase_deg",
+    "gain_error_db", "phase_error_deg", "relative_error", "coherence", "std", "trusted",
+)  # fmt: skip
+"""Columns of the table of a comparison."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,19 +114,8 @@ class FRFComparison(Result):
         """List all points, one per row."""
         import pandas as pd
 
-        columns: dict[str, Any] = {
-            "frequency_hz": self.frequency_hz,
-            "measured_gain_db": decibels(self.measured),
-            "model_gain_db": decibels(self.model),
-            "measured_phase_deg": self.measured_phase_deg,
-            "model_phase_deg": self.model_phase_deg,
-            "gain_error_db": self.gain_error_db,
-            "phase_error_deg": self.phase_error_deg,
-            "relative_error": self.relative_error,
-            "coherence": self.coherence,
-            "std": self.std,
-            "trusted": self.trusted,
-        }
+        gains = {"measured_gain_db": decibels(self.measured), "model_gain_db": decibels(self.model)}
+        columns = {name: gains.get(name, getattr(self, name, None)) for name in _COLUMNS}
         return pd.DataFrame({name: one for name, one in columns.items() if one is not None})
 
     def _title(self) -> str:

@@ -94,16 +94,10 @@ def _structures(
     for key, fit in fits.items():
         freedom = 2 * data.s.size - parameters(fit)
         scales[key] = residual_variance(data, fit, freedom, noise_known)
-        rows.append(
-            FRFStructure(
-                order=key.order,
-                relative_degree=key.relative_degree,
-                dead_time=fit.dead_time / unit,
-                std=dead_time_error(data.problem, fit, 0.5 * scales[key]) / unit,
-                cost=smallest_cost(data, fit),
-                bic=criteria[key],
-            )
-        )
+        dead_time, cost = fit.dead_time / unit, smallest_cost(data, fit)
+        std = dead_time_error(data.problem, fit, 0.5 * scales[key]) / unit
+        bic = criteria[key]
+        rows.append(FRFStructure(key.order, key.relative_degree, dead_time, std, cost, bic))
     return sorted(rows, key=lambda row: row.bic), scales
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import replace
 from typing import Literal
 
 import numpy as np
@@ -141,17 +142,8 @@ def spectral_frf(
     else:
         within(overlap, "overlap", "part", 0, 0.95)
         found, dt = from_segments(stream, method, segment, window, overlap)
-    frequency = found.frequency_hz
-    response = found.response * np.exp(-2j * np.pi * frequency * delay * dt)
-    return MeasuredFRF(
-        response,
-        frequency,
-        coherence=found.coherence,
-        std=found.std,
-        repeats=found.repeats,
-        sample_time=dt,
-        name=name,
-    )
+    response = found.response * np.exp(-2j * np.pi * found.frequency_hz * delay * dt)
+    return MeasuredFRF(**vars(replace(found, response=response)), sample_time=dt, name=name)
 
 
 def _aligned(records: Record | Iterable[Record], delay: int) -> Stream:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from typing import TypeAlias
+from itertools import islice
+from typing import Any, TypeAlias
 
 import numpy as np
 
@@ -11,7 +12,7 @@ from .._checks import not_negative, numbers
 from ..data import MeasuredFRF, Record
 from ..data.given import as_records, check_complete
 from ..errors import DataError, OptionError
-from ..numerics.arrays import ComplexArray, FloatArray
+from ..numerics.arrays import FloatArray
 from ..numerics.rational.sines import dominant_frequency
 from .sine_batches import LEAST_SAMPLES, batches, fit_batch, misfit_beside_line
 
@@ -112,23 +113,23 @@ def stepped_sine_frf(
     if settle is not None:
         not_negative(settle, "settle", "time in s")
 
-    omega = np.empty(len(flat))
-    phasors = np.empty((len(flat), 2), dtype=np.complex128)
-    power = np.empty((len(flat), 2))
-    relative_variance = np.empty(len(flat))
-    bins = np.empty(len(flat))
+    estimates: dict[int, tuple[Any, ...]] = {}
     for batch in batches(flat):
         members = [flat[i] for i in batch]
         fit = fit_batch(members, starts[batch], settle, free_frequency, drift)
-        omega[batch], phasors[batch] = fit.omega, fit.phasor
-        power[batch] = 0.5 * np.abs(fit.phasor) ** 2 + fit.noise_variance
+        power = 0.5 * np.abs(fit.phasor) ** 2 + fit.noise_variance
         # The total variance of a phasor is the trace; that of a ratio is the sum of the relative
         # ones.
         variance = np.trace(fit.phasor_covariance, axis1=2, axis2=3)
-        stronger, bins[batch] = misfit_beside_line(members, fit)
-        variance = variance * stronger
-        relative_variance[batch] = (variance / np.abs(fit.phasor) ** 2).sum(axis=1)
-    return _averaged(points, omega, phasors, power, relative_variance, bins, name)
+        stronger, bins = misfit_beside_line(members, fit)
+        relative = (variance * stronger / np.abs(fit.phasor) ** 2).sum(axis=1)
+        found = zip(fit.omega, fit.phasor, power, relative, bins, strict=True)
+        estimates.update(zip(batch, found, strict=True))
+    in_order = iter([estimates[k] for k in range(len(flat))])
+    averages = [_averaged(point, islice(in_order, len(point))) for point in points]
+    frequency, response, coherence, std, behind = map(np.array, zip(*averages, strict=True))
+    least = float(behind.min())
+    return MeasuredFRF(response, frequency, coherence=coherence, std=std, repeats=least, name=name)
 
 
 def _as_points(records: Sweep) -> list[list[Record]]:
@@ -185,38 +186,22 @@ def _strongest_lines(flat: list[Record]) -> FloatArray:
 
 
 def _averaged(
-    points: list[list[Record]],
-    omega: FloatArray,
-    phasors: ComplexArray,
-    power: FloatArray,
-    relative_variance: FloatArray,
-    bins: FloatArray,
-    name: str,
-) -> MeasuredFRF:
-    """Average the repeats of each point."""
-    response = np.empty(len(points), dtype=np.complex128)
-    frequency, coherence, std = (np.empty(len(points)) for _ in range(3))
-    values_behind = np.empty(len(points))
-    start = 0
-    for k, point in enumerate(points):
-        these = slice(start, start + len(point))
-        start += len(point)
-        u, y = phasors[these, 0], phasors[these, 1]
-        if np.any(np.abs(u) == 0):
-            raise DataError(f"the input of {point[0]!r} has no sine in it")
-        values = y / u
-        # H1 over the repeats: strong ones have more weight, and the coherence is defined for it.
-        response[k] = (y @ u.conj()) / (u @ u.conj()).real
-        frequency[k] = omega[these].mean() / (2 * np.pi)
-        total = 4 * power[these, 0].sum() * power[these, 1].sum()
-        coherence[k] = min(abs(y @ u.conj()) ** 2 / total, 1.0) if total > 0 else 0.0
-        if len(point) >= _ENOUGH:
-            variance = np.var(values, ddof=1) / len(point)
-            values_behind[k] = len(point)
-        else:
-            variance = np.mean(np.abs(values) ** 2 * relative_variance[these]) / len(point)
-            # No mean is subtracted: the number of bins corresponds to one repeat more.
-            values_behind[k] = 1 + bins[these].sum()
-        std[k] = np.sqrt(variance)
-    behind = float(values_behind.min())
-    return MeasuredFRF(response, frequency, coherence=coherence, std=std, repeats=behind, name=name)
+    point: list[Record], estimates: Iterable[tuple[Any, ...]]
+) -> tuple[float, complex, float, float, float]:
+    """Average the repeats of a point: frequency, response, coherence, std and values behind it."""
+    omega, phasors, power, variances, bins = map(np.array, zip(*estimates, strict=True))
+    u, y = phasors.T
+    if np.any(np.abs(u) == 0):
+        raise DataError(f"the input of {point[0]!r} has no sine in it")
+    values = y / u
+    # H1 over the repeats: strong ones have more weight, and the coherence is defined for it.
+    response = (y @ u.conj()) / (u @ u.conj()).real
+    total = 4 * power[:, 0].sum() * power[:, 1].sum()
+    coherence = min(abs(y @ u.conj()) ** 2 / total, 1.0) if total > 0 else 0.0
+    if len(point) >= _ENOUGH:
+        variance, behind = np.var(values, ddof=1), len(point)
+    else:
+        # No mean is subtracted: the number of bins corresponds to one repeat more.
+        variance, behind = np.mean(np.abs(values) ** 2 * variances), 1 + bins.sum()
+    std = np.sqrt(variance / len(point))
+    return omega.mean() / (2 * np.pi), response, coherence, std, behind
