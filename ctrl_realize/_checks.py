@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
+from itertools import chain, count
 from numbers import Integral, Real
 from typing import Any, TypeVar, cast
 
@@ -226,14 +227,11 @@ def system_names(names: Sequence[str]) -> list[str]:
     >>> system_names(["FIC101.OP", "FIC101_OP", "TIC7.PV"])
     ['FIC101_OP_2', 'FIC101_OP', 'TIC7_PV']
     """
-    made = [system_name(name) for name in names]
+    made: list[str] = []
     taken = {name for name in names if "." not in name}
-    for position, (name, wish) in enumerate(zip(names, made, strict=True)):
-        if name == wish:
-            continue
-        number = 2
-        while made[position] in taken:
-            made[position] = f"{wish}_{number}"
-            number += 1
-        taken.add(made[position])
+    for name in names:
+        wish = system_name(name)
+        tries = chain([wish], (f"{wish}_{number}" for number in count(2)))
+        made.append(name if name == wish else next(one for one in tries if one not in taken))
+        taken.add(made[-1])
     return made

@@ -20,15 +20,9 @@ if TYPE_CHECKING:
     import pandas as pd
 
 __all__ = [
-    "INTERVAL_LABELS",
-    "Drawable",
-    "Flag",
-    "FractionalDelayFit",
-    "IntervalKind",
-    "ModelFit",
-    "Parameter",
-    "Result",
-]
+    "INTERVAL_LABELS", "Drawable", "Flag", "FractionalDelayFit", "IntervalKind", "ModelFit",
+    "Parameter", "Result",
+]  # fmt: skip
 
 IntervalKind = Literal["confidence", "conditional", "spanned", "flatness", "plausible", "tracked"]
 """Kinds of intervals of a dead time; see `ModelFit`."""

@@ -151,10 +151,8 @@ class MeasuredFRF(FRFAlgebra):
         return as_asked(self)
 
     def _repr_eval_(self) -> str:
-        parts = [
-            as_code(self.frdata[0, 0] if self._single else self.frdata),
-            as_code(self.frequency_hz),
-        ]
+        response = self.frdata[0, 0] if self._single else self.frdata
+        parts = [as_code(response), as_code(self.frequency_hz)]
         for name in ("coherence", "std", "repeats", "sample_time", "name"):
             if (value := getattr(self, name)) is not None:
                 parts.append(f"{name}={as_code(value)}")
@@ -200,12 +198,9 @@ class MeasuredFRF(FRFAlgebra):
             return taken
         # python-control interprets the key, applied to an FRF whose values are the positions.
         p, m = self.noutputs, self.ninputs
-        places = ct.FrequencyResponseData(
-            np.arange(p * m, dtype=np.complex128).reshape(p, m, 1),
-            [1.0],
-            inputs=self.input_labels,
-            outputs=self.output_labels,
-        )[key].frdata[:, :, 0]
+        numbered = np.arange(p * m, dtype=np.complex128).reshape(p, m, 1)
+        names = {"inputs": self.input_labels, "outputs": self.output_labels}
+        places = ct.FrequencyResponseData(numbered, [1.0], **names)[key].frdata[:, :, 0]
         chosen = places.real.astype(int)
         if chosen.size == 0:
             raise DataError(
@@ -248,10 +243,8 @@ class MeasuredFRF(FRFAlgebra):
 
     def between_hz(self, low: float, high: float) -> MeasuredFRF:
         """Return the points with low <= frequency <= high, in Hz."""
-        return self._select(
-            (self.frequency_hz >= low) & (self.frequency_hz <= high),
-            f"between {low:g} and {high:g} Hz",
-        )
+        inside = (self.frequency_hz >= low) & (self.frequency_hz <= high)
+        return self._select(inside, f"between {low:g} and {high:g} Hz")
 
     def trusted(self, min_coherence: float = 0.95) -> MeasuredFRF:
         """Return the points with a coherence of at least `min_coherence` (in every channel)."""

@@ -55,14 +55,10 @@ class FRFAlgebra(ct.FrequencyResponseData):  # type: ignore[misc]  # control is 
 
     def _operand(self) -> Operand:
         shape = self.frdata.shape
-        return Operand(
-            self.frdata,
-            None if self.std is None else self.std.reshape(shape) ** 2,
-            None if self.coherence is None else self.coherence.reshape(shape),
-            self.sample_time,
-            self.repeats,
-            measured=True,
-        )
+        variance = None if self.std is None else self.std.reshape(shape) ** 2
+        coherence = None if self.coherence is None else self.coherence.reshape(shape)
+        known = variance, coherence, self.sample_time, self.repeats
+        return Operand(self.frdata, *known, measured=True)
 
     def _other(self, other: Any) -> Operand | None:
         """Evaluate the other operand at the frequencies of this one; None if it is not a system."""

@@ -299,12 +299,9 @@ class Record(RecordConversions):
                 f"samples of the record, which covers {self.time[0]:g} s to {self.time[-1]:g} "
                 f"s; at least {MIN_SAMPLES} are needed"
             )
-        return self.__replace__(
-            time=self.time[inside],
-            input=self.input[..., inside],
-            output=self.output[..., inside],
-            reference=None if self.reference is None else self.reference[..., inside],
-        )
+        signals = {"input": self.input, "output": self.output, "reference": self.reference}
+        kept = {name: one[..., inside] for name, one in signals.items() if one is not None}
+        return self.__replace__(time=self.time[inside], **kept)
 
     def with_baseline(self, input: ArrayLike, output: ArrayLike) -> Record:
         """Return the record with one sample of the steady state in front of it.

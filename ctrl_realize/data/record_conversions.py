@@ -290,18 +290,15 @@ class RecordConversions(Drawable):
         """
         if response.inputs is None:
             raise DataError("the response has no input; simulate with ct.forced_response")
-        many = {} if response.issiso else {"input": response.u, "output": response.y}
-        for what, values in many.items():
+        u, y = response.u, response.y
+        if response.issiso:
+            u, y = np.ravel(u), np.ravel(y)
+        for what, values in (("input", u), ("output", y)):
             if np.ndim(values) > 2:
                 raise DataError(f"the {what} of the response has several traces; pass one of them")
-        return cls(
-            response.time,
-            many.get("input", np.ravel(response.u)),
-            many.get("output", np.ravel(response.y)),
-            name=(response.sysname or "") if name is None else name,
-            input_labels=response.input_labels,
-            output_labels=response.output_labels,
-        )
+        called = (response.sysname or "") if name is None else name
+        labels = {"input_labels": response.input_labels, "output_labels": response.output_labels}
+        return cls(response.time, u, y, name=called, **labels)
 
     def to_response(self) -> ct.TimeResponseData:
         """Convert the record to time-response data of python-control."""

@@ -6,8 +6,9 @@ from dataclasses import dataclass
 from difflib import get_close_matches
 from importlib import resources
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
+from .._shown import Card
 from ..data import MeasuredFRF, Record
 from ..errors import OptionError
 from ..io import read_frf, read_record
@@ -63,14 +64,8 @@ class Dataset(Result):
             )
         return self.frfs[0]
 
-    def _title(self) -> str:
-        return self.info._title()
-
-    def _rows(self) -> list[tuple[str, str]]:
-        return self.info._rows()
-
-    def _choices(self) -> list[str]:
-        return self.info._choices()
+    def _card(self) -> Card:
+        return self.info._card()
 
     def __repr__(self) -> str:
         count, responses = len(self.records), len(self.frfs)
@@ -239,11 +234,6 @@ def _located(info: DatasetInfo, file: DataFile) -> Path:
 
 def _read(info: DatasetInfo, file: DataFile, path: Path) -> Record:
     found = read_record(path, **file.reading)
-    return Record(
-        found.time,
-        found.input,
-        found.output,
-        name=f"{info.name} {_spelled(file)}",
-        input_labels=list(file.inputs),
-        output_labels=list(file.outputs),
-    )
+    name = f"{info.name} {_spelled(file)}"
+    labels: dict[str, Any] = {"input_labels": file.inputs, "output_labels": file.outputs}
+    return Record(found.time, found.input, found.output, name=name, **labels)
