@@ -173,14 +173,8 @@ def summary_of(fit: ModelFit | None) -> FitSummary | None:
     with times_in(fit.time_unit):
         rows = tuple((str(label), str(value)) for label, value in fit._rows())
         title = fit._title()
-    return FitSummary(
-        kind=type(fit).__name__,
-        title=title,
-        rows=rows,
-        values=tuple(pair for pair in values.items() if pair[1] not in (None, ())),
-        flags=fit.flags,
-        choices=fit.choices,
-    )
+    known = tuple(pair for pair in values.items() if pair[1] not in (None, ()))
+    return FitSummary(type(fit).__name__, title, rows, known, fit.flags, fit.choices)
 
 
 def summary_to_json(summary: FitSummary | None) -> dict[str, Any] | None:

@@ -7,17 +7,11 @@ from ..errors import OptionError
 from ..numerics.arrays import FloatArray
 
 # Scale as (multiplier, divisor): t / 1000 is the double nearest to the decimal number in the file,
-# t * 0.001 often is not.
+# t * 0.001 often is not. Not "d": a column u_d is more likely a disturbance than u in days.
 TIME_UNITS: dict[str, tuple[float, float]] = {
-    "s": (1.0, 1.0),
-    "ms": (1.0, 1e3),
-    "us": (1.0, 1e6),
-    "ns": (1.0, 1e9),
-    "min": (60.0, 1.0),
-    "h": (3600.0, 1.0),
-    # not "d": a column u_d is more likely a disturbance than u in days
-    "day": (86400.0, 1.0),
-}
+    "s": (1.0, 1.0), "ms": (1.0, 1e3), "us": (1.0, 1e6), "ns": (1.0, 1e9),
+    "min": (60.0, 1.0), "h": (3600.0, 1.0), "day": (86400.0, 1.0),
+}  # fmt: skip
 
 _WORDS = facts("io/words.toml")
 _SPELLINGS: dict[str, str] = {

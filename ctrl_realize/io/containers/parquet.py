@@ -63,8 +63,7 @@ def read_parquet(path: Path, *, max_bytes: float, variable: str | None = None) -
         raise FileFormatError(f"{path} has no columns")
     reader = _Reader(path, unpacked_limit(path, max_bytes))
     columns = tuple(
-        LateColumn(str(field.name)[:MAX_NAME], partial(reader.load, position, field))
-        for position, field in enumerate(fields)
+        LateColumn(str(field.name)[:MAX_NAME], partial(reader.load, field)) for field in fields
     )
     return Table(path, columns)
 
@@ -77,14 +76,14 @@ class _Reader:
         self.limit = limit
         self.taken = 0
 
-    def load(self, position: int, field: pa.Field, count: int | None) -> AnyArray:
+    def load(self, field: pa.Field, count: int | None) -> AnyArray:
         """Return the first `count` cells of a column, or all."""
         import pyarrow.parquet as pq
 
         kind = _kind(field.type)
         if kind == "other":
             if count is not None:
-                return np.empty(0, dtype=object)
+                return _NOTHING
             raise FileFormatError(
                 f"{self.path}: column {field.name!r} holds {str(field.type)[:60]} values; "
                 "expected numbers or times"
@@ -98,10 +97,10 @@ class _Reader:
             if count is not None:
                 parts = file.iter_batches(count, columns=[field.name], use_threads=False)
                 return next((_cells(part.column(0)) for part in parts), _NOTHING)
-            self._take(file, position, field, kind)
+            self._take(file, field, kind)
             return _cells(file.read(columns=[field.name], use_threads=False).column(0))
 
-    def _take(self, file: Any, position: int, field: pa.Field, kind: str) -> None:
+    def _take(self, file: Any, field: pa.Field, kind: str) -> None:
         """Refuse a column that exceeds the limit."""
         groups = [file.metadata.row_group(k) for k in range(file.metadata.num_row_groups)]
         packed = sum(

@@ -45,9 +45,8 @@ class Reading(SimpleNamespace):
                 f"missing={self.missing!r} and resample=True exclude each other: expected one of "
                 "them"
             )
-        if self.rest is not None and (
-            isinstance(self.rest, str) or np.shape(self.rest)[:1] != (2,)
-        ):
+        pair = not isinstance(self.rest, str) and np.shape(self.rest)[:1] == (2,)
+        if self.rest is not None and not pair:
             raise OptionError(f"rest={self.rest!r}; expected input and output in the steady state")
         self.text = TextOptions.among(given)
         self.clock = Clock(self.time_unit, self.time_format, self.time_zone)

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from ...data.record_checks import labelled
 from ...data.resampling import MIN_SAMPLES
 from ...data.samples import Samples
 from ...errors import DataError, OptionError
@@ -26,10 +27,8 @@ from .quality import Rows, Rules
 
 def wide_axis(table: Table, parts: Parts, clock: Clock) -> tuple[TimeAxis, Rows]:
     """Time axis of a table with a column for each signal, and its rows in the order of time."""
-    used = [*parts.inputs, *parts.outputs, *parts.references] + (
-        [] if parts.time is None else [parts.time]
-    )
-    check_lengths(table, used)
+    used = [*parts.inputs, *parts.outputs, *parts.references, parts.time]
+    check_lengths(table, [k for k in used if k is not None])
     count = table.columns[parts.outputs[0]].cells.size
     if parts.time is None:
         return TimeAxis(parts.dt * np.arange(count, dtype=np.float64), None), np.arange(count)
@@ -168,9 +167,8 @@ def labels_of(table: Table, parts: Parts, time_unit: str) -> dict[str, Any]:
     ):
         names = [table.columns[k].name for k in chosen]
         unique = all(names) and len(set(names)) == len(names)
-        labels[argument] = names if unique else None
-        default = [letter] if len(chosen) == 1 else [f"{letter}[{k}]" for k in range(len(chosen))]
-        for name, k in zip(names if unique else default, chosen, strict=True):
+        labels[argument] = labelled(names if unique else None, len(chosen), letter, argument)
+        for name, k in zip(labels[argument], chosen, strict=True):
             unit = table.columns[k].told_unit
             if plain_unit(unit):
                 units[name] = unit
