@@ -55,9 +55,8 @@ def write_campaign_files(folder: Path, campaign: Campaign, provenance: Provenanc
     write_csv(folder / "records.csv", campaign.table(), index=True)
     save_models(folder, campaign, provenance.settings)
     title = f"Campaign of {len(campaign.rows)} records"
-    return _write_files(
-        folder, partial(report.write_campaign, campaign=campaign, title=title), provenance
-    )
+    write = partial(report.write_campaign, campaign=campaign, title=title)
+    return _write_files(folder, write, provenance)
 
 
 _SHOWN = ("frf", "comparison", "settings", "calls")

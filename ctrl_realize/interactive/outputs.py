@@ -70,11 +70,8 @@ def controller_lines(settings: Mapping[str, Any], system: DelayedStateSpace) -> 
     options = loops.rule_options(settings, system)
     words = "".join(f", {key}={value!r}" for key, value in options.items())
     ranges = "".join(f", {k}={v!r}" for k, v in loops.form_ranges(settings).items())
-    return [
-        "",
-        f"pid = cr.design.pid(system{words})",
-        f"print(pid.as_form({settings['form']!r}{ranges}).report())",
-    ]
+    told = f"print(pid.as_form({settings['form']!r}{ranges}).report())"
+    return ["", f"pid = cr.design.pid(system{words})", told]
 
 
 def report(

@@ -81,12 +81,8 @@ def campaign_plot(
         reach = {"ymax": 1 - room} if listed else {}
         if np.isfinite(summary.std_error):
             band(*summary.interval, color=style.BAND, alpha=0.25, linewidth=0, **reach)
-        along(
-            summary.mean,
-            color=style.MODEL,
-            label=f"trimmed mean {summary.mean:.2f} samples = {in_time(summary.mean * dt)}",
-            **reach,
-        )
+        mean = f"trimmed mean {summary.mean:.2f} samples = {in_time(summary.mean * dt)}"
+        along(summary.mean, color=style.MODEL, label=mean, **reach)
         if truth is not None:
             known = f"truth {truth:.4g} (simulated)"
             along(truth, color=style.TRUTH, linestyle=":", label=known, **reach)

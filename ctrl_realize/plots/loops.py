@@ -261,11 +261,10 @@ def _linear_signals(
     """Measured value after both steps, then the controller's output after both."""
     # Twice the span is computed: circular wrap-around shows at the end.
     length = 2 ** int(np.ceil(np.log2(2 * count)))
-    responses = (
-        *step_responses(plant, controller, length),
-        *step_responses(plant, controller, length, of_controller=True),
-    )
-    return [height * y[:count] for height, y in zip(steps * 2, responses, strict=True)]
+    measured = step_responses(plant, controller, length)
+    driven = step_responses(plant, controller, length, of_controller=True)
+    signals = (*measured, *driven)
+    return [height * y[:count] for height, y in zip(steps * 2, signals, strict=True)]
 
 
 def _simulated(

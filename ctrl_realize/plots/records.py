@@ -223,11 +223,9 @@ def _steps(given: Any) -> list[StepResponse]:
 def _measured_steps(
     axes: Axes, steps: Sequence[StepResponse], factor: float, before: float = 0.0, **kwargs: Any
 ) -> list[Line2D]:
-    looks: dict[str, Any] = {
-        "color": style.MEASURED,
-        "linewidth": 1.5 if len(steps) == 1 else 0.8,
-        "alpha": 1.0 if len(steps) == 1 else 0.6,
-    }
+    looks: dict[str, Any] = {"color": style.MEASURED, "linewidth": 1.5, "alpha": 1.0}
+    if len(steps) > 1:
+        looks |= {"linewidth": 0.8, "alpha": 0.6}
     if sum(step.n_samples for step in steps) <= _FEW_SAMPLES:
         looks |= {"marker": "o", "markersize": 3.5}
     looks.update(kwargs)

@@ -193,6 +193,8 @@ def write_campaign(
     """
     system = campaign.system
     with times_in(shown_time_unit(system)):
+        tables = [campaign_table(campaign), amplitude_table(campaign)]
+        tables += comparison_tables(comparison)
         sketches = campaign_sketches(campaign, truth=truth)
         if frf is not None:
             sketches += frf_sketches([system], frf, comparison)
@@ -202,13 +204,7 @@ def write_campaign(
             subtitle=f"{len(campaign.rows)} records, method {campaign.method}",
             verdict=campaign_verdict(campaign, comparison=comparison),
             sketches=sketches,
-            tables=[
-                campaign_table(campaign),
-                amplitude_table(campaign),
-                *comparison_tables(comparison),
-                *fit_tables(system.fit),
-                model_table(system),
-            ],
+            tables=[*tables, *fit_tables(system.fit), model_table(system)],
             records=records,
             fit=system.fit,
             controller=controller_of(system, controller, form),

@@ -68,19 +68,14 @@ def write_valve_report(
     """
     check_type(result, ValveReport, "result", "that of valve_report")
     many = len(result.records)
+    tables = [_metric_table(result), _size_table(result)]
     return write_report(
         path,
         title=title,
         subtitle=f"{many} record{'s' if many > 1 else ''}, {len(result.steps)} steps",
         verdict=_verdict(result),
         sketches=_sketches(result),
-        tables=[
-            _metric_table(result),
-            _size_table(result),
-            *_missing_tables(result),
-            _step_table(result),
-            _definition_table(),
-        ],
+        tables=[*tables, *_missing_tables(result), _step_table(result), _definition_table()],
         records=result.records,
         **about,
     )
@@ -94,9 +89,8 @@ def _verdict(result: ValveReport) -> Verdict:
             value, interval = in_words(one.interval, one.definition.unit)
             facts.append((one.definition.name, f"{value} {interval}"))
     reasons = (*map(str, result.flags), *result.choices)
-    return Verdict(
-        result.level, result.verdict, tuple(facts), reasons, JUDGEMENTS["valve"][result.level]
-    )
+    judgement = JUDGEMENTS["valve"][result.level]
+    return Verdict(result.level, result.verdict, tuple(facts), reasons, judgement)
 
 
 def _sketches(result: ValveReport) -> list[Sketch]:

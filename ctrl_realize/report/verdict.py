@@ -94,11 +94,8 @@ def campaign_verdict(campaign: Campaign, *, comparison: FRFComparison | None = N
     """Judge a campaign by its final model, and its flags."""
     system = campaign.system
     flags = (*_flags_in(comparison), *campaign.flags, *_flags_of(system))
-    facts = [
-        *campaign._rows(),
-        *gain_scatter(np.array([row.gain for row in campaign.good], dtype=np.float64)),
-        *disagreement(comparison),
-    ]
+    gains = np.array([row.gain for row in campaign.good], dtype=np.float64)
+    facts = [*campaign._rows(), *gain_scatter(gains), *disagreement(comparison)]
     known = {label for label, _ in facts}
     facts += [fact for fact in facts_of(system) if fact[0] not in known]
     return _verdict(system, flags, facts)

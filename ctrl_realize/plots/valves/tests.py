@@ -51,9 +51,8 @@ def _draw_steps(axes: Axes, report: ValveReport, looks: dict[str, Any]) -> list[
             "color": colours[nearest], "linestyle": "-" if step.size > 0 else "--",
             "linewidth": 1.0, "alpha": 0.8, **({"label": label} if label else {}), **looks,
         }  # fmt: skip
-        lines += axes.plot(
-            np.arange(0, count, every) * step.dt * unit, step.response[:count:every], **own
-        )
+        time = np.arange(0, count, every) * step.dt
+        lines += axes.plot(time * unit, step.response[:count:every], **own)
     for level in (0.632, 0.865):
         axes.axhline(level, color=style.NOISE, linewidth=0.8, linestyle=":")
     axes.set(xlabel=f"time after the step [{name}]", ylabel="response / change")
@@ -111,11 +110,9 @@ def _draw_loop(axes: Axes, report: ValveReport, looks: dict[str, Any]) -> list[L
                "linewidth": 0.8, **looks}  # fmt: skip
         if 1 < len(few) <= 6 and record.name:
             own.setdefault("label", record.name)
-        lines += axes.plot(
-            100 * (u[::every] - ranges.command[0]) / ranges.command_span,
-            100 * (y[::every] - ranges.travel[0]) / ranges.travel_span,
-            **own,
-        )
+        command = 100 * (u[::every] - ranges.command[0]) / ranges.command_span
+        travel = 100 * (y[::every] - ranges.travel[0]) / ranges.travel_span
+        lines += axes.plot(command, travel, **own)
     axes.set(xlabel="command [% of span]", ylabel="position [% of travel]")
     return lines
 
