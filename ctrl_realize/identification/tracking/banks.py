@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import TypeAlias
 
 import numpy as np
 
@@ -29,24 +30,22 @@ PENDING = 0.3
 """Relative move of a pole, in a renewal, above which no estimate is given meanwhile. Below it the
 interval is widened by the same fraction of the slowest lag, the possible error of the delay."""
 
+Start: TypeAlias = tuple[Core, ComplexArray]
+"""Matrices of a model without its delay, and its zeros."""
+
 
 class Banks:
     """The bank for the poles of the starting model, and those that replace it.
 
-    `span` is the forgetting time in samples; with `fixed`, poles do not move.
+    `delays` are the first and the last candidate and `span` the forgetting time, all in samples;
+    with `fixed`, poles do not move.
     """
 
     def __init__(
-        self,
-        core: Core,
-        zeros: ComplexArray,
-        *,
-        dt: float,
-        candidates: tuple[int, int],
-        span: float,
-        fixed: bool,
+        self, start: Start, *, dt: float, delays: tuple[int, int], span: float, fixed: bool
     ) -> None:
-        self._zeros, self._dt, self._candidates, self._span = zeros, dt, candidates, span
+        core, self._zeros = start
+        self._dt, self._delays, self._span = dt, delays, span
         poles = np.linalg.eigvals(core[0]).astype(np.complex128)
         directions = [] if fixed else pole_directions(poles, dt)
         self.now = self._about(core, directions, np.zeros(len(directions)))
@@ -54,7 +53,7 @@ class Banks:
 
     def _about(self, core: Core, directions: list[Direction], moved: FloatArray) -> LinearisedBank:
         system = sensitivity_system(*core, directions)
-        bank = DelayBank(*system, *self._candidates, float(np.exp(-1.0 / self._span)))
+        bank = DelayBank(system, *self._delays, float(np.exp(-1.0 / self._span)))
         return LinearisedBank(bank, core, directions, moved)
 
     def update(self, u: float, y: float, count: int) -> bool:
@@ -86,7 +85,7 @@ class Banks:
         fresh = self._about(*made, self.now.moved + step)
         settling = fresh.bank.settling()
         if settling is not None:
-            self._next = replace(fresh, begin=count + settling + self._candidates[1] + 1)
+            self._next = replace(fresh, begin=count + settling + self._delays[1] + 1)
 
     def core_at(self, found: Solution | None) -> Core:
         """Return the core with its poles moved to the estimates; the zeros are unchanged."""

@@ -203,7 +203,5 @@ def track_of(points: Sequence[TrackPoint], dt: float) -> TrackHistory:
     """Collect single estimates in the arrays of a history."""
     names = ("time", "dead_time", "gain_ratio", "resolved", "lost")
     found = {name: locked(np.array([getattr(one, name) for one in points])) for name in names}
-    low, high = (
-        locked(np.array(ends)) for ends in zip(*(one.interval for one in points), strict=True)
-    )
-    return TrackHistory(low=low, high=high, dt=dt, **found)
+    ends = np.array([one.interval for one in points])
+    return TrackHistory(low=locked(ends[:, 0]), high=locked(ends[:, 1]), dt=dt, **found)

@@ -11,11 +11,9 @@ from ..._checks import positive
 from ...data import Record
 from ...delayed import DelayedStateSpace
 from ...errors import DataError, UnsuitableSystemError
-from ...numerics.arrays import ComplexArray
 from ...numerics.blas_threads import single_threaded
 from ...numerics.regression.recursive import RunningResidual
-from ...numerics.state_space.pole_sensitivity import Core
-from .banks import Banks
+from .banks import Banks, Start
 from .checks import (
     check_candidates,
     check_forgetting_time,
@@ -134,25 +132,19 @@ class DelayTracker:
             passed = positive(drift_time, "drift_time", "time constant in s")
             self._keep_of_drift = float(np.exp(-self.dt / passed))
         self._dynamics = dynamics
-        self._start, self._zeros = _parts(core)
+        self._start = _parts(core)
         self._begin()
 
     def _begin(self) -> None:
         """Initialise for a core, without samples."""
-        self._banks = Banks(
-            self._start,
-            self._zeros,
-            dt=self.dt,
-            candidates=(self._low, self._high),
-            span=self._span,
-            fixed=not self._dynamics,
-        )
+        delays, fixed = (self._low, self._high), not self._dynamics
+        self._banks = Banks(self._start, dt=self.dt, delays=delays, span=self._span, fixed=fixed)
         self._count = 0
         self._first = (0.0, 0.0)
         self._before, self._passed = (0.0, 0.0), (0.0, 0.0)
         # Smallest residual of the starting model over a forgetting time with a resolved delay.
         self._least = np.inf
-        slowest = float(np.abs(np.linalg.eigvals(self._start[0])).max(initial=0.0))
+        slowest = float(np.abs(np.linalg.eigvals(self._start[0][0])).max(initial=0.0))
         lag = -1 / np.log(slowest) if 0 < slowest < 1 else 1.0
         # Neighbouring noise samples may be correlated, by filters and converters.
         self._lag, self._well_sampled = lag, lag >= 3 * SHARE_OF_LAG
@@ -225,7 +217,7 @@ class DelayTracker:
                     f"the model has the sample time {core.dt:g} s, the tracker {self.dt:g} s"
                 )
             self._noise_std = model_noise(model, None) or self._noise_std
-            self._start, self._zeros = _parts(core)
+            self._start = _parts(core)
         self._begin()
 
     def estimate(self) -> TrackPoint:
@@ -238,9 +230,8 @@ class DelayTracker:
         found, point = self._latest()
         A, B, C, D = self._banks.core_at(found)
         gain = point.gain_ratio
-        return DelayedStateSpace(
-            ct.ss(A, B[:, None], gain * C[None], gain * D, self.dt), point.delay, fit=point
-        )
+        core = ct.ss(A, B[:, None], gain * C[None], gain * D, self.dt)
+        return DelayedStateSpace(core, point.delay, fit=point)
 
     @single_threaded
     def track(self, record: Record) -> TrackHistory:
@@ -279,17 +270,14 @@ class DelayTracker:
 
     def _keep(self, found: Solution | None) -> None:
         """Update the state from a solution, and start a new bank if the poles have moved."""
-        self._point = self._point_of(found)
+        self._point = point = self._point_of(found)
         full = self._count >= self._span
-        if found is not None and full and self._point.resolved and not self._banks.moved:
+        if found is not None and full and point.resolved and not self._banks.moved:
             self._least = min(self._least, float(np.sqrt(found.variance)))
-        self._recent_delays.append(
-            self._point.dead_time / self.dt if self._point.resolved else np.nan
-        )
-        if found is None:
-            return
-        self._solution, self._variance = found, found.variance
-        self._banks.follow(found, self._count)
+        self._recent_delays.append(point.dead_time / self.dt if point.resolved else np.nan)
+        if found is not None:
+            self._solution, self._variance = found, found.variance
+            self._banks.follow(found, self._count)
 
     def _point_of(self, found: Solution | None) -> TrackPoint:
         time, low = max(self._count - 1, 0) * self.dt, self._low
@@ -335,7 +323,7 @@ class DelayTracker:
         return low, min(interval[1] + int(np.ceil(max(change, 0.0) + off)), self._high)
 
 
-def _parts(core: ct.StateSpace) -> tuple[Core, ComplexArray]:
-    """Return the matrices of a core, and its zeros."""
+def _parts(core: ct.StateSpace) -> Start:
+    """Return the matrices of a core, and its zeros: a system itself cannot be pickled."""
     matrices = core.A, core.B[:, 0], core.C[0], float(core.D[0, 0])
     return matrices, np.asarray(core.zeros(), dtype=np.complex128)

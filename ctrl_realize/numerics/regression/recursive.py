@@ -20,7 +20,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..arrays import FloatArray
+from ..arrays import FloatArray, Matrices
 from ..constants import LARGEST
 
 
@@ -42,12 +42,8 @@ class RunningResidual:
 
     def __init__(self, forgetting: float, lag: int = 1) -> None:
         self._forgetting = forgetting
-        self._sum = 0.0
-        self._squares = 0.0
-        self._squared_sums = 0.0
+        self._sum = self._squares = self._squared_sums = self._changes = self._weight = 0.0
         self._last: deque[float] = deque(maxlen=lag)
-        self._changes = 0.0
-        self._weight = 0.0
 
     def add(self, error: float) -> None:
         """Process the residual of one sample."""
@@ -101,24 +97,17 @@ class DelayBank:
 
     Parameters
     ----------
-    A, B, C, D : ndarray, shapes (n, n), (n,), (q, n), (q,)
-        System from the input to the q regressors, with zero initial state.
+    system : tuple (A, B, C, D)
+        From the input to the q regressors, with zero initial state: arrays of shapes (n, n), (n,),
+        (q, n), (q,).
     low, high : int
         Candidate delays, in samples.
     forgetting : float
         Factor lambda by which a sample's weight decreases from one sample to the next.
     """
 
-    def __init__(
-        self,
-        A: FloatArray,
-        B: FloatArray,
-        C: FloatArray,
-        D: FloatArray,
-        low: int,
-        high: int,
-        forgetting: float,
-    ) -> None:
+    def __init__(self, system: Matrices, low: int, high: int, forgetting: float) -> None:
+        A, B, C, D = system
         q, n = C.shape
         self.low, self.high, self.forgetting = low, high, forgetting
         # One product a sample gives the next state and the regressors.

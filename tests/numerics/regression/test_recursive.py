@@ -27,7 +27,7 @@ def test_the_bank_solves_the_weighted_least_squares_of_every_delay(low, restart)
     A, B, C, D = matrices(R3)
     big = sensitivity_system(A, B, C, D, pole_directions(np.linalg.eigvals(A), DT))
     u, y = rng.normal(size=120), 5 + rng.normal(size=120)
-    bank = DelayBank(*big, low, 9, 0.98)
+    bank = DelayBank(big, low, 9, 0.98)
     for k, sample in enumerate(zip(u, y, strict=True)):
         if restart and k == restart:
             bank.restart()
