@@ -12,7 +12,7 @@ from ...numerics.blas_threads import single_threaded
 from .delay_scan_result import DelayScan
 from .realize import realize
 from .result import Realization
-from .scan_curve import best_delay, flat_set, scan_flags
+from .scan_curve import scan_curve, scan_flags
 from .scan_surface import Surface, scan_surface
 
 
@@ -105,8 +105,7 @@ def estimate_delay(
 
 def best_of(surface: Surface, order: int) -> DelayedStateSpace:
     """Realize the model of one order at its best delay."""
-    iae, rounding = surface.iae[surface.orders.index(order)], surface.rounding
-    delay = best_delay(iae, rounding)
+    iae, delay, flat = scan_curve(surface, order)
     system = realize(
         surface.impulse,
         order,
@@ -119,7 +118,7 @@ def best_of(surface: Surface, order: int) -> DelayedStateSpace:
     fit = DelayScan(
         iae=read_only(iae),
         delay=delay,
-        delay_interval=flat_set(iae, delay, rounding),
+        delay_interval=flat,
         order=order,
         samples=surface.samples,
         feedthrough=surface.feedthrough is not False,

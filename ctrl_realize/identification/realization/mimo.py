@@ -254,21 +254,19 @@ def realize_mimo(
         if ALIKE * direct[2].sum() < errors.sum():
             found, (way, pieces, errors) = later, direct
     apart = np.add.outer(pieces.outputs, pieces.inputs)
-    return pieces.system(
-        data.dt,
-        MimoRealization(
-            delays=locked(found),
-            residual_delays=locked(np.where(known, found - apart, 0)),
-            output_delays=pieces.outputs,
-            input_delays=pieces.inputs,
-            structure=way,
-            orders=pieces.orders,
-            states=pieces.states,
-            relative_iae=read_only(errors),
-            impulse=data,
-            flags=pieces.flags,
-        ),
+    fit = MimoRealization(
+        delays=locked(found),
+        residual_delays=locked(np.where(known, found - apart, 0)),
+        output_delays=pieces.outputs,
+        input_delays=pieces.inputs,
+        structure=way,
+        orders=pieces.orders,
+        states=pieces.states,
+        relative_iae=read_only(errors),
+        impulse=data,
+        flags=pieces.flags,
     )
+    return pieces.system(data.dt, fit)
 
 
 def _assembled(
@@ -283,14 +281,12 @@ def _assembled(
     if choice in ("common", "auto"):
         candidates = [aligned_core(data, count, *split, samples) for split in splits]
         models["common"] = min(candidates, key=lambda c: float(channel_iae(c, data).sum()))
-    if choice in ("rows", "auto"):
-        models["rows"] = cores_one_by_one(data, count, found, samples, 0)
-    if choice in ("columns", "auto"):
-        models["columns"] = cores_one_by_one(data, count, found, samples, 1)
+    for axis, way in enumerate(("rows", "columns")):
+        if choice in (way, "auto"):
+            models[way] = cores_one_by_one(data, count, found, samples, axis)
     errors = {way: channel_iae(pieces, data) for way, pieces in models.items()}
     # The fewest states among those that explain the data about as well as the best.
     enough = max(ALIKE * min(m.sum() for m in errors.values()), EXACT * data.noutputs)
-    way = min(
-        (way for way in models if errors[way].sum() <= enough), key=lambda w: models[w].states
-    )
+    good = [way for way in models if errors[way].sum() <= enough]
+    way = min(good, key=lambda one: models[one].states)
     return way, models[way], errors[way]

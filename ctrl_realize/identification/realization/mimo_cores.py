@@ -14,7 +14,7 @@ from ...delayed.parts import matrices_of
 from ...errors import OrderError
 from ...numerics.arrays import FloatArray, IntArray, Matrices
 from ...numerics.hankel.delay_models import realize_at
-from ...numerics.state_space.delay_split import joined_columns, joined_rows, least_known
+from ...numerics.state_space.delay_split import aligned, joined_columns, joined_rows, least_known
 from ...results import Flag
 from ..realization.result import Realization
 from .impulses import channels, check_samples
@@ -54,15 +54,6 @@ def channel_iae(pieces: Assembly, data: ImpulseResponse) -> FloatArray:
     return share
 
 
-def _aligned(markov: FloatArray, delays: IntArray) -> FloatArray:
-    """Advance every channel by its delay; the length is what all channels have."""
-    p, m, N = markov.shape
-    length = N - int(delays.max())
-    return np.array(
-        [[markov[i, j, delays[i, j] : delays[i, j] + length] for j in range(m)] for i in range(p)]
-    )
-
-
 def _realized(
     data: ImpulseResponse, markov: FloatArray, order: int, samples: int | None
 ) -> tuple[Matrices, tuple[Flag, ...]]:
@@ -85,7 +76,7 @@ def aligned_core(
     data: ImpulseResponse, order: int, outputs: IntArray, inputs: IntArray, samples: int | None
 ) -> Assembly:
     """Align all channels by delays of inputs and outputs, and realize them with one A."""
-    moved = _aligned(channels(data), np.add.outer(outputs, inputs))
+    moved = aligned(channels(data), np.add.outer(outputs, inputs))
     core, flags = _realized(data, moved, order, samples)
     before, behind = (tuple(int(d) for d in share) for share in (inputs, outputs))
     return Assembly(core, before, behind, (core[0].shape[0],), flags)
@@ -100,8 +91,8 @@ def cores_one_by_one(
     # a channel without response uses its delay line unchanged, and adds no tap
     full = np.where(found >= 0, found, np.expand_dims(first, axis))
     count = full.shape[axis]
-    aligned = [_aligned(markov.take([k], axis), full.take([k], axis)) for k in range(count)]
-    realized = [_realized(data, part, order, samples) for part in aligned]
+    advanced = [aligned(markov.take([k], axis), full.take([k], axis)) for k in range(count)]
+    realized = [_realized(data, part, order, samples) for part in advanced]
     parts = [core for core, _ in realized]
     join = joined_columns if axis else joined_rows
     core = join(parts, full - np.expand_dims(first, axis))

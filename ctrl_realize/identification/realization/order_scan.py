@@ -19,7 +19,7 @@ from ...results import Flag, Result
 from .delay_scan import best_of
 from .impulses import filter_flags
 from .order import suggest_order
-from .scan_curve import best_delay, flat_set, scan_flags
+from .scan_curve import scan_curve, scan_flags
 from .scan_surface import Surface, scan_surface
 
 if TYPE_CHECKING:
@@ -233,17 +233,15 @@ def scan_orders(
     every = orders if isinstance(orders, Iterable) else range(1, integer(orders, "orders", 1) + 1)
     tried = integers(every, "orders", 1)
     surface = scan_surface(impulse, tried, max_delay, samples, feedthrough, hankel, dt)
-    rounding = surface.rounding
-    delays = tuple(best_delay(row, rounding) for row in surface.iae)
+    curves = [scan_curve(surface, order) for order in surface.orders]
+    delays = tuple(delay for _, delay, _ in curves)
     last = surface.singular_values[list(delays), np.array(surface.orders) - 1]
     chosen = suggest_order(surface, last)
     return OrderScan(
         orders=surface.orders,
         iae=read_only(surface.iae),
         delays=delays,
-        delay_intervals=tuple(
-            flat_set(row, d, rounding) for row, d in zip(surface.iae, delays, strict=True)
-        ),
+        delay_intervals=tuple(flat for *_, flat in curves),
         singular_values=read_only(surface.singular_values),
         noise_floor=surface.noise_floor,
         order=chosen,

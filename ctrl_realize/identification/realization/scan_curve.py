@@ -22,35 +22,31 @@ NOISE_REFUSE = 1.3
 the noise (paper scan on simulated valves: errors of 3-5 samples between, 10 and more below)."""
 
 
-def best_delay(iae: FloatArray, rounding: float) -> int:
-    """Return the smallest delay whose IAE equals the minimum up to rounding.
+def scan_curve(surface: Surface, order: int) -> tuple[FloatArray, int, tuple[int, int]]:
+    """IAE of one order for all delays, the best delay, and the ends of those within 5 % of its IAE.
 
-    Exact data of a strictly proper plant are fitted exactly by two delays; the choice between them
-    must not depend on rounding.
+    The best is the smallest delay whose IAE equals the minimum up to rounding: exact data of a
+    strictly proper plant are fitted exactly by two delays, and the choice between them must not
+    depend on rounding.
     """
-    return int(np.flatnonzero(iae <= iae.min() + rounding)[0])
-
-
-def flat_set(iae: FloatArray, delay: int, rounding: float) -> tuple[int, int]:
-    """Return the smallest and largest delay within 5 % of the smallest IAE."""
-    flat = np.flatnonzero(iae <= FLAT * iae[delay] + rounding)
-    return int(flat[0]), int(flat[-1])
+    iae = surface.iae[surface.orders.index(order)]
+    best = int(np.flatnonzero(iae <= iae.min() + surface.rounding)[0])
+    flat = np.flatnonzero(iae <= FLAT * iae[best] + surface.rounding)
+    return iae, best, (int(flat[0]), int(flat[-1]))
 
 
 def scan_flags(surface: Surface, order: int) -> Iterator[Flag]:
     """List the flags that follow from the curve of one order, and from the noise."""
-    iae, rounding = surface.iae[surface.orders.index(order)], surface.rounding
-    delay, last = best_delay(iae, rounding), iae.size - 1
-    least = float(iae[delay])
+    iae, delay, (low, high) = scan_curve(surface, order)
+    last, least = iae.size - 1, float(iae[delay])
     contrast = float(iae[0]) / least if least > 0 else np.inf
-    low, high = flat_set(iae, delay, rounding)
     if high == last and last > 0:
         best = "the best delay is" if delay == last else "delays that fit equally well reach up to"
         yield flagged("delay_at_bound.scan", best=best, max_delay=last)
     if contrast < CONTRAST:
         yield flagged("no_delay_resolved.scan", contrast=contrast, delay=delay)
     # separate minima within 5 % of the smallest IAE
-    minima = len(runs(iae <= FLAT * iae[delay] + rounding)[0])
+    minima = len(runs(iae <= FLAT * iae[delay] + surface.rounding)[0])
     if minima > 1:
         yield flagged("several_minima", minima=minima, low=low, high=high)
     floor = surface.noise_floor

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import linprog
 
-from ..arrays import IntArray, Matrices
+from ..arrays import FloatArray, IntArray, Matrices
 
 
 def split_delays(delays: IntArray, known: NDArray[np.bool_]) -> list[tuple[IntArray, IntArray]]:
@@ -66,6 +66,12 @@ def _balanced(outputs: IntArray, inputs: IntArray) -> tuple[IntArray, IntArray]:
     p, m = outputs.size, inputs.size
     common = int(outputs.min()) if m <= p else -int(inputs.min())
     return outputs - common, inputs + common
+
+
+def aligned(markov: FloatArray, delays: IntArray) -> FloatArray:
+    """Advance every channel of a response (p, m, N) by its delay, to a length that all have."""
+    length = markov.shape[-1] - int(delays.max())
+    return np.take_along_axis(markov, delays[:, :, None] + np.arange(length), axis=-1)
 
 
 def joined_rows(parts: list[Matrices], taps: IntArray) -> Matrices:
