@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
@@ -15,6 +16,7 @@ from ...numerics.constants import VERY_STRONG
 from ...numerics.hankel.delay_models import OneModel, realize_at
 from ...numerics.regression.arx import excited_directions
 from ...numerics.regression.normal_equations import normal_equations
+from ...numerics.state_space.delay_split import aligned
 from ...numerics.state_space.section_fit import MOST_STEPS, Experiment, SectionFit, fit_sections
 from ...numerics.state_space.sections import Sections, in_sections
 
@@ -63,7 +65,7 @@ class Candidate:
 
 
 def experiments(
-    group: Sequence[Record], shares: Shares, most: int | None = None, *, drift: bool = False
+    group: Sequence[Record], shares: Shares, most: int = sys.maxsize, *, drift: bool = False
 ) -> list[Experiment]:
     """Align inputs and outputs by their delays, up to `most` samples of all records together.
 
@@ -75,7 +77,7 @@ def experiments(
     found, left = [], most
     for record in group:
         u, y = np.atleast_2d(record.input), np.atleast_2d(record.output)
-        samples = record.n_samples if left is None else min(record.n_samples, left)
+        samples = min(record.n_samples, left)
         count = samples - first
         if count < 2:
             continue
@@ -85,8 +87,7 @@ def experiments(
             row[: max(count - d, 0)] = mine[first + d : samples]
         level = np.nanmean(y[:, :samples], axis=1, keepdims=True)
         found.append(Experiment(v - v.mean(axis=1, keepdims=True), late - level, drift))
-        if left is not None:
-            left -= samples
+        left -= samples
     if not found:
         raise DataError(f"no record is longer than the delays, {first} samples")
     return found
@@ -101,18 +102,10 @@ class Search:
     """
 
     def __init__(
-        self,
-        group: Sequence[Record],
-        markov: FloatArray,
-        top: int,
-        enough: int = ENOUGH_SAMPLES,
-        *,
-        drift: bool = False,
+        self, group: Sequence[Record], markov: FloatArray, top: int, enough: int, *, drift: bool
     ) -> None:
         self._group, self._experiments = group, partial(experiments, group, drift=drift)
-        self._enough = enough
-        self._markov = markov
-        self._top = top
+        self._markov, self._top, self._enough = markov, top, enough
         u, y = (
             np.hstack([x - np.nanmean(x, axis=1, keepdims=True) for x in map(np.atleast_2d, rows)])
             for rows in ([r.input for r in group], [r.output for r in group])
@@ -122,8 +115,7 @@ class Search:
         self._starts: dict[Shares, OneModel] = {}
         self._compared: list[Candidate] = []
         p, m, _ = markov.shape
-        per_order = p + m
-        self.highest = max((self._samples * p // PER_PARAMETER - p * m) // per_order, 0)
+        self.highest = max((self._samples * p // PER_PARAMETER - p * m) // (p + m), 0)
 
     def orders(self, asked: Sequence[int] | None) -> tuple[int, ...]:
         """Return the orders that the records support: excited, and with enough data."""
@@ -131,11 +123,9 @@ class Search:
         possible = tuple(n for n in tried if n <= self.highest and self._excites(n))
         missing = sorted(set(tried) - set(possible))
         if missing and (asked is not None or not possible):
-            why = (
-                f"{self._samples} samples are not enough"
-                if missing[0] > self.highest
-                else "the input does not excite enough (a sine, or inputs that move together)"
-            )
+            why = "the input does not excite enough (a sine, or inputs that move together)"
+            if missing[0] > self.highest:
+                why = f"{self._samples} samples are not enough"
             raise DataError(
                 f"{why} for a model of order {missing[0]}; choose a lower order or a richer input"
             )
@@ -145,11 +135,9 @@ class Search:
         self, order: int, shares: Shares, *, feedthrough: bool, start: Candidate | None = None
     ) -> Candidate:
         """Fit one structure, starting from another fit or from Kung's realization."""
-        data = self._experiments(shares, self._enough)
-        sections = start.found.model if start is not None else self._kung(order, shares)
+        model = start.found.model if start is not None else self._kung(order, shares)
         most = MOST_STEPS if start is None else NEARBY
-        found = fit_sections(data, sections, feedthrough=feedthrough, enough=ROUGHLY, most=most)
-        return self._judged(found, order, shares, feedthrough)
+        return self._fitted(model, (order, shares, feedthrough), ROUGHLY, most)
 
     def converged(self, fits: Sequence[Candidate]) -> list[Candidate]:
         """Fit what may be the best to its minimum: otherwise rounding might decide."""
@@ -167,10 +155,7 @@ class Search:
         return [c for c in others if abs(c.bic - best.bic) <= within]
 
     def _minimum(self, one: Candidate) -> Candidate:
-        order, shares, own = one.structure
-        data, model = self._experiments(shares, self._enough), one.found.model
-        fit = fit_sections(data, model, feedthrough=own, enough=CONVERGED, most=MOST_TURNS)
-        end = self._judged(fit, order, shares, own)
+        end = self._fitted(one.found.model, one.structure, CONVERGED, MOST_TURNS)
         # B is estimated again first, which may lead to another minimum.
         return replace(min(one, end, key=lambda c: c.bic), converged=True)
 
@@ -252,9 +237,8 @@ class Search:
                     delay = last.inputs[0] + step
                     if not 0 <= delay < self._markov.shape[-1] // 2 or missed == 2:
                         break
-                    last = self.fit(
-                        best.order, ((delay,), last.outputs), feedthrough=feedthrough, start=last
-                    )
+                    shares = (delay,), last.outputs
+                    last = self.fit(best.order, shares, feedthrough=feedthrough, start=last)
                     missed += 1
                     if 0 < last.bic - best.bic - VERY_STRONG * independent <= REACH:
                         last = self._minimum(last)
@@ -275,13 +259,11 @@ class Search:
     def _kung(self, order: int, shares: Shares) -> Sections:
         """Realize the scaled impulse response after the delays; lower orders are parts of it."""
         if shares not in self._starts:
-            reach = np.add.outer(shares[1], shares[0])
-            length = self._markov.shape[-1] - int(reach.max())
             scaled = self._markov * self._size_in[:, None] / self._size_out[:, None, None]
-            lags = reach[:, :, None] + np.arange(length)
-            ahead = np.take_along_axis(scaled, lags, axis=-1)
-            top = min(max(self._top, order), (length - 1) * min(ahead.shape[:2]))
-            self._starts[shares] = realize_at(ahead, 0, length - 1, top, padded=True)
+            ahead = aligned(scaled, np.add.outer(shares[1], shares[0]))
+            samples = ahead.shape[-1] - 1
+            top = min(max(self._top, order), samples * min(ahead.shape[:2]))
+            self._starts[shares] = realize_at(ahead, 0, samples, top, padded=True)
         whole = self._starts[shares]
         if order > np.count_nonzero(whole.singular_values[: whole.A.shape[0]]):
             raise OrderError(f"order={order} is above the rank of the impulse response")
@@ -289,9 +271,13 @@ class Search:
         B, C = whole.B[:order] / self._size_in, whole.C[:, :order] * self._size_out[:, None]
         return in_sections(whole.A[:order, :order], B, C, direct)
 
-    def _judged(
-        self, found: SectionFit, order: int, shares: Shares, feedthrough: bool
+    def _fitted(
+        self, model: Sections, structure: tuple[int, Shares, bool], enough: float, most: int
     ) -> Candidate:
+        """Fit one structure from a model, and judge it."""
+        order, shares, feedthrough = structure
+        data = self._experiments(shares, self._enough)
+        found = fit_sections(data, model, feedthrough=feedthrough, enough=enough, most=most)
         p, m, _ = self._markov.shape
         values = found.counts.sum() / p
         used = min(self._samples, self._enough)

@@ -141,16 +141,14 @@ def _from_start(
 
 def _marginal(others: Sequence[Candidate]) -> Iterator[Flag]:
     """Flag a choice so close that rounding may change it."""
-    if not others:
-        return
-    one = others[0]
-    yield flagged(
-        "marginal_decision.state_space",
-        order=one.order,
-        inputs=one.inputs,
-        outputs=one.outputs,
-        feedthrough="and" if one.feedthrough else "and no",
-    )
+    for one in others[:1]:
+        yield flagged(
+            "marginal_decision.state_space",
+            order=one.order,
+            inputs=one.inputs,
+            outputs=one.outputs,
+            feedthrough="and" if one.feedthrough else "and no",
+        )
 
 
 def _silence(best: Candidate, more: float = 0.0) -> tuple[Flag, ...]:
@@ -169,11 +167,8 @@ def _silence(best: Candidate, more: float = 0.0) -> tuple[Flag, ...]:
 def _choices(best: Candidate, bic: dict[int, float], begun: Shares) -> tuple[str, ...]:
     choices = []
     if len(bic) > 1:
-        others = ", ".join(
-            f"{order} ({value - best.bic:+.0f})"
-            for order, value in sorted(bic.items())
-            if order != best.order
-        )
+        more = {order: value - best.bic for order, value in bic.items() if order != best.order}
+        others = ", ".join(f"{order} ({value:+.0f})" for order, value in sorted(more.items()))
         choices.append(f"order {best.order} has the smallest BIC; others: {others}")
     if (best.inputs, best.outputs) != begun:
         choices.append(
