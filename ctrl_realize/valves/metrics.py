@@ -161,9 +161,8 @@ def judged(
 
 
 def _with_limit(one: Metric, given: Any) -> Metric:
-    low, high = _limit(given, one.key)
-    judgement = _judgement(one.interval, low, high)
-    return replace(one, limit=(low, high), judgement=judgement)
+    limit = _limit(given, one.key)
+    return replace(one, limit=limit, judgement=_judgement(one.interval, *limit))
 
 
 def _of_sizes(
@@ -174,12 +173,9 @@ def _of_sizes(
     for size, limit in limits.items():
         wanted = float(size)
         own = [group for group in groups if abs(group.size - wanted) <= 0.15 * wanted]
-        for group in own:
-            metric = Metric(one.key, one.definition, group.estimates[one.key], words_of(group))
-            found.append(_with_limit(metric, limit))
-        if not own:
-            metric = Metric(one.key, one.definition, Interval(), f"{wanted:g} %: no such step")
-            found.append(_with_limit(metric, limit))
+        pairs = [(group.estimates[one.key], words_of(group)) for group in own]
+        for pair in pairs or [(Interval(), f"{wanted:g} %: no such step")]:
+            found.append(_with_limit(Metric(one.key, one.definition, *pair), limit))
     return found
 
 

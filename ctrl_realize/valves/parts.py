@@ -105,10 +105,8 @@ def _stairs_that_are_ramps(run: list[TestPart]) -> list[TestPart]:
         flight = list(own)
         if len(flight) > _MOST_STAIRS:
             first, last = flight[0], flight[-1]
-            parts.append(
-                TestPart("ramp", first.edges[0].index, last.edges[0].index + 1, first.before,
-                         last.after, first.time)
-            )  # fmt: skip
+            start, stop = first.edges[0].index, last.edges[0].index + 1
+            parts.append(TestPart("ramp", start, stop, first.before, last.after, first.time))
         else:
             parts += flight
     return parts
@@ -126,10 +124,10 @@ def _with_stairs(parts: list[TestPart]) -> list[TestPart]:
         if longest > _MOST_STAIRS:
             joined.extend(_stairs_that_are_ramps(run))
         elif longest >= _LEAST_STAIRS:
+            first, last = run[0], run[-1]
             joined.append(
-                replace(run[0], kind="staircase", stop=run[-1].stop, after=run[-1].after,
-                        edges=edges)
-            )  # fmt: skip
+                replace(first, kind="staircase", stop=last.stop, after=last.after, edges=edges)
+            )
         else:
             joined.extend(run)
         run.clear()

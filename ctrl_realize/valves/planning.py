@@ -159,9 +159,7 @@ def _assembled(
         ("slow ramp", 0.0, 100.0, along), ("slow ramp", 100.0, 100.0, rest),
         ("slow ramp", 100.0, 0.0, along), ("slow ramp", 0.0, 0.0, rest),
     ]  # fmt: skip
-    percent = np.concatenate(
-        [np.linspace(a, b, count, endpoint=False) for _, a, b, count in pieces]
-    )
+    percent = np.concatenate([np.linspace(a, b, n, endpoint=False) for _, a, b, n in pieces])
     sections, start = [], 0
     for name, own in groupby(pieces, key=itemgetter(0)):
         stop = start + sum(count for *_, count in own)

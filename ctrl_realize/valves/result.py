@@ -127,17 +127,14 @@ class ValveReport(Result):
     @property
     def verdict(self) -> str:
         """What the limits and the records say, in one sentence."""
-        by = {
-            word: [named_metric(one) for one in self.metrics if one.judgement == word]
-            for word in ("not met", "cannot tell", "met")
-        }
-        if by["not met"]:
-            return f"Limits not met: {', '.join(by['not met'])}."
-        if by["cannot tell"]:
-            names = ", ".join(by["cannot tell"])
-            return f"The records cannot tell whether these limits are met: {names}."
-        if by["met"]:
-            return f"All limits are met: {', '.join(by['met'])}."
+        for judgement, said in (
+            ("not met", "Limits not met"),
+            ("cannot tell", "The records cannot tell whether these limits are met"),
+            ("met", "All limits are met"),
+        ):
+            names = [named_metric(one) for one in self.metrics if one.judgement == judgement]
+            if names:
+                return f"{said}: {', '.join(names)}."
         known = sum(one.interval.is_known for one in self.metrics[: len(DEFINITIONS)])
         if not self.steps and all(part.kind != "ramp" for one in self.parts for part in one):
             return "Cannot tell: the records contain no valve test."
@@ -214,21 +211,17 @@ class ValveReport(Result):
         """
         import pandas as pd
 
-        return pd.DataFrame(
-            [
-                {
-                    "record": self.records[one.record].name or one.record + 1,
-                    "time": one.time, "before": one.before, "after": one.after, "size": one.size,
-                    "reversal": one.reversal, "moved": one.moved, "settled": one.settled,
-                }
-                | {
-                    name: number
-                    for key in STEP_METRICS
-                    for name, number in ((key, one.values[key]), (f"{key}_std", one.errors[key]))
-                }
-                for one in self.steps
-            ]
-        )  # fmt: skip
+        rows = []
+        for one in self.steps:
+            row: dict[str, object] = {
+                "record": self.records[one.record].name or one.record + 1,
+                "time": one.time, "before": one.before, "after": one.after, "size": one.size,
+                "reversal": one.reversal, "moved": one.moved, "settled": one.settled,
+            }  # fmt: skip
+            for key in STEP_METRICS:
+                row |= {key: one.values[key], f"{key}_std": one.errors[key]}
+            rows.append(row)
+        return pd.DataFrame(rows)
 
     def metric_table(self) -> pd.DataFrame:
         """List the metrics.

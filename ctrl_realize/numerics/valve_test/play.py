@@ -112,9 +112,8 @@ def _misfits(
     centred = outputs - outputs.mean()
     power = np.einsum("kws,kws->ws", path, path)
     product = np.einsum("kws,k->ws", path, centred)
-    gains = np.divide(
-        product, power, out=np.zeros_like(power), where=power > 1e-12 * np.ptp(levels) ** 2
-    )
+    moved = power > 1e-12 * np.ptp(levels) ** 2
+    gains = np.divide(product, power, out=np.zeros_like(power), where=moved)
     sums = np.maximum(float(centred @ centred) - gains * product, 0.0)
     which = np.arange(widths.size), np.argmin(sums, axis=1)
     return sums[which], gains[which]

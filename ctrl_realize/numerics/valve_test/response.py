@@ -14,6 +14,7 @@ References
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Self
 
 import numpy as np
 from scipy.special import ndtri
@@ -87,18 +88,15 @@ class UnitResponse:
     after: float
 
     @classmethod
-    def of(
-        cls, output: FloatArray, levels: tuple[Estimate, Estimate], noise: Noise
-    ) -> UnitResponse:
+    def of(cls, output: FloatArray, levels: tuple[Estimate, Estimate], noise: Noise) -> Self:
         """Scale the samples from the step on."""
         (before, after), change = levels, levels[1].value - levels[0].value
         scale = abs(change)
         shape = (output - before.value) / change
         scaled = Noise(noise.sigma / scale, noise.correlation, noise.quantum / scale)
         width = _smoothing(shape, scaled)
-        return cls(
-            shape, _smoothed(shape, width), scaled, width, before.std / scale, after.std / scale
-        )
+        smooth = _smoothed(shape, width)
+        return cls(shape, smooth, scaled, width, before.std / scale, after.std / scale)
 
     def crossing(self, level: float) -> Estimate:
         """Time of the first lasting crossing of a level upwards."""
