@@ -157,10 +157,8 @@ def crossings(signal: FloatArray) -> FloatArray:
         part = signal[first : last + 1]
         # the middle of the crossings in between, if noise makes several
         zeros = np.flatnonzero(part[:-1] * part[1:] <= 0)
-        at = [
-            i + (part[i] / (part[i] - part[i + 1]) if part[i] != part[i + 1] else 0.5)
-            for i in zeros
-        ]
+        fall = part[zeros] - part[zeros + 1]
+        at = zeros + np.divide(part[zeros], fall, out=np.full(fall.shape, 0.5), where=fall != 0)
         found.append(first + float(np.mean(at)))
     return np.array(found)
 

@@ -82,12 +82,9 @@ def _shapes() -> dict[str, FloatArray]:
     tent = [np.minimum(x / p, (1 - x) / (1 - p)) for p in _VERTICES]
     skew = [np.sin(np.pi / 2 * np.minimum(x / p, (1 - x) / (1 - p))) for p in _VERTICES]
     relay = [_relay(x, p, lag) for p in _VERTICES for lag in _LAGS]
-    return {
-        "sine": np.sin(np.pi * x)[None, :, None],
-        "leaning sine": np.array(skew)[:, :, None],
-        "triangle": np.array(tent)[:, :, None],
-        "relay": np.array(relay)[:, :, None],
-    }
+    sine = [np.sin(np.pi * x)]
+    shapes = {"sine": sine, "leaning sine": skew, "triangle": tent, "relay": relay}
+    return {name: np.array(rows)[:, :, None] for name, rows in shapes.items()}
 
 
 def _relay(x: FloatArray, turn: float, lag: float) -> FloatArray:

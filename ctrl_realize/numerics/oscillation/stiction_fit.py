@@ -131,11 +131,7 @@ def fit_stiction(
 
 
 def _valleys(
-    loop: StickingLoop,
-    levels: FloatArray,
-    swing: float,
-    lags: Sequence[float],
-    starts: Sequence[int],
+    loop: StickingLoop, levels: FloatArray, swing: float, lags: Sequence[float], starts: range
 ) -> list[Trial]:
     """Best pairs of the first grid, with S over the swing at `levels`, apart from one another."""
     parts = _JUMPS_OF_LEVEL if np.isinf(lags[0]) else _JUMPS

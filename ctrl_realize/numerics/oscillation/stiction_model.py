@@ -99,11 +99,10 @@ class StickingLoop:
 
     def residual(self, trial: Trial) -> FloatArray:
         """Value minus the model, without drift."""
-        position = (
-            self._thinned(self.output[None])
-            if trial.stick == 0
-            else self._positions(np.array([trial.stick]), np.array([trial.jump]), trial.start)
-        )
+        stick, jump = np.array([trial.stick]), np.array([trial.jump])
+        position = self._thinned(self.output[None])
+        if trial.stick:
+            position = self._positions(stick, jump, trial.start)
         late = self._lagged(self._level(position), trial.lag)[0]
         first = self._first - trial.delay
         return np.asarray(self.value - trial.gain * late[first : first + self.value.size])
@@ -117,9 +116,8 @@ class StickingLoop:
         delays: Sequence[int],
         start: int = 0,
     ) -> list[Trial]:
-        rows = np.arange(sticks.size)
-        error, gain = np.ones(rows.size), np.zeros(rows.size)
-        lag, delay = np.full(rows.size, lags[0]), np.full(rows.size, delays[0])
+        rows, ones = np.arange(sticks.size), np.ones(sticks.size)
+        found = np.outer([1.0, 0.0, lags[0], delays[0]], ones)  # error, gain, lag and delay
         level = self._level(positions)
         for each in lags:
             power, product = self._sums(self._lagged(level, each), self._first - np.array(delays))
@@ -127,25 +125,20 @@ class StickingLoop:
             factor = np.where(good, product / np.where(good, power, 1.0), 0.0)
             left = 1 - factor * product / self.power
             best = np.argmin(left, axis=1)
-            better = left[rows, best] < error
-            error = np.where(better, np.maximum(left[rows, best], 0.0), error)
-            gain = np.where(better, factor[rows, best], gain)
-            lag = np.where(better, each, lag)
-            delay = np.where(better, np.asarray(delays)[best], delay)
-        table = np.stack([error, sticks, jumps, gain, lag], axis=1).tolist()
-        return [
-            Trial(e, s, j, g, t, int(late), start)
-            for (e, s, j, g, t), late in zip(table, delay, strict=True)
-        ]
+            least = left[rows, best]
+            new = np.maximum(least, 0.0), factor[rows, best], each * ones, np.take(delays, best)
+            found = np.where(least < found[0], new, found)
+        error, gain, lag, delay = found.tolist()
+        columns = zip(error, sticks.tolist(), jumps.tolist(), gain, lag, delay, strict=True)
+        return [Trial(e, s, j, g, t, int(late), start) for e, s, j, g, t, late in columns]
 
     def _positions(self, sticks: FloatArray, jumps: FloatArray, start: int) -> FloatArray:
         stops = self.starts[start]
         first, ahead = min(stops), min(stops) // self.every
         begin = ahead * self.every
         command = np.append(np.full(first - begin, self.output[first]), self.output[first:])
-        moved = kano_rows(
-            command, sticks, jumps, {0: stops[first]} | {k - begin: stops[k] for k in stops}
-        )
+        own = {0: stops[first]} | {k - begin: stops[k] for k in stops}
+        moved = kano_rows(command, sticks, jumps, own)
         return np.pad(self._thinned(moved), ((0, 0), (ahead, 0)), mode="edge")
 
     def _thinned(self, rows: FloatArray) -> FloatArray:
@@ -175,16 +168,14 @@ class StickingLoop:
 
     def _sums(self, late: FloatArray, first: IntArray) -> tuple[FloatArray, FloatArray]:
         """Power of rows (M, ...) from each of `first` on, and products with the value (M, D)."""
-        low, n = int(first.min()), self.value.size
-        high = int(first.max())
+        low, high, n = int(first.min()), int(first.max()), self.value.size
         shifted = np.zeros((high - low + n, first.size))
         for k, place in enumerate((first - low).tolist()):
             shifted[place : place + n, k] = self.value
         part = late[:, low : low + n]
         change = late[:, low + n : high + n] ** 2 - late[:, low:high] ** 2
-        power = np.einsum("ij,ij->i", part, part)[:, None] + np.cumsum(
-            np.pad(change, ((0, 0), (1, 0))), axis=1
-        )
+        since = np.cumsum(np.pad(change, ((0, 0), (1, 0))), axis=1)
+        power = np.einsum("ij,ij->i", part, part)[:, None] + since
         return power[:, first - low], late[:, low : high + n] @ shifted
 
 
@@ -199,6 +190,5 @@ def _stops_of_cycles(output: FloatArray, period: float) -> tuple[dict[int, float
         up = clean[(first + last) // 2 - offset] > 0
         stops[first + int(np.argmax(part) if up else np.argmin(part))] = 1.0 if up else -1.0
     places = list(stops)
-    return tuple(
-        {k: stops[k] for k in places[first:]} for first in range(min(_HALF_CYCLES, len(places)))
-    )
+    count = min(_HALF_CYCLES, len(places))
+    return tuple({k: stops[k] for k in places[first:]} for first in range(count))

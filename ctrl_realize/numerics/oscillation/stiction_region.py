@@ -53,8 +53,8 @@ class Region:
             fine = len(sticks) >= _FEWEST_CELLS, len(jumps) >= _FEWEST_CELLS
             if halved == _HALVINGS or all(fine) or len(self.inside) > _MOST_CELLS / 4:
                 break
-            halves = [0.5 if coarse else 1.0 for coarse in (not fine[0], not fine[1])]
-            self.cell = (self.cell[0] * halves[0], self.cell[1] * halves[1])
+            stick, jump = self.cell
+            self.cell = (stick if fine[0] else 0.5 * stick, jump if fine[1] else 0.5 * jump)
 
     def ends(self, others: Sequence[Trial]) -> tuple[tuple[float, float], tuple[float, float]]:
         """Ends of S and of J; `others` were tried elsewhere."""
