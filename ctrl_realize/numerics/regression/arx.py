@@ -115,11 +115,9 @@ def solve_arx(equations: NormalEquations, na: int, nb: int) -> ArxFit:
     p = equations.power.shape[0]
     m = (equations.gram.shape[0] - na * p) // nb
     theta, cut = solution.coefficients, na * p
-    return ArxFit(
-        a=-theta[:cut].reshape(na, p, p).transpose(0, 2, 1),
-        b=theta[cut:].reshape(nb, m, p).transpose(0, 2, 1),
-        solution=solution,
-    )
+    a = -theta[:cut].reshape(na, p, p).transpose(0, 2, 1)
+    b = theta[cut:].reshape(nb, m, p).transpose(0, 2, 1)
+    return ArxFit(a, b, solution)
 
 
 def arx_markov(fit: ArxFit, count: int) -> FloatArray:

@@ -24,7 +24,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.linalg.blas import dtrmm
 from scipy.linalg.lapack import dtrtrs
-from scipy.optimize import minimize
+from scipy.optimize import Bounds, minimize
 
 from ..arrays import FloatArray
 from .kernel_prior import cholesky, prior_factors
@@ -81,18 +81,10 @@ class KernelProblem:
     @classmethod
     def of(cls, equations: NormalEquations, lags: int, kernel: str) -> KernelProblem:
         """Correct the sums for rounding of the squares, of every input in its own unit."""
-        size = equations.gram.shape[0]
         squares = np.diag(equations.gram).reshape(-1, lags).mean(axis=1)
-        return cls(
-            equations.gram + np.diag(_ROUNDING * np.repeat(squares, lags)),
-            equations.cross[:, 0],
-            float(equations.power[0, 0]),
-            equations.freedom,
-            size // lags,
-            lags,
-            1,
-            kernel,
-        )
+        gram = equations.gram + np.diag(_ROUNDING * np.repeat(squares, lags))
+        cross, power = equations.cross[:, 0], float(equations.power[0, 0])
+        return cls(gram, cross, power, equations.freedom, squares.size, lags, 1, kernel)
 
     def tied(self, group: int) -> KernelProblem:
         """Group neighbouring taps: the same data with `group` times fewer unknowns."""
@@ -172,18 +164,14 @@ class KernelProblem:
         # From a start at a bound, steps go inward; otherwise the simplex would be flat there.
         steps = np.where(inside + steps > high, -steps, steps)
         simplex = np.vstack([inside, inside + np.diag(steps)])
-        rough = size == WIDE
+        # A difference of 0.1 in -2 log likelihood is far inside what the data can tell.
+        fine, most = (0.02, 300 * m) if size == WIDE else (0.1, 40 * m)
+        near = max(size / 30, 0.02)
         found = minimize(
             misfit,
             inside,
             method="Nelder-Mead",
-            bounds=list(zip(low, high, strict=True)),
-            # A difference of 0.1 in -2 log likelihood is far inside what the data can tell.
-            options={
-                "initial_simplex": simplex,
-                "xatol": max(size / 30, 0.02),
-                "fatol": 0.02 if rough else 0.1,
-                "maxfev": (300 if rough else 40) * m,
-            },
+            bounds=Bounds(low, high),
+            options={"initial_simplex": simplex, "xatol": near, "fatol": fine, "maxfev": most},
         )
         return np.asarray(found.x, dtype=np.float64), float(found.fun)

@@ -45,13 +45,8 @@ class NormalEquations:
     freedom: int
 
     def __add__(self, other: NormalEquations) -> NormalEquations:
-        return NormalEquations(
-            self.gram + other.gram,
-            self.cross + other.cross,
-            self.power + other.power,
-            self.rows + other.rows,
-            self.freedom + other.freedom,
-        )
+        pairs = zip(vars(self).values(), vars(other).values(), strict=True)
+        return NormalEquations(*(one + two for one, two in pairs))
 
     def take(self, columns: Sequence[int]) -> NormalEquations:
         """Keep some of the regressors."""
