@@ -140,10 +140,7 @@ class DelayComparison(Result):
     _heading = "Comparison of delay estimates"
 
     def _rows(self) -> list[tuple[str, str]]:
-        rows = [
-            (f"{estimate.method} ({estimate.source})", self._words(estimate))
-            for estimate in self.estimates
-        ]
+        rows = [(f"{one.method} ({one.source})", self._words(one)) for one in self.estimates]
         if self.common is not None:
             agreed = f"yes, on {interval_in_time(*self.common)}"
         elif self.conflicts:
@@ -152,15 +149,9 @@ class DelayComparison(Result):
             agreed = "no: every estimate is in doubt"
         rows.append(("they agree", agreed))
         if self.rely_on is not None:
-            rows.append(
-                ("rely on", f"{self.rely_on}: the narrowest interval among the reliable estimates")
-            )
-        rows += [
-            (f"{estimate.method} in doubt", estimate.doubt)
-            for estimate in self.estimates
-            if estimate.doubt
-        ]
-        return rows
+            why = "the narrowest interval among the reliable estimates"
+            rows.append(("rely on", f"{self.rely_on}: {why}"))
+        return rows + [(f"{one.method} in doubt", one.doubt) for one in self.estimates if one.doubt]
 
     def _words(self, estimate: DelayEstimate) -> str:
         samples = "" if self.dt is None else f" = {estimate.value / self.dt:.4g} samples"

@@ -156,9 +156,8 @@ def _told(output: FloatArray, drive: FloatArray) -> bool:
     outputs = [output[here - i] for i in range(_CONTROLLER + 1)]
     alone, _ = _least_absolute(own, drive[here])
     left, weights = _least_absolute([*own, *outputs], drive[here])
-    steps = np.repeat(
-        [quantisation_step(drive), quantisation_step(output)], [len(own), len(outputs)]
-    )
+    sizes = [quantisation_step(drive), quantisation_step(output)]
+    steps = np.repeat(sizes, [len(own), len(outputs)])
     # The input of the sample itself is rounded in place of the constant.
     weights[0] = 1.0
     rounding = float(np.linalg.norm(steps * weights)) / np.sqrt(12)

@@ -70,11 +70,8 @@ def at_limit(output: FloatArray) -> list[tuple[float, BoolArray]]:
     least = max(_FEWEST, _OFTEN * counts[1:-1].max())
     low, high = ordered[firsts[1]], ordered[firsts[-1] - 1]
     sides = [(ordered[0], low, counts[0]), (ordered[-1], high, counts[-1])]
-    at = [
-        float(end)
-        for end, next_one, count in sides
-        if count >= least and abs(end - next_one) <= _FAR * (high - low)
-    ]
+    often = [(end, next_one) for end, next_one, count in sides if count >= least]
+    at = [float(end) for end, next_one in often if abs(end - next_one) <= _FAR * (high - low)]
     inner = (values >= low) & (values <= high)
     if not at or not _is_noisy(values, ~inner):
         return []

@@ -131,9 +131,7 @@ def disagreeing(values: FloatArray, errors: FloatArray, least: float) -> list[in
     fewest = max(len(values) // 2 + 1, 2)
     apart: list[int] = []
     while len(kept) > fewest:
-        scores = [
-            _against_others(i, [k for k in kept if k != i], values, errors, least) for i in kept
-        ]
+        scores = [_against_others(i, kept, values, errors, least) for i in kept]
         worst = int(np.argmax(scores))
         if scores[worst] <= 1:
             break
@@ -142,9 +140,10 @@ def disagreeing(values: FloatArray, errors: FloatArray, least: float) -> list[in
 
 
 def _against_others(
-    one: int, others: list[int], values: FloatArray, errors: FloatArray, least: float
+    one: int, kept: list[int], values: FloatArray, errors: FloatArray, least: float
 ) -> float:
     """Distance of an estimate from the mean of the others, over its critical value."""
+    others = [k for k in kept if k != one]
     tail = _FALSE_NAMES / (2 * (len(others) + 1))
     rest = values[others]
     if homogeneity(rest, errors[others])[1] >= _FALSE_NAMES:
@@ -204,10 +203,8 @@ def matched(
     dt : float
         Sample time in s.
     """
-    (gain, shift, _), (gain_error, error, _), _ = _settled(output, moved, beside, reach, 0.0)
-    (*_, lag), (*_, lag_error), settled = _settled(
-        output, moved, beside, reach, shift, with_lags=True
-    )
+    (gain, shift, _), (gain_error, error, _), _ = _settled(output, moved, beside, reach, 0.0, 2)
+    (*_, lag), (*_, lag_error), settled = _settled(output, moved, beside, reach, shift, 3)
     common = moved(0.0, 1.0)[0]
     alone, errors = _regression(np.column_stack([common, own]), output)
     level = np.linalg.lstsq(beside, output - common, rcond=None)[0]
@@ -226,19 +223,14 @@ def matched(
 
 
 def _settled(
-    output: FloatArray,
-    moved: Moved,
-    beside: FloatArray,
-    reach: float,
-    shift: float,
-    *,
-    with_lags: bool = False,
+    output: FloatArray, moved: Moved, beside: FloatArray, reach: float, shift: float, free: int
 ) -> tuple[tuple[float, ...], tuple[float, ...], bool]:
     """Gain, shift and stretch of a response that fit best, their errors, and whether they settled.
 
-    Without lags the stretch is 1. The errors of shift and stretch are those of the last turn.
+    The first 2 or 3 are `free`; otherwise the stretch is 1. The errors of shift and stretch are
+    those of the last turn.
     """
-    stretch, free = 1.0, 3 if with_lags else 2
+    stretch = 1.0
     for _ in range(_TURNS):
         columns = moved(shift, stretch)[:free]
         solution, errors = _regression(np.column_stack([*columns, beside]), output)
