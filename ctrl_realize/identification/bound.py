@@ -71,8 +71,8 @@ class Bound:
 
     def response(self, signal: FloatArray) -> FloatArray:
         """Response (N,) to an input, from rest."""
-        theta, numerator, known = self._parts(signal.size)
-        return respond(self._drive(signal), known, numerator, theta)
+        there, known = self._parts(signal.size)
+        return respond(self._drive(signal), known, self.model.numerator, there.parameters)
 
     def errors(self, tests: Sequence[Experiment], gradient: FloatArray) -> FloatArray:
         """Standard errors (k,) of quantities with gradients (k, p) after all tests together."""
@@ -88,24 +88,21 @@ class Bound:
 
         These are the level, and drift and free responses unless the test consists of steps.
         """
-        theta, numerator, known = self._parts(signal.size)
-        clock, own = self.dt * np.arange(signal.size, dtype=np.float64), np.ones((signal.size, 1))
+        n = signal.size
+        there, known = self._parts(n)
+        clock, own = self.dt * np.arange(n, dtype=np.float64), np.ones((n, 1))
         held = self.dt * np.diff(np.flatnonzero(np.diff(signal)))
         # A fit takes any other test for one of steps, which begin at rest.
         if np.any(held < DWELL * self.model.dead_time):
             own = operating_terms(clock, self.model.poles)
-        problem = Problem(
-            np.zeros(signal.size), np.ones(signal.size), self._drive(signal), own, known
-        )
-        there = Candidate(Structure(theta.size - 1, theta.size - numerator.size), theta, 0.0)
-        found = local_errors(problem, there, numerator, signal.size * self.dt)
+        problem = Problem(np.zeros(n), np.ones(n), self._drive(signal), own, known)
+        found = local_errors(problem, there, self.model.numerator, n * self.dt)
         return found.slopes, found.own
 
     @property
     def point(self) -> FloatArray:
         """Dead time, pole parameters and numerator (p,), without those of an integrator."""
-        theta, numerator, _ = self._parts(1)
-        return np.concatenate([theta, numerator])
+        return np.concatenate([self._parts(1)[0].parameters, self.model.numerator])
 
     def at(self, point: FloatArray) -> Bound:
         """The same structure with other parameters (p,)."""
@@ -120,9 +117,8 @@ class Bound:
 
     def derivatives(self, value: Callable[[PlausibleModel], FloatArray]) -> FloatArray:
         """The same of values (k,) of a model."""
-        theta, numerator, _ = self._parts(1)
-        there = Candidate(Structure(theta.size - 1, theta.size - numerator.size), theta, 0.0)
-        steps, point = parameter_steps(there, numerator, self.dt), self.point
+        steps = parameter_steps(self._parts(1)[0], self.model.numerator, self.dt)
+        point = self.point
 
         def at(moved: FloatArray) -> FloatArray:
             return value(self.at(moved).model)
@@ -132,8 +128,8 @@ class Bound:
     def _drive(self, signal: FloatArray) -> SampledInput:
         return SampledInput(signal - signal[0], self.dt)
 
-    def _parts(self, samples: int) -> tuple[FloatArray, FloatArray, KnownFactor]:
-        """Free parameters [dead time, poles...], numerator, and the integrator."""
+    def _parts(self, samples: int) -> tuple[Candidate, KnownFactor]:
+        """Structure with free parameters [dead time, poles...], and the integrator."""
         poles = self.model.poles
         moving = poles[poles != 0]
         if poles.size - moving.size > 1 or np.any(moving.real >= 0):
@@ -143,7 +139,8 @@ class Bound:
             )
         theta = np.concatenate([[self.model.dead_time], parameters_from_poles(moving)])
         slow = np.full(poles.size - moving.size, -SLOWEST / (samples * self.dt), dtype=complex)
-        return theta, self.model.numerator, KnownFactor(slow)
+        structure = Structure(theta.size - 1, theta.size - self.model.numerator.size)
+        return Candidate(structure, theta, 0.0), KnownFactor(slow)
 
 
 def operating_terms(clock: FloatArray, poles: ComplexArray) -> FloatArray:

@@ -101,11 +101,8 @@ def with_modes_judged(
                 return system  # coloured noise that a controller answers is correlated with it
             if gain > VERY_STRONG and not late:
                 return _chosen(found, fit, sum(related), gain, cut)
-            why = (
-                f"a model of {found.fit.order} states starts after max_delay"
-                if late
-                else f"a model of {found.fit.order} states (fit_state_space) is no better"
-            )
+            said = "starts after max_delay" if late else "(fit_state_space) is no better"
+            why = f"a model of {found.fit.order} states {said}"
         except (DataError, OrderError) as refused:
             why = f"no state-space model: {refused}"
     if left is None or not any(follows):

@@ -99,11 +99,8 @@ def told(
     lags = [one for one in parameters if one.name.startswith("lag_")]
     # Of lags that are alike none is known, and all matter.
     total = sum(one.value for one in parameters if one in lags or one.name == "dead_time")
-    out = [
-        one
-        for one in lags
-        if one.low <= 0 and one.value <= max(small, _SMALL_PART * min(one.high, total))
-    ]
+    unsure = [one for one in lags if one.low <= 0]
+    out = [one for one in unsure if one.value <= max(small, _SMALL_PART * min(one.high, total))]
     shown = [one for one in parameters if one not in out]
     if samples is not None and len(shown) == 2:
         shown[1] = Parameter("dead_time", samples * dt, unit="s", times=1)

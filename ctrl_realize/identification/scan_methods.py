@@ -49,19 +49,16 @@ def by_scan(
             f"delays up to {reach} samples were tried: by then the step response has reached "
             "half of its final value"
         )
+    options: dict[str, Any] = {"samples": samples, "feedthrough": feedthrough}
     if order is None:
         # A Hankel matrix of few samples allows few orders.
         room = (impulse.n_samples - 1 - reach) // 2
         tried = [n for n in SCANNED_ORDERS if n <= room] or [1]
-        orders = scan_orders(
-            impulse, tried, max_delay=reach, samples=samples, feedthrough=feedthrough
-        )
+        orders = scan_orders(impulse, tried, max_delay=reach, **options)
         choices.append(f"order {orders.order}: its last singular value is {_against_noise(orders)}")
         system = orders.system()
     else:
-        system = estimate_delay(
-            impulse, order, max_delay=reach, samples=samples, feedthrough=feedthrough
-        )
+        system = estimate_delay(impulse, order, max_delay=reach, **options)
     return _named(system, choices, step)
 
 

@@ -212,9 +212,7 @@ def _wider(
         others = np.column_stack([*(t[seen] for t in tangents[:i] + tangents[i + 1 :]), *every])
         slopes = bounds[i].derivatives(_values)
         names = ["total", *(one.name for one in _named(bounds[i].model))]
-        wider = {
-            name: _ratio(own, others, slope) for name, slope in zip(names, slopes, strict=True)
-        }
+        wider = {name: _ratio(own, others, one) for name, one in zip(names, slopes, strict=True)}
         estimate, factor = fit.estimate, wider["dead_time"]
         at = estimate.dead_time
         low = max(at - factor * (at - estimate.low), 0.0)

@@ -163,9 +163,8 @@ def identify_each(
     if type(n_jobs) is not int or not 0 < abs(n_jobs) <= 10_000:
         raise OptionError(f"n_jobs={n_jobs!r}; expected a number of processes, or -1 for all")
     work = partial(identify_row, method=method, options=options, store=store)
-    rows = _rows(
-        records, _workers(work, n_jobs, store, client), store, settings_of(method, options)
-    )
+    workers = _workers(work, n_jobs, store, client)
+    rows = _rows(records, workers, store, settings_of(method, options))
     return _with_bar(rows, len(records) if isinstance(records, Sized) else None, progress)
 
 

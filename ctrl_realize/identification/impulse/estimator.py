@@ -40,10 +40,8 @@ def choose_estimate(group: tuple[Record, ...], count: int, start: str) -> Choice
     """
     free = ("auto",) * group[0].noutputs
     splits = [round((1 - HELD_BACK) * record.n_samples) for record in group]
-    first = tuple(
-        record.between(*record.time[[0, split - 1]])
-        for record, split in zip(group, splits, strict=True)
-    )
+    pairs = zip(group, splits, strict=True)
+    first = tuple(record.between(*record.time[[0, split - 1]]) for record, split in pairs)
     try:
         smooth = with_prior(first, count, start, free)
     except DataError:

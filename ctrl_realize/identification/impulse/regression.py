@@ -142,9 +142,8 @@ def through_arx(group: tuple[Record, ...], count: int, start: str) -> PulseRegre
         raise DataError("an output is constant: no ARX model can be estimated")
     if excited_directions(equations.gram) < equations.gram.shape[0]:
         # Without noise, many models of high order reproduce the output; any of them will do.
-        equations = replace(
-            equations, gram=equations.gram + np.diag(RIDGE * np.diag(equations.gram))
-        )
+        ridge = np.diag(RIDGE * np.diag(equations.gram))
+        equations = replace(equations, gram=equations.gram + ridge)
     fits = {}
     for order in orders:
         columns = [*range(order * p), *range(top * p, top * p + (order + 1) * m)]

@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..arrays import FloatArray, IntArray, block_powers
+from ..arrays import FloatArray, IntArray, Matrices, block_powers
 
 
 def markov_stack(A: FloatArray, B: FloatArray, C: FloatArray, count: int) -> FloatArray:
@@ -42,11 +42,7 @@ def markov_stack(A: FloatArray, B: FloatArray, C: FloatArray, count: int) -> Flo
     return response.reshape(models, -1)[:, :count]
 
 
-def integrated_absolute_error(
-    markov: FloatArray,
-    delays: IntArray,
-    models: tuple[FloatArray, FloatArray, FloatArray, FloatArray],
-) -> FloatArray:
+def integrated_absolute_error(markov: FloatArray, delays: IntArray, models: Matrices) -> FloatArray:
     """Sum ``|G[k] - model[k]|`` over one fixed window for models with delays.
 
     Parameters

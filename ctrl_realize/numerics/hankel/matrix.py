@@ -55,12 +55,11 @@ def hankel_matrix(h: FloatArray, rows: int, columns: int) -> FloatArray:
            [2., 1.],
            [1., 0.]])
     """
-    blocks = np.atleast_3d(h) if h.ndim == 3 else h[np.newaxis, np.newaxis, :]
+    blocks = h if h.ndim == 3 else h[np.newaxis, np.newaxis, :]
     p, m, available = blocks.shape
     length = rows + columns - 1
     padded = np.zeros((p, m, length))
-    used = min(length, available)
-    padded[:, :, :used] = blocks[:, :, :used]
+    padded[:, :, :available] = blocks[:, :, :length]
     windows = np.lib.stride_tricks.sliding_window_view(padded, columns, axis=2)
     return np.ascontiguousarray(windows.transpose(2, 0, 3, 1)).reshape(rows * p, columns * m)
 
@@ -121,15 +120,13 @@ class BlockHankel:
     """
 
     def __init__(self, h: FloatArray, rows: int, columns: int) -> None:
-        self.outputs, self.inputs, available = h.shape
+        self.outputs, self.inputs, _ = h.shape
         self.rows, self.columns = rows, columns
         length = rows + columns - 1
         self.points = fft_length(length)
-        used = h[:, :, : min(length, available)]
+        spectrum = np.fft.rfft(h[:, :, :length], n=self.points)
         # frequency first: the products below are batched matrix products
-        self._spectrum: ComplexArray = np.ascontiguousarray(
-            np.fft.rfft(used, n=self.points).transpose(2, 0, 1)
-        )
+        self._spectrum: ComplexArray = np.ascontiguousarray(spectrum.transpose(2, 0, 1))
 
     @property
     def shape(self) -> tuple[int, int]:

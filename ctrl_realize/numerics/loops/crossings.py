@@ -82,9 +82,8 @@ def follow(
     for _ in range(MAX_REFINEMENTS):
         with np.errstate(divide="ignore", invalid="ignore"):
             ratio = values[1:] / values[:-1]
-            coarse = (np.abs(np.angle(ratio)) > largest_turn) | (
-                np.abs(np.log(np.abs(ratio))) > 0.7
-            )
+            growth = np.abs(np.log(np.abs(ratio)))
+            coarse = (np.abs(np.angle(ratio)) > largest_turn) | (growth > 0.7)
         coarse &= np.isfinite(ratio) & (np.diff(grid) > 1e-13 * grid[1:])
         if not coarse.any():
             break

@@ -43,9 +43,8 @@ def simc_pi(model: PlausibleModel, dt: float) -> tuple[float, float]:
     times = -zeros.real / np.abs(zeros) ** 2
     lags, late = -poles.real / np.abs(poles) ** 2, model.dead_time + dt / 2
     leads, unstable = times[times > 0], -times[times < 0]
-    factor, kept, delay = half_rule(
-        lags, leads, unstable, late, 1 - int(integrating), integrating=integrating
-    )
+    order = 0 if integrating else 1
+    factor, kept, delay = half_rule(lags, leads, unstable, late, order, integrating=integrating)
     gain = factor * float(model.numerator[0] / np.prod(-poles).real)
     if integrating:
         return 1 / (2 * gain * delay), 8 * delay

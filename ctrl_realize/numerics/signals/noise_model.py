@@ -115,9 +115,7 @@ def _whitened(signals: FloatArray, filters: Sequence[tuple[FloatArray, float]]) 
     return np.asarray(white)
 
 
-def noise_covariance(
-    quiet: FloatArray, longest: int, columns: FloatArray | None = None
-) -> FloatArray:
+def noise_covariance(quiet: FloatArray, longest: int, columns: FloatArray | None) -> FloatArray:
     """Autocovariance of noise over its variance, from lag 0 until it has decayed.
 
     For white noise this is lag 0 alone.
@@ -129,7 +127,7 @@ def noise_covariance(
         covariances are only noise.
     longest : int
         Largest number of lags.
-    columns : ndarray, optional
+    columns : ndarray or None
         As for `whitening_filter`.
     """
     denominator = whitening_filter(quiet, noise_lags(quiet.size), columns=columns)

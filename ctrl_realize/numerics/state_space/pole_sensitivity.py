@@ -162,11 +162,10 @@ def _modal(zeros: ComplexArray, poles: ComplexArray, gain: float) -> Core | None
     if zeros.size > n or np.abs(apart).min(initial=1.0) < 1e-9:
         return None
     residues = gain * np.prod(poles[:, None] - zeros[None], axis=1) / np.prod(apart, axis=1)
-    blocks = [k for k in range(n) if poles[k].imag >= -1e-12]
+    upper = poles.imag >= -1e-12
     A, B, C = np.zeros((n, n)), np.zeros(n), np.zeros(n)
     at = 0
-    for k in blocks:
-        p, r = poles[k], residues[k]
+    for p, r in zip(poles[upper], residues[upper], strict=True):
         if abs(p.imag) <= 1e-12:
             A[at, at], B[at], C[at] = p.real, 1.0, r.real
             at += 1

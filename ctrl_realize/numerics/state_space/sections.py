@@ -98,11 +98,8 @@ def in_sections(A: FloatArray, B: FloatArray, C: FloatArray, D: FloatArray) -> S
     a, rows, columns = [], [], []
     order = np.argsort(poles.real)
     real = [int(i) for i in order if poles[i].imag == 0]
-    pairs = [
-        (int(i), int(np.argmin(np.abs(poles - poles[i].conj()))))
-        for i in order
-        if poles[i].imag > 0
-    ]
+    upper = [int(i) for i in order if poles[i].imag > 0]
+    pairs = [(i, int(np.argmin(np.abs(poles - poles[i].conj())))) for i in upper]
     pairs += zip(real[0::2], real[1::2], strict=False)
     for i, j in pairs:
         one, two = poles[i], poles[j]

@@ -144,7 +144,7 @@ def exact_covariance(lags):
 
 
 def test_the_covariance_of_ringing_noise_is_found():
-    found = noise_covariance(ringing(40_000), 40_000)
+    found = noise_covariance(ringing(40_000), 40_000, None)
     # 1/sqrt(40 000) times the square root of what a sample counts for, with room: 0.02
     assert found[:100] == pytest.approx(exact_covariance(100), abs=0.02)
     # it goes on until it has died away, and no longer
