@@ -14,7 +14,7 @@ from ...data import Record
 from ...errors import DataError
 from ...numerics.arrays import FloatArray
 from ...numerics.constants import SMALLEST
-from ...numerics.output_error.any_input.data import MOST_SAMPLES, SOUGHT, SampledData
+from ...numerics.output_error.any_input.data import MOST_SAMPLES, SOUGHT_THEN, SampledData
 from ...numerics.output_error.any_input.fit import SampledFit, fit_sampled
 from ...numerics.output_error.other_structures import Requested
 from ...numerics.output_error.result import AT_BOUND, OutputErrorEstimate
@@ -31,9 +31,7 @@ from .result import OutputErrorFit
 from .sensor_flags import missing_code
 from .summary import choices_of
 
-_SOUGHT_THEN = 2.0  # times as far where nothing explains the output, or a dead time is at the bound
 _LEAST_REST = 20  # samples before the first move of the input, for a plant at rest
-_MISSED = 0.9  # of the residual with a motion, which is larger only where its search has failed
 _ALL = 0.99  # of a record, from which on the rest is not reported
 
 
@@ -92,21 +90,13 @@ def _fit(
     for record in records:
         _check_moves(record)
     outputs, inputs = zip(*signals, strict=True)
-    size, from_rest = max(y.size for y in outputs), None
-    if size <= MOST_SAMPLES and not requested.loop and all(map(_begins_at_rest, records)):
-        # A free response that begins with the record explains a slow one from rest as well.
-        # Ablation: fits from rest.
-        latest = requested.latest or SOUGHT * _SOUGHT_THEN * size * dt
-        from_rest = fit_sampled(outputs, inputs, dt, replace(requested, latest=latest, rested=True))
-        if from_rest.follows and from_rest.rests and Rule.FROM_REST.on:
-            return from_rest
-    found = _sought(outputs, inputs, dt, requested)
-    if from_rest is not None and from_rest.follows:
-        left, more = from_rest.fit.residual.std, found.fit.residual.std
-        if left < _MISSED * more and Rule.FROM_REST.on:
-            return from_rest
+    # A free response that begins with the record explains a slow one from rest as well.
+    # Ablation: fits from rest.
+    whole = max(y.size for y in outputs) <= MOST_SAMPLES and not requested.loop
+    rested = whole and Rule.FROM_REST.on and all(map(_begins_at_rest, records))
+    found = _sought(outputs, inputs, dt, replace(requested, rested=rested))
     if refuses and not found.follows:
-        latest = requested.latest or SOUGHT * _SOUGHT_THEN * found.data.longest
+        latest = requested.latest or SOUGHT_THEN * found.data.longest
         codes = [str(code) for y in found.data.measured if (code := missing_code(y))]
         raise UnrelatedError(
             f"{_named(records)}: the output does not respond to the input, which explains nothing "
@@ -122,11 +112,11 @@ def _sought(
 ) -> SampledFit:
     """Fit records with dead times up to a part of them, and with later ones where none explains."""
     found = fit_sampled(outputs, inputs, dt, requested)
-    latest = SOUGHT * found.data.longest
-    if requested.latest is not None or (found.follows and found.fit.high < AT_BOUND * latest):
+    inside = found.follows and found.fit.high < AT_BOUND * found.data.sought
+    if requested.latest is not None or found.data.rested or inside:
         return found
-    latest *= _SOUGHT_THEN
-    wider = fit_sampled(outputs, inputs, dt, replace(requested, latest=latest))
+    latest = SOUGHT_THEN * found.data.longest
+    wider = fit_sampled(outputs, inputs, dt, replace(requested, latest=latest, rested=False))
     # What explains little is no response for being sought for longer: it must lie inside.
     inside = found.follows or wider.fit.high < AT_BOUND * latest
     return wider if wider.follows and inside else found
@@ -187,7 +177,7 @@ def _summary(
     data = found.data
     used = records if repeats is None else tuple(compress(records, repeats.kept))
     shown, time = joined(used, data, fit.residual.std)
-    limit = SOUGHT * data.longest if latest is None else latest
+    limit = data.sought if latest is None else latest
     flags = [*sampled_flags(fit, data.dt, data.longest, limit), *_cut(used, found)]
     if repeats is not None:
         flags += repeat_flags(repeats, fit.dead_time, data.dt)

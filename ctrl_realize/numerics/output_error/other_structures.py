@@ -60,7 +60,7 @@ class Requested:
     loop : bool
         The input is that of a controller: see `any_input.lags`.
     rested : bool
-        Records of any input begin at rest, so that none has a free response or a drift.
+        Records of any input begin at rest: none has a free response or a drift that is not seen.
     compared : bool
         Look for structures that were not requested and fit better, or as well.
     """

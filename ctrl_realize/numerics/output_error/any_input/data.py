@@ -25,7 +25,10 @@ MOST_SAMPLES = 4000
 Where their response ends in time all samples are fitted afterwards (`condensed`); where the plant
 is slow means over blocks of samples are fitted, so many of them."""
 
-SOUGHT = 0.25  # of the longest record, up to which a dead time is sought unless a limit is given
+SOUGHT, SOUGHT_THEN = 0.25, 0.5
+"""Of the longest record, up to which a dead time is sought unless a limit is given: also where what
+came before the record is known, or where nothing explains the output or a dead time is at the bound
+before."""
 BEYOND = 1.5  # of a first-order model's dead time: no model's dead time is later
 
 _SPARSEST = 20
@@ -172,6 +175,11 @@ class SampledData:
     def longest(self) -> float:
         """Duration of the longest record, in s."""
         return max(y.size for y in self.outputs) * self.step
+
+    @property
+    def sought(self) -> float:
+        """Largest dead time that is sought unless a limit is given, in s."""
+        return (SOUGHT_THEN if self.rested else SOUGHT) * self.longest
 
     @property
     def edges(self) -> IntArray:

@@ -79,8 +79,7 @@ class SampledFit:
     `explained` is the decrease of the sum of squares due to the input, divided by the residual
     variance: a chi-square. If the records are longer than `data`, `condensed` contains the data
     that were fitted. `noise` is the polynomial that makes the noise white, 1 for white noise;
-    `loads` are those of loops. `rests` tells, of a fit from rest, that no motion of the plant's own
-    is seen.
+    `loads` are those that were found.
     """
 
     fit: OutputErrorEstimate
@@ -89,7 +88,6 @@ class SampledFit:
     noise: FloatArray
     condensed: Condensed | None
     loads: tuple[Load, ...] = ()
-    rests: bool = False
 
     @property
     def needed(self) -> float:
@@ -138,9 +136,9 @@ def fit_sampled(
     Notes
     -----
     The past before a record is represented by an initial state, which is eliminated together with
-    level and drift; records that are `requested` as rested have neither, and `SampledFit.rests`
-    tells whether they ask for one. The input within the dead time before the record is unknown:
-    samples for one and a half dead times of the best first-order model are left out, at most half
+    level and drift; records that are `requested` as rested have neither, unless they ask for one.
+    The input within the dead time before the record is unknown: samples for one and a half dead
+    times of the best first-order model are left out, at most half
     of the record. If the residual is coloured, all structures are fitted again by generalised least
     squares [3]_: inputs and outputs are filtered by the residual's autoregressive model, which does
     not change a linear plant. A likelihood in such noise has many narrow maxima, and its ratio is
@@ -225,7 +223,7 @@ def fit_sampled(
     close = fit.close + close_to("adequate", correlation, WHITE)
     fitted = fit.fitted * np.repeat(data.scales, data.counts)
     fit = _at_rest(data, replace(fit, residual=residual, close=close, fitted=fitted))
-    return SampledFit(fit, data, explained(stretch), part.noise, sums, part.loads, part.rests)
+    return SampledFit(fit, data, explained(stretch), part.noise, sums, part.loads)
 
 
 def _of_measured(

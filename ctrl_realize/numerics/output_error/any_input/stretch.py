@@ -24,15 +24,15 @@ from ...engine.window_fit import WindowFit
 from ...rules import Rule
 from ..other_structures import Requested
 from .condensed import MOST_LAGS
-from .data import BEYOND, SOUGHT, SampledData, cut
-from .loads import beside_loads
+from .data import BEYOND, SampledData, cut
+from .loads import Refit, beside_loads
 from .window import (
     ORDERS,
     WHITE,
     SampledWindow,
     fit_windows,
     in_coloured_noise,
-    seen_at_rest,
+    rests,
     simulates_worse,
 )
 
@@ -57,22 +57,44 @@ _NEARLY = 0.8  # of a record, from which on all of it is taken
 def fit_stretch(
     data: SampledData, structures: Sequence[Structure], requested: Requested
 ) -> SampledWindow:
-    """Fit structures to a part of the records, by default dead times up to a quarter of it."""
-    limit = SOUGHT * data.longest if requested.latest is None else requested.latest
-    within = requested.earliest, max(limit, requested.earliest)
-    part = fit_windows(data, structures, within, requested.huber, np.ones(1))
-    white, whiten = None, partial(made_white, requested=requested)
+    """Fit structures to a part of the records, by default dead times up to `SampledData.sought`.
+
+    Records that begin at rest are fitted as such. If that is not what they show, or leaves nothing
+    to the input, they are fitted as others are.
+    """
+
+    def fit(
+        data: SampledData, structures: Sequence[Structure], like: WindowFit | None = None
+    ) -> SampledWindow:
+        limit = data.sought if requested.latest is None else requested.latest
+        within = requested.earliest, max(limit, requested.earliest)
+        return fit_windows(data, structures, within, requested.huber, np.ones(1), like=like)
+
+    part = fit(data, structures)
+    if data.rested:
+        others = replace(data, rested=False)
+        free = None if rests(part) else fit(others, structures)
+        # What is taken for a motion, and leaves more than noise, may be a load.
+        if free is None or free.fit.correlation > WHITE:
+            loaded, white = _beside_loads(part, fit, requested)
+            if rests(loaded) if loaded.loads else free is None:
+                found = loaded if requested.structures is not None else white
+                if explained(found.fit) >= FOLLOWS:
+                    return found
+        part = free or fit(others, structures)
+    part, white = _beside_loads(part, fit, requested)
+    return part if requested.structures is not None else white
+
+
+def _beside_loads(
+    part: SampledWindow, fit: Refit, requested: Requested
+) -> tuple[SampledWindow, SampledWindow]:
+    """Fit beside loads where they are looked for; the same with the noise made white."""
+    whiten = partial(made_white, requested=requested)
     sought = requested.whiten and requested.compared and not requested.loop
     if sought and Rule.SAMPLED_LOADS.on:
-        refit = partial(fit_windows, within=within, huber=requested.huber, noise=np.ones(1))
-        part, white = beside_loads(part, refit, whiten)
-    if data.rested:
-        part = seen_at_rest(part)
-        if not part.rests:
-            return part
-    if requested.structures is not None:
-        return part
-    return whiten(part) if white is None else replace(white, rests=part.rests)
+        return beside_loads(part, fit, whiten)
+    return part, part if requested.structures is not None else whiten(part)
 
 
 def made_white(part: SampledWindow, requested: Requested) -> SampledWindow:
@@ -84,7 +106,7 @@ def made_white(part: SampledWindow, requested: Requested) -> SampledWindow:
     # In a loop the noise model is needed for consistency [1]_.
     if requested.simulates and not requested.loop and simulates_worse(weighted, part):
         return part
-    return replace(weighted, unweighted=part.model, rests=part.rests, loads=part.loads)
+    return replace(weighted, unweighted=part.model, loads=part.loads)
 
 
 def samples_in_a_block(

@@ -73,9 +73,8 @@ class SampledWindow:
     """Fit of all structures to records that were filtered by a polynomial `noise`, 1 for none.
 
     `data` are the records before the filter, without the samples that depend on the unknown past;
-    `unweighted` is the model before it, and `residual` as for `SampledData.whitened`. `rests` tells
-    whether records fitted from rest have neither a free response nor a drift; `loads` are those
-    that were found.
+    `unweighted` is the model before it, and `residual` as for `SampledData.whitened`; `loads` are
+    those that were found.
     """
 
     data: SampledData
@@ -85,7 +84,6 @@ class SampledWindow:
     huber: bool
     unweighted: PlausibleModel | None = None
     residual: tuple[FloatArray, ...] = ()
-    rests: bool = False
     loads: tuple[Load, ...] = ()
 
     @property
@@ -171,8 +169,8 @@ def in_coloured_noise(
     return found
 
 
-def seen_at_rest(part: SampledWindow) -> SampledWindow:
-    """Tell of records that were fitted from rest whether they show neither free response nor drift.
+def rests(part: SampledWindow) -> bool:
+    """Whether records that were fitted from rest show neither a free response nor a drift.
 
     These are tried with the best structure, and with one and two lags: slow poles beside zeros take
     their place in richer ones, and a filter in coloured noise, which is why it comes afterwards.
@@ -194,7 +192,7 @@ def seen_at_rest(part: SampledWindow) -> SampledWindow:
             value + still.penalty * terms[s] + needless_parameters(s) for s, value in values.items()
         )
 
-    return replace(part, rests=bool(least(still) + STRONG < least(moving)))
+    return bool(least(still) + STRONG < least(moving))
 
 
 def noise_model(part: SampledWindow, model: Candidate, error: FloatArray, lags: int) -> FloatArray:
