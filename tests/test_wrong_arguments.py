@@ -82,6 +82,17 @@ def test_values_that_make_no_sense_are_refused():
             call()
 
 
+@pytest.mark.parametrize("wrong", [{"td": -1.0}, {"tf": -1.0}])
+def test_times_of_a_pid_are_not_negative(wrong):
+    with pytest.raises(cr.errors.OptionError, match=r"t[df]=-1(\.0)?"):
+        cr.design.PIDAlgorithm(1.0, 10.0, **wrong)
+
+
+def test_points_of_a_characteristic_are_pairs_whatever_its_kind():
+    with pytest.raises(cr.errors.OptionError, match="at least two pairs"):
+        cr.actuators.Characteristic("linear", points=(1, 2, 3))
+
+
 def test_a_filter_slower_than_the_record_is_refused_before_memory_is_given_to_it():
     # 1e-6 Hz of 1280 Hz: 51 GB of zeros before the step
     with pytest.raises(OptionError, match="takes 5e\\+06 s to settle"):

@@ -75,7 +75,7 @@ class Characteristic(StaticMap):
         if positive(self.exponent, "exponent", "exponent of the travel") >= 1:
             raise OptionError(f"exponent={self.exponent!r}; expected a value below 1")
         given = finite(self.points, "points")
-        if self.kind == "points" and (
+        if (self.kind == "points" or given.size) and (
             given.ndim != 2
             or given.shape[0] < 2
             or given.shape[1] != 2

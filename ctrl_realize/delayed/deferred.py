@@ -8,6 +8,7 @@ from typing import Any
 import control as ct
 import numpy as np
 
+from .._checks import system_name
 from .._parameters import checked_time_unit
 from ..data.shown_units import shown_time_unit
 from ..errors import DelayRangeError
@@ -38,6 +39,8 @@ class DeferredMatrices(ct.StateSpace, ABC):  # type: ignore[misc]  # control is 
         """Set up the system without matrices; `states` is their number without the delay line."""
         self._locked = False
         self._time_unit = checked_time_unit(names.pop("time_unit", "s"))
+        if names.get("name") is not None:
+            names["name"] = system_name(names["name"])
         # Not StateSpace.__init__, which needs the matrices.
         ct.NonlinearIOSystem.__init__(
             self, self._next_state, self._output, states=states, dt=dt, **names

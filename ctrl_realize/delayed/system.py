@@ -16,7 +16,6 @@ from typing import Any, TypeVar
 
 import control as ct
 
-from .._checks import system_name
 from .._shown import shown_alike
 from ..errors import DelayRangeError, OptionError, UnsuitableSystemError
 from ..results import Drawable, ModelFit
@@ -152,8 +151,7 @@ class DelayedStateSpace(
         input_names = signal_names(inputs, core.input_labels, "u")
         output_names = signal_names(outputs, core.output_labels, "y")
         states = core.nstates + sum(before) + sum(behind)
-        called = None if name is None else system_name(name)
-        names = {"name": called, "inputs": input_names, "outputs": output_names}
+        names = {"name": name, "inputs": input_names, "outputs": output_names}
         self._begin(core.nstates, states, core.dt, time_unit=time_unit, **names)
         self._core = named(core, input_names, output_names, core.state_labels, f"{self.name}_core")
         self.input_delays = before

@@ -124,6 +124,15 @@ def test_tags_that_differ_in_a_dot_alone_stay_apart_in_the_model():
     assert (frf.name, frf.input_labels) == ("run_1", ["a_b_2", "a_b"])
 
 
+def test_a_dot_in_a_name_is_an_underscore_of_every_system_with_a_delay_line():
+    plant = cr.delayed_ss(ct.tf([1], [0.08, 1]), dead_time=0.1, dt=0.01, name="FIC101.PV")
+    pi = ct.tf([2.0, -1.8], [1, -1], 0.01)
+    predictor = cr.design.smith_predictor(plant, pi, name="FIC101.OP")
+    regulator = cr.design.lqg(plant, 1, 1, 1, 1, name="FIC101.OP")
+    names = [one.name for one in (plant, predictor, regulator)]
+    assert names == ["FIC101_PV", "FIC101_OP", "FIC101_OP"]
+
+
 def test_any_name_makes_a_name_of_a_file(tmp_path):
     for piece in PIECES[:300]:
         (tmp_path / f"001_{file_name(piece)}.json").write_text("", encoding="utf-8")

@@ -13,7 +13,7 @@ from typing import Any, Self
 import control as ct
 import numpy as np
 
-from ..._checks import real, system_name
+from ..._checks import real
 from ...numerics.arrays import Matrices
 from ...numerics.internal_delays.form import DelayForm, through, without_zero_delays
 from ...numerics.internal_delays.merging import ends_apart
@@ -132,8 +132,7 @@ class DelaySystem(InsideResponses, InsideConversions, InsideCards, DelayOperator
             core, delays = plain(form, dt, core.state_labels), form.delays
             q = len(delays)
         states = core.nstates + (int(sum(delays)) if dt else 0)
-        called = None if name is None else system_name(name)
-        names = {"inputs": input_names, "outputs": output_names, "name": called}
+        names = {"inputs": input_names, "outputs": output_names, "name": name}
         self._begin(core.nstates, states, dt, time_unit=time_unit, **names)
         into = [*input_names, *(f"w[{i}]" for i in range(q))]
         out = [*output_names, *(f"z[{i}]" for i in range(q))]

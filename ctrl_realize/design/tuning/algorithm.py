@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..._checks import band, finite, numbers, one_of, positive, real
+from ..._checks import band, finite, not_negative, numbers, one_of, positive, real
 from ..._wording import in_digits, in_time
 from ...errors import DataError, OptionError
 from ...numerics.arrays import FloatArray
@@ -131,8 +131,10 @@ class PIDAlgorithm(Result):
     def __post_init__(self) -> None:
         positive(self.dt, "dt", "sample time in s")
         one_of(self.method, "method", DISCRETIZATIONS)
-        for name in ("kp", "td", "tf", "setpoint_weight", "derivative_weight", "bias"):
+        for name in ("kp", "setpoint_weight", "derivative_weight", "bias"):
             real(getattr(self, name), name, "parameter of a PID")
+        for name in ("td", "tf"):
+            not_negative(getattr(self, name), name, "time in s")
         if self.ti != INF:
             positive(self.ti, "ti", "integral time in s")
         low, high = _limits(self.output_limits)
