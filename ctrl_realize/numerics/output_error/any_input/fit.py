@@ -131,7 +131,7 @@ def fit_sampled(
     dt : float
         Sample time in s.
     requested : Requested
-        By default orders up to 3 are tried, and dead times up to a quarter of the longest record.
+        By default orders up to 3 are tried, and dead times up to `SampledData.sought`.
 
     Notes
     -----
