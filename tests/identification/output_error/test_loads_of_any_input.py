@@ -1,5 +1,7 @@
 """Loads that move the output of a plant in open loop, whatever its input is (simulated)."""
 
+from functools import cache
+
 import numpy as np
 import pytest
 from scipy.signal import lfilter
@@ -39,10 +41,15 @@ def loaded(*moves):
     return np.sum([np.where(at > TIME, 0.0, size) for at, size in moves], axis=0)
 
 
+@cache
+def identified(*moves):
+    return cr.identify(record(binary(4), loaded(*moves), seed=4))
+
+
 @pytest.mark.parametrize("moves", [[(400, 0.5)], [(250, 0.5), (550, -0.5)]])
 def test_a_load_is_told_and_taken_out_of_the_gain(moves):
     # the gains were -5 and -6.1
-    fit = cr.identify(record(binary(4), loaded(*moves), seed=4)).fit
+    fit = identified(*moves).fit
     assert fit.gain == pytest.approx(GAIN, rel=0.02)  # half the width of the interval is 0.007
     assert fit.gain_interval[0] <= GAIN <= fit.gain_interval[1]
     assert fit.interval[0] <= DEAD_TIME <= fit.interval[1]
@@ -52,8 +59,7 @@ def test_a_load_is_told_and_taken_out_of_the_gain(moves):
 
 
 def test_what_a_simulation_follows_is_without_the_load():
-    data = record(binary(4), loaded((400, 0.5)), seed=4)
-    system = cr.identify(data)
+    data, system = record(binary(4), loaded((400, 0.5)), seed=4), identified((400, 0.5))
     y, simulated = np.ravel(data.output), system.simulate(np.ravel(data.input))
     used = slice(-system.fit.time.size, None)  # the first samples may not be
     alone = 100 * (1 - np.std((y - simulated)[used]) / np.std(y[used]))

@@ -89,10 +89,14 @@ def test_a_code_for_missing_values_is_left_out_wherever_it_is(where, value):
     assert codes(fit) - codes(told) == {"outliers"}
 
 
-@pytest.mark.parametrize("kind", ["step", "any input"])
 @pytest.mark.parametrize(
-    ("where", "value", "structures"),
-    [(30, 1000.0, None), (250, -9999.0, "FOPDT"), (250, 4.0, "FOPDT")],
+    ("kind", "where", "value", "structures"),
+    [
+        ("step", 30, 1000.0, None),
+        ("any input", 250, -9999.0, "FOPDT"),
+        ("step", 250, 4.0, "FOPDT"),
+        ("any input", 250, 4.0, "FOPDT"),
+    ],
 )
 def test_an_error_code_of_the_input_is_none_if_the_output_responds(kind, where, value, structures):
     u = {"step": STEP, "any input": BINARY}[kind]
