@@ -1,5 +1,6 @@
 """Trimmed statistics, and threads of the BLAS."""
 
+import gc
 import sys
 import threading
 
@@ -118,6 +119,7 @@ def test_an_error_leaves_the_setting_as_it_was(two_threads):
 def test_an_interruption_at_any_call_leaves_the_setting_as_it_was(two_threads):
     # An interpreter handles signals where functions are entered, among other places.
     tracer, left = sys.gettrace(), 0
+    gc.collect()  # what is freed meanwhile would be interrupted, and tell nobody
 
     def interrupt(*_: object) -> None:
         nonlocal left
