@@ -40,9 +40,6 @@ from ..load import LEAST_LOAD
 from .data import Load, SampledData
 from .window import WHITE, SampledWindow, left_of
 
-_MOST = 2
-"""Loads of records without feedback: what more of them explain is another plant, as a hysteresis,
-which one in each direction imitates."""
 _LASTING = 0.05, 0.95
 """Quantiles of an input between which it moves for longer than a pulse. Of 194 loops beside a load
 that drifts eight had a load of three to six times the lasting motion in place of the response to
@@ -84,10 +81,12 @@ def beside_loads(
 ) -> tuple[SampledWindow, SampledWindow]:
     """Fit records beside a load or two, and the same with the noise made white.
 
-    Of a load that comes and goes neither end alone explains much. Loads are placed in coloured
-    noise, by a model that they hardly change, where the evidence for one is very strong. They take
-    the place of what a model lacks, and a step explains some of slow noise: what is left beside
-    them must be white. Simple structures tell: without them zeros have taken the place of loads.
+    Of a load that comes and goes neither end alone explains much; what more than two explain is
+    another plant, as a hysteresis, which one in each direction imitates. Loads are placed in
+    coloured noise, by a model that they hardly change, where the evidence for one is very strong.
+    They take the place of what a model lacks, and a step explains some of slow noise: what is left
+    beside them must be white. Simple structures tell: without them zeros have taken the place of
+    loads.
     Ablation: loads in records of any input.
     """
     if part.fit.correlation <= WHITE:
@@ -97,29 +96,37 @@ def beside_loads(
     load, score = _likeliest(white.data.without_loads, white, lags, [])
     if score <= VERY_STRONG:
         return part, white
-    every = list(part.fit.candidates)
-    few = [s for s in every if s in _SIMPLE or s == white.fit.best.structure]
-    # The noise model of `white` has taken some of a load for noise, and the poles of `part` some
-    # for a response: loads are tried where either finds them likeliest.
-    found, more, like = [load], part, white
-    for _ in range(_MOST):
-        placed, another = _placed(more, like, more.loads)
-        if another is None:
-            break
-        more = like = _beside(more, like, [*placed, another], refit, few)
-        ways = [_again(one, refit, few) for one in (_beside(part, white, found, refit, few), more)]
-        best = max(ways, key=partial(_excess, part))
-        if _excess(part, best) > 0:
-            best = _again(_needed(best, refit, few), refit, few)
-            if _tells(part, best):
-                best = _again(best, refit, every)
-                if _tells(part, best):
-                    return best, best
-        found, another = _placed(white, white, found)
-        if another is None:
-            break
-        found.append(another)
-    return part, white
+    few = [s for s in part.fit.candidates if s in _SIMPLE or s == white.fit.best.structure]
+    trial = partial(refit, huber=False)  # which takes half of the time
+    first = _again(_beside(part, white, [load], trial, few), trial, few)
+    told = _told(part, [first], refit, few)
+    if told is None:
+        # The noise model of `white` has taken some of two loads for noise, and the poles of `first`
+        # some of the second for a response: it is tried where either finds it likeliest.
+        seconds = [
+            (like, *_placed(like, like, loads))
+            for like, loads in ((white, [load]), (first, first.loads))
+        ]
+        pairs = [
+            _beside(part, like, [*placed, another], trial, few)
+            for like, placed, another in seconds
+            if another is not None
+        ]
+        told = _told(part, [_again(pair, trial, few) for pair in pairs], refit, few)
+    return (part, white) if told is None else (told, told)
+
+
+def _told(
+    part: SampledWindow, ways: Sequence[SampledWindow], refit: Refit, few: Sequence[Structure]
+) -> SampledWindow | None:
+    """The likeliest of some fits beside loads, with all structures, if it tells them."""
+    best, trial = max(ways, key=partial(_excess, part), default=part), partial(refit, huber=False)
+    if _excess(part, best) <= 0:
+        return None
+    best = _again(_needed(best, trial, few), trial, few)
+    if _tells(part, best):
+        best = _again(best, refit, list(part.fit.candidates))
+    return best if _tells(part, best) else None
 
 
 def _needed(part: SampledWindow, refit: Refit, few: Sequence[Structure]) -> SampledWindow:

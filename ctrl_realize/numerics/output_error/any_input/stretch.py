@@ -64,11 +64,14 @@ def fit_stretch(
     """
 
     def fit(
-        data: SampledData, structures: Sequence[Structure], like: WindowFit | None = None
+        data: SampledData,
+        structures: Sequence[Structure],
+        like: WindowFit | None = None,
+        huber: bool = requested.huber,
     ) -> SampledWindow:
         limit = data.sought if requested.latest is None else requested.latest
         within = requested.earliest, max(limit, requested.earliest)
-        return fit_windows(data, structures, within, requested.huber, np.ones(1), like=like)
+        return fit_windows(data, structures, within, huber, np.ones(1), like=like)
 
     part = fit(data, structures)
     if data.rested:
