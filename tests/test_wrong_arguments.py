@@ -84,7 +84,7 @@ def test_values_that_make_no_sense_are_refused():
 
 @pytest.mark.parametrize("wrong", [{"td": -1.0}, {"tf": -1.0}])
 def test_times_of_a_pid_are_not_negative(wrong):
-    with pytest.raises(cr.errors.OptionError, match=r"t[df]=-1(\.0)?"):
+    with pytest.raises(cr.errors.OptionError, match=r"t[df]=-1"):
         cr.design.PIDAlgorithm(1.0, 10.0, **wrong)
 
 

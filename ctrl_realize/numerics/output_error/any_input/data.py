@@ -63,8 +63,9 @@ class SampledData:
     Attributes
     ----------
     inputs, outputs : tuple of ndarray
-        Of every record, from its first sample on; without the mean of the input. The output is NaN
-        where a sample is missing. Of blocks of samples the output is the mean.
+        Of every record, from its first sample on; without the mean of the input, or the level at
+        which it rests first. The output is NaN where a sample is missing. Of blocks of samples the
+        output is the mean.
     starts : tuple of int
         Outputs before these depend on the input before the record.
     scales : tuple of float

@@ -138,14 +138,13 @@ def fit_sampled(
     The past before a record is represented by an initial state, which is eliminated together with
     level and drift; records that are `requested` as rested have neither, unless they ask for one.
     The input within the dead time before the record is unknown: samples for one and a half dead
-    times of the best first-order model are left out, at most half
-    of the record. If the residual is coloured, all structures are fitted again by generalised least
-    squares [3]_: inputs and outputs are filtered by the residual's autoregressive model, which does
-    not change a linear plant. A likelihood in such noise has many narrow maxima, and its ratio is
-    no chi-square: the interval contains 95 % of the weight of the dead times as well
-    (`posterior_of`; of 42 ramps in AR(0.9) noise 37 intervals hold, 31 without). Structures that
-    are given remain those of equal weights where others rule them out in such noise: the residual
-    is what they cannot describe.
+    times of the best first-order model are left out, at most half of the record. If the residual is
+    coloured, all structures are fitted again by generalised least squares [3]_: inputs and outputs
+    are filtered by the residual's autoregressive model, which does not change a linear plant. A
+    likelihood in such noise has many narrow maxima, and its ratio is no chi-square: the interval
+    contains 95 % of the weight of the dead times as well (`posterior_of`; of 42 ramps in AR(0.9)
+    noise 37 intervals hold, 31 without). Structures that are given remain those of equal weights
+    where others rule them out in such noise: the residual is what they cannot describe.
 
     Where the residual is coloured a load is looked for, or two, that make it white (`loads`); all
     that is fitted then is the part in which they are.
