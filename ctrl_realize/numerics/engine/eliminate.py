@@ -46,16 +46,38 @@ def eliminate(problem: Problem, structure: Structure, parameters: FloatArray) ->
     """Eliminate the linear terms at parameters (B, 1 + n), and leave derivatives aside."""
     if isinstance(structure, Family):
         return structure.compress(problem, parameters)
+    residual, weights, _ = _eliminated(_linear(problem, structure, parameters))
+    numerator = weights[:, : structure.zeros + 1]
+    return Eliminated(np.add.reduce(residual * residual, axis=1), numerator)
+
+
+def drawn_numerators(
+    problem: Problem,
+    structure: Structure,
+    parameters: FloatArray,
+    std: float,
+    rng: np.random.Generator,
+) -> FloatArray:
+    """Numerators (B, n - r + 1) at parameters (B, 1 + n), each fitted to data with errors anew.
+
+    The errors have a standard deviation in units of the noise. Those that no linear term follows
+    are left out.
+    """
+    linear = _linear(problem, structure, parameters)
+    basis = _eliminated(linear)[2]
+    moves = std * rng.standard_normal((len(basis), basis.shape[2], 1))
+    linear[:, :, -1:] += basis @ moves
+    return _eliminated(linear)[1][:, : structure.zeros + 1]
+
+
+def _linear(problem: Problem, structure: Structure, parameters: FloatArray) -> FloatArray:
+    """Responses to powers of s (B, k, n - r + 1), regressors and data, in few rows."""
     models, q = _Models(problem, structure, parameters), problem.regressors.shape[1]
     columns = models.columns(slopes=False)
     if models.local is None:
-        linear = models.linear(triangle(columns)[:, q:, q:])
-    else:
-        left = [part.left for part in models.local.reduced(columns)]
-        linear = models.linear(np.concatenate(left, axis=1), q)
-    residual, weights, _ = _eliminated(linear)
-    numerator = weights[:, : structure.zeros + 1]
-    return Eliminated(np.add.reduce(residual * residual, axis=1), numerator)
+        return models.linear(triangle(columns)[:, q:, q:])
+    left = [part.left for part in models.local.reduced(columns)]
+    return models.linear(np.concatenate(left, axis=1), q)
 
 
 def compress(problem: Problem, structure: Structure, parameters: FloatArray) -> Compressed:

@@ -28,12 +28,12 @@ from scipy.special import factorial
 
 from ..arrays import ComplexArray, FloatArray
 from ..blas_threads import one_blas_thread
-from ..constants import SMALLEST
-from .eliminate import eliminate
+from ..constants import SMALLEST, VERY_STRONG
+from .eliminate import drawn_numerators, eliminate
 from .poles import poles_from_parameters
 from .problem import Bounds, Family, Structure
-from .static_gain import LocalErrors, local_errors
-from .structures import Candidate, Scales, parameter_bounds
+from .static_gain import local_errors
+from .structures import Candidate, parameter_bounds
 from .window_fit import WindowFit
 
 COUNT = 39
@@ -129,6 +129,12 @@ def _about(
     n, free = theta.size, numerator.size
     widest = np.full(n + free, np.inf)
     widest[0], widest[1:n] = 0.5 * (scales.latest - scales.earliest), _WIDEST
+
+    def models(drawn: FloatArray) -> list[PlausibleModel]:
+        poles = poles_from_parameters(drawn[:, 1:])[0]
+        own = drawn_numerators(problem, structure.plain, drawn, float(np.sqrt(variance)), rng)
+        return [PlausibleModel(*one) for one in zip(drawn[:, 0].tolist(), poles, own, strict=True)]
+
     if isinstance(structure, Family):
         # Far from the fit, which is one of them, its tangent is no guide: what fits worse than it
         # says is left out, and numerators are those that fit.
@@ -140,10 +146,7 @@ def _about(
         value = -0.5 * np.maximum(found.cost - candidate.cost, 0.0) / variance
         chances = np.cumsum(np.exp(np.minimum(value + 0.5 * np.sum(moves**2, axis=1), 0.0)))
         places = (np.arange(count) + rng.random()) / count * chances[-1]
-        chosen = np.searchsorted(chances, places).clip(0, len(tried) - 1)
-        plain = Candidate(structure.plain, theta, candidate.cost)
-        errors = local_errors(problem, plain, numerator, scales.length)
-        return _models(plain, tried[chosen], found.numerator[chosen], errors, variance, scales, rng)
+        return models(tried[np.searchsorted(chances, places).clip(0, len(tried) - 1)])
     bounds = parameter_bounds(structure, scales)
     rows = _WIDER * _directions(covariance[:n, :n], widest[:n])
 
@@ -160,46 +163,24 @@ def _about(
     weight = np.exp(weight - weight.max())
     if np.sum(weight) ** 2 < _EFFECTIVE * enough * np.sum(weight**2):
         first = np.argsort(value)[-enough:]
-        drawn = _stretched(likelihood, bounds, tried[first], value[first], rng)[-count:]
+        # Errors without a tangent, as that of a zero at infinity, leave none of them near the fit.
+        part = np.sqrt(VERY_STRONG / np.maximum(-value[first, None], VERY_STRONG))
+        near = theta + part * (tried[first] - theta)
+        drawn = _stretched(likelihood, bounds, near, rng)[-count:]
     else:
         places = (np.arange(count) + rng.random()) / count * weight.sum()
         drawn = tried[np.searchsorted(np.cumsum(weight), places).clip(0, len(tried) - 1)]
-    there = eliminate(problem, structure, drawn).numerator
-    return _models(candidate, drawn, there, errors, variance, scales, rng)
-
-
-def _models(
-    fit: Candidate,
-    drawn: FloatArray,
-    numerator: FloatArray,
-    errors: LocalErrors,
-    variance: float,
-    scales: Scales,
-    rng: np.random.Generator,
-) -> list[PlausibleModel]:
-    """Add the error of their numerators (B, k) to models drawn about a fit.
-
-    The error of the numerator beside given poles is one of gain, and grows with their product; with
-    a pole slower than the record it is one of slope, and does not.
-    """
-    free = numerator.shape[1]
-    given = variance * LocalErrors(errors.slopes[:, drawn.shape[1] :], errors.own).covariance()
-    beside = rng.standard_normal((len(drawn), free)) @ _directions(given, np.full(free, np.inf))
-    slowest = 1 / scales.length
-    own = np.prod(np.abs(fit.poles) + slowest)
-    scale = np.prod(np.abs(poles_from_parameters(drawn[:, 1:])[0]) + slowest, axis=1) / own
-    return [_model(*pair) for pair in zip(drawn, numerator + scale[:, None] * beside, strict=True)]
+    return models(drawn)
 
 
 def _stretched(
     likelihood: Callable[[FloatArray], FloatArray],
     bounds: Bounds,
     walkers: FloatArray,
-    value: FloatArray,
     rng: np.random.Generator,
 ) -> FloatArray:
     """Move walkers (B, n) by stretches along lines through others [3]_, whatever their shape."""
-    half, n = len(walkers) // 2, walkers.shape[1]
+    half, n, value = len(walkers) // 2, walkers.shape[1], likelihood(walkers)
     for turn in range(2 * _SWEEPS):
         moved, others = slice(0, half), walkers[half:]
         if turn % 2:
@@ -215,10 +196,6 @@ def _stretched(
         walkers[moved] = np.where(taken[:, None], tried, walkers[moved])
         value[moved] = np.where(taken, there, value[moved])
     return walkers
-
-
-def _model(theta: FloatArray, numerator: FloatArray) -> PlausibleModel:
-    return PlausibleModel(float(theta[0]), poles_from_parameters(theta[None, 1:])[0][0], numerator)
 
 
 def _directions(covariance: FloatArray, widest: FloatArray) -> FloatArray:

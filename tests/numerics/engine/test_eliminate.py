@@ -7,7 +7,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from ctrl_realize.numerics.engine.batch_search import fit_batch
-from ctrl_realize.numerics.engine.eliminate import compress, eliminate, evaluate
+from ctrl_realize.numerics.engine.eliminate import compress, drawn_numerators, eliminate, evaluate
 from ctrl_realize.numerics.engine.local_terms import Segments
 from ctrl_realize.numerics.engine.modal import respond
 from ctrl_realize.numerics.engine.poles import parameters_from_poles
@@ -248,4 +248,23 @@ def test_the_residual_is_that_of_weighted_least_squares():
         assert state.regression[row, 0] == pytest.approx(best[1])
 
 
-# --- steps
+@pytest.mark.parametrize("made", [behind_known(TRAIN), two_records], ids=["steps", "own"])
+def test_drawn_numerators_scatter_by_linear_least_squares(made):
+    # At given dead time and poles numerators are linear: the covariance of white noise of unit
+    # variance is that of the fits to unit errors in each sample, W W^T.
+    x, structure = np.concatenate([[7.3], THETA[2]])[None], Structure(2, 1)
+    weight = np.linspace(0.5, 2.0, 300)
+    data = np.random.default_rng(1).normal(size=300).cumsum()
+
+    def numerator(values):
+        return eliminate(made(values, weight), structure, x).numerator[0]
+
+    unit = np.array([numerator(row) for row in np.diag(1 / weight)])
+    exact = 0.5**2 * unit.T @ unit
+    rng = np.random.default_rng(2)
+    drawn = drawn_numerators(made(data, weight), structure, np.tile(x, (4000, 1)), 0.5, rng)
+    # a variance of 4000 draws has a relative standard error of 2.2 %, a mean one of 1.6 % of its
+    # standard deviation: four of them
+    std = np.sqrt(np.diag(exact))
+    assert_allclose(np.cov(drawn.T) / np.outer(std, std), exact / np.outer(std, std), atol=0.09)
+    assert_allclose((drawn.mean(axis=0) - numerator(data)) / std, 0.0, atol=0.064)
