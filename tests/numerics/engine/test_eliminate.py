@@ -227,12 +227,6 @@ def noisy(gain=2.0, level=5.0, noise=0.02, seed=0):
     return clean + noise * np.random.default_rng(seed).standard_normal(SIZE)
 
 
-# --- responses
-
-
-# --- elimination
-
-
 def test_the_residual_is_that_of_weighted_least_squares():
     data, weight = noisy(), np.linspace(0.5, 2.0, SIZE)
     trials = TRUTH + np.array([[0.0, 0.0], [0.7, 0.2], [-1.0, -0.5]])
