@@ -14,7 +14,7 @@ from ..delayed import DelayedStateSpace
 from ..errors import DataError, OptionError, OrderError
 from ..numerics.arrays import FloatArray
 from ..numerics.blas_threads import single_threaded
-from ..numerics.rational.error_floor import fit_with_floor
+from ..numerics.rational.error_floor import fits_with_unknown_errors
 from ..numerics.rational.frf_data import FRFData
 from ..numerics.rational.search import DEFAULT_ORDERS, dead_time_bound, fit_structures
 from ..numerics.rational.spectra import hold_response
@@ -66,9 +66,8 @@ def fit_frf(
     weighting : {"auto", "std", "relative", "uniform"}
         "std": the FRF's standard deviation. "relative": an error proportional to the response,
         weighted by the coherence if there is one. "uniform": the same error everywhere. "auto":
-        "std" if there is one, otherwise "relative", with a floor if the residuals have one: with
-        relative weights noise that does not fall with the response, as at an anti-resonance, would
-        outweigh all other points.
+        "std" if there is one, "relative" if there is a coherence, and otherwise what the residuals
+        tell: a relative error, the same one everywhere, or a relative one with a floor.
     hold : {"auto", "zoh", None}
         "zoh": the FRF was estimated from samples of a held input, and so is the response of the
         model (`dt` must be its sample time if the FRF has none), aliases included. "auto": do so if
@@ -101,6 +100,8 @@ def fit_frf(
 
     If the noise is not known, the standard deviations of the poles are computed from the residuals
     of the individual points [3]_: poles that depend on a noisy part of the band are more uncertain.
+    Where the residuals do not tell a relative error from one that is the same everywhere, the
+    interval covers both.
 
     The flag ``"phase_leads"`` reports an FRF whose time axis starts late, ``"systematic_error"``
     that poles beyond the fourth describe what may be an error of all points of unknown noise; the
@@ -170,13 +171,13 @@ def fit_frf(
         held=(held or 0.0) * unit,
     )
     if points.assumed:
-        data, fits = fit_with_floor(data, orders, degrees)
-        sigma = size / data.weight
+        ways = fits_with_unknown_errors(data, orders, degrees)
+        sigma = size / ways[0][0].weight
     else:
-        fits = fit_structures(data, orders, degrees)
+        ways = [(data, fit_structures(data, orders, degrees))]
     used = replace(points, response=response, sigma=sigma)
     stated = order is not None or relative_degree is not None
-    return chosen_model(frf, data, fits, used, unit, size, sample_time, held, name, stated=stated)
+    return chosen_model(frf, ways, used, unit, size, sample_time, held, name, stated=stated)
 
 
 def _searchable(max_dead_time: float, omega: FloatArray) -> float:

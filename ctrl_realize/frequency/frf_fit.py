@@ -72,8 +72,8 @@ class FRFFit(FractionalDelayFit):
         Points that were fitted. The hold of a sampled FRF was divided out, and the aliases were
         taken out that a held input has in the model.
     sigma : ndarray, shape (K,)
-        Standard deviation used as weight of each point; if the FRF had none a relative one, with a
-        floor where the residuals have one.
+        Standard deviation used as weight of each point; if the FRF had none a relative one, the
+        same everywhere, or between the two, as the residuals tell.
     noise_known : bool
         Whether `sigma` is the measured standard deviation.
     weighted_rms : float

@@ -55,8 +55,8 @@ more (two were unstable below the band), and of 14 stable ones none by more than
 
 
 def chosen_model(
-    frf: Any, data: FRFData, fits: dict[Structure, Candidate], points: FRFPoints, unit: float,
-    size: float, dt: float, held: float | None, name: str | None, *, stated: bool,
+    frf: Any, ways: list[tuple[FRFData, dict[Structure, Candidate]]], points: FRFPoints,
+    unit: float, size: float, dt: float, held: float | None, name: str | None, *, stated: bool,
 ) -> DelayedStateSpace:  # fmt: skip
     """Choose the structure, state the uncertainty and build the model.
 
@@ -64,10 +64,9 @@ def chosen_model(
     ----------
     frf : control.FrequencyResponseData
         As it was measured.
-    data : FRFData
-        Frequencies in units of `unit` rad/s, responses in units of `size`.
-    fits : dict
-        (order, relative degree) -> fit.
+    ways : list of FRFData, dict
+        Frequencies in units of `unit` rad/s, responses in units of `size`, and the fits of all
+        structures; then those with other weights that are not ruled out.
     points : FRFPoints
         What was fitted, in the measurement's own units.
     unit, size : float
@@ -80,14 +79,20 @@ def chosen_model(
         Whether order or relative degree were given.
     """
     frequency, noise_known = points.frequency_hz, points.noise_known
+    (data, fits), *others = ways
     compared = compared_fits(data, fits, unit, noise_known)
     fits, rows, scales = compared.fits, compared.rows, compared.scales
     best = rows[0]
     n, r = best.order, best.relative_degree
     chosen = fits[key_of(best)]
     ends = [compared.interval(data, key_of(row), solved=row is best) for row in compared.near]
-    within = [(low / unit, high / unit) for low, high in ends]
-    interval, flags = _cover(rows, within, data.max_dead_time / unit, 1 / float(frequency[-1]))
+    beside = []
+    for other, its in others:
+        more = compared_fits(other, its, unit, noise_known)
+        beside.append(more.interval(other, key_of(more.rows[0]), solved=True))
+    within, beside = ([(low / unit, high / unit) for low, high in e] for e in (ends, beside))
+    bound, shortest = data.max_dead_time / unit, 1 / float(frequency[-1])
+    interval, flags = _cover(rows, within, beside, bound, shortest)
     ratio = residual_ratio(data, chosen)
     if not noise_known and n > max(DEFAULT_ORDERS) and ratio < _ACCURACY:
         interval, systematic = _of_lower_orders(data, compared, unit, interval)
@@ -241,17 +246,25 @@ def _of_lower_orders(
 
 
 def _cover(
-    rows: list[FRFStructure], within: list[tuple[float, float]], bound: float, shortest: float
+    rows: list[FRFStructure],
+    within: list[tuple[float, float]],
+    beside: list[tuple[float, float]],
+    bound: float,
+    shortest: float,
 ) -> tuple[tuple[float, float], list[Flag]]:
-    """Widen the best structure's interval to those that the data do not tell from it."""
+    """Widen the best structure's interval to those that the data do not tell from it.
+
+    Those of other weights are ``beside``.
+    """
     best, interval = rows[0], within[0]
     ends = np.array(within)
     # exp(-BIC / 2) is the evidence for a structure: the interval is that of the mixture.
     share = np.exp(-0.5 * np.array([row.bic - best.bic for row in rows[: len(within)]]))
     spread = np.maximum((ends[:, 1] - ends[:, 0]) / (2 * Z_95), 1e-12 * bound)
     centre = ends.mean(axis=1)
-    low = min(interval[0], mixture_quantile(0.025, centre, spread, share))
-    high = max(interval[1], mixture_quantile(0.975, centre, spread, share))
+    joined = np.array([interval, *beside])
+    low = min(joined[:, 0].min(), mixture_quantile(0.025, centre, spread, share))
+    high = max(joined[:, 1].max(), mixture_quantile(0.975, centre, spread, share))
     flags = []
     low, high = max(low, 0.0), min(high, bound)
     if high >= (1 - 1e-9) * bound:

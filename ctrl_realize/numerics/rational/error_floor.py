@@ -3,7 +3,7 @@
 An error in proportion to the response would be none at an anti-resonance, whose few points then
 outweigh all others; a floor is an error that is the same everywhere, as of a noisy sensor. Both are
 variances of the complex error, estimated from residuals by maximum likelihood [1]_ (a regression of
-variances, [2]_). There is a floor where the evidence for it is very strong.
+variances, [2]_).
 
 References
 ----------
@@ -26,53 +26,57 @@ from ..engine.problem import Structure
 from ..engine.structures import Candidate
 from .frf_data import FRFData
 from .search import (
-    DEFAULT_ORDERS,
-    MISSING,
     correlation_cost,
     fit_structures,
     information_criteria,
     information_criterion,
-    unexplained,
+    parameters,
 )
 
 _TRIED = 100  # floors over the range of the response: 10 % apart over four decades
 
 
-def fit_with_floor(
+def fits_with_unknown_errors(
     data: FRFData, orders: Sequence[int] | None, degrees: Sequence[int] | None
-) -> tuple[FRFData, dict[Structure, Candidate]]:
-    """Fit all structures to points with relative weights, and with a floor if the errors have one.
+) -> list[tuple[FRFData, dict[Structure, Candidate]]]:
+    """Fit all structures to points with relative, with uniform weights, and with a floor if seen.
 
-    Where relative weights explain little, or need many poles, the errors are seen in a fit with
-    uniform ones. The floor is used where model and floor have the lower information criterion.
+    Each kind of weights has a fit in which few points outweigh all others where the errors are of
+    the other kind: a floor is looked for in the residuals of both. The lowest information criterion
+    tells.
 
     Returns
     -------
-    data : FRFData
-        With the weights that were used.
-    fits : dict
+    list of FRFData, dict
+        The best, and those against which there is no very strong evidence.
     """
-    fits = fit_structures(data, orders, degrees)
-    seen, best = data, _best(data, fits)
-    if unexplained(data, best) > MISSING or best.structure.order > max(DEFAULT_ORDERS):
-        seen = replace(data, weight=np.ones(data.s.size))
-        best = _best(seen, fit_structures(seen, orders, degrees))
-    residual = seen.misfit(best) / seen.weight
-    floor = error_floor(np.abs(seen.response - residual), np.abs(residual))
-    if floor == 0:
-        return data, fits
-    other = replace(data, weight=1 / np.hypot(np.abs(data.response), floor))
-    again = fit_structures(other, orders, degrees)
+    uniform = replace(data, weight=np.ones(data.s.size))
+    ways = [(way, fit_structures(way, orders, degrees)) for way in (data, uniform)]
+    values = [_criterion(*way, 0) for way in ways]
+    for way, fits in ways[:2]:
+        residual = way.misfit(_best(way, fits)) / way.weight
+        floor = error_floor(np.abs(way.response - residual), np.abs(residual))
+        if floor:
+            between = replace(data, weight=1 / np.hypot(np.abs(data.response), floor))
+            ways.append((between, fit_structures(between, orders, degrees)))
+            values.append(_criterion(*ways[-1], 1))
     # A part of the response that the model does not follow is no noise.
-    is_noise = correlation_cost(other, _best(other, again)) == 1.0
-    less = _criterion(other, again, 1) < _criterion(data, fits, 0)
-    return (other, again) if is_noise and less else (data, fits)
+    noise = [True, *(correlation_cost(way, _best(way, fits)) == 1.0 for way, fits in ways[1:])]
+    taken = np.where(noise, values, np.inf)
+    return [ways[k] for k in np.argsort(taken) if taken[k] <= taken.min() + VERY_STRONG]
 
 
 def _criterion(data: FRFData, fits: dict[Structure, Candidate], floors: int) -> float:
-    """Information criterion of the best fit, for any weights: those of a density [1]_."""
+    """Information criterion of the best fit, for any weights: those of a density [1]_.
+
+    The variance is that without bias: what a model with a parameter for every third number leaves
+    in points of small errors is no sign of them.
+    """
+    best, count = _best(data, fits), 2 * data.s.size
     weights = 4 * float(np.sum(np.log(data.weight)))
-    return information_criterion(data, _best(data, fits), 2 * data.s.size, floors) - weights
+    freedom = max(count - parameters(best), 1)
+    own = information_criterion(data, best, count, floors)
+    return float(own - count * np.log(freedom) - weights)
 
 
 def _best(data: FRFData, fits: dict[Structure, Candidate]) -> Candidate:
