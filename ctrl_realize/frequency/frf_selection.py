@@ -262,9 +262,9 @@ def _cover(
     share = np.exp(-0.5 * np.array([row.bic - best.bic for row in rows[: len(within)]]))
     spread = np.maximum((ends[:, 1] - ends[:, 0]) / (2 * Z_95), 1e-12 * bound)
     centre = ends.mean(axis=1)
-    joined = np.array([interval, *beside])
-    low = min(joined[:, 0].min(), mixture_quantile(0.025, centre, spread, share))
-    high = max(joined[:, 1].max(), mixture_quantile(0.975, centre, spread, share))
+    lows, highs = zip(interval, *beside, strict=True)
+    low = min(*lows, mixture_quantile(0.025, centre, spread, share))
+    high = max(*highs, mixture_quantile(0.975, centre, spread, share))
     flags = []
     low, high = max(low, 0.0), min(high, bound)
     if high >= (1 - 1e-9) * bound:
