@@ -72,7 +72,8 @@ def read_record(
         Column or tag of the controller's mode: ``MAN`` or ``AUTO``, ``CAS``, 0 or 1. In manual the
         set point is not in force, and NaN. Default: ``MODE``, ``A/M``, ..., if there is one.
     dt : float, optional
-        Sample time in s, where there is no time column.
+        Sample time in s, where there is no time column or its clock is coarser; other times are
+        refused.
     time_unit : str, optional
         ``"s"``, ``"ms"``, ``"us"``, ``"ns"``, ``"min"``, ``"h"`` or ``"day"``. ``"auto"``: that of
         the header, or s. For a clock such as ``12:34`` it is the unit of the first number.

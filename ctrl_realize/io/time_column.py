@@ -27,7 +27,8 @@ _CLOCK = rf"{_SHORT}|\d{{1,3}}:\d{{2}}:\d{{2}}(\.\d*)?"
 _PART = re.compile(r"(?<=:\d\d)[,;:](?=\d{3,}$)")
 """Sign before a part of a second, as some controllers write it."""
 _FIRST = {"hh:mm": "h", "h:mm": "h", "h:min": "h", "mm:ss": "min", "m:ss": "min", "min:s": "min"}
-_AS_STATED = 0.01  # relative difference of the usual step from the sample time in the header
+AS_STATED = 0.01
+"""Relative difference of the usual step from the sample time in the header, or from `dt`."""
 
 
 class TimeAxis(NamedTuple):
@@ -111,9 +112,9 @@ def _stated_unit(table: Table, index: int) -> str:
     (name, value), step = *list(stated.items())[:1], float(np.median(np.diff(table.numbers(index))))
     unit = sample_time_unit(name)
     # several columns of time, each with its own
-    if np.isnan(value) or np.isclose(step, value, rtol=_AS_STATED):
+    if np.isnan(value) or np.isclose(step, value, rtol=AS_STATED):
         return unit
-    if np.isclose(step, to_seconds(np.asarray(value), unit), rtol=_AS_STATED):
+    if np.isclose(step, to_seconds(np.asarray(value), unit), rtol=AS_STATED):
         return "s"
     raise OptionError(
         f"{table.at(index)} runs in steps of {step:g}, and the file states {name} {value:g}; give "

@@ -489,6 +489,39 @@ def test_a_clock_of_seconds_may_show_what_a_day_count_shows_but_is_not_coarse(tm
     assert read_record(file, dt=0.1).n_samples == 40
 
 
+@pytest.mark.parametrize(
+    ("header", "cells", "dt"),
+    [
+        ("time [s]", [f"{2 * k}" for k in range(30)], 2.0),
+        ("time [ms]", [f"{2000 * k}" for k in range(30)], 2.0),
+        ("time [s]", [f"{k / 3:.2f}" for k in range(30)], 1 / 3),
+        ("time [s]", [f"{math.floor(1.25 * k)}" for k in range(101)], 1.25),
+        ("time", [f"2026-03-04 09:{k // 30:02d}:{2 * (k % 30):02d}" for k in range(90)], 2.0),
+    ],
+)
+def test_a_sample_time_other_than_that_of_the_time_column_is_refused(tmp_path, header, cells, dt):
+    file = tmp_path / "log.csv"
+    lines = "".join(f"{cell},{k % 2},{k}\n" for k, cell in enumerate(cells))
+    file.write_text(f"{header},u,y\n{lines}")
+    assert read_record(file, dt=dt).dt == dt
+    with pytest.raises(OptionError, match=r"has times every [\d.]+ s, and dt=5 s .* omit dt="):
+        read_record(file, dt=5.0)
+
+
+def test_a_time_column_that_is_not_clear_leaves_the_sample_time(tmp_path):
+    file = tmp_path / "log.csv"
+    lines = "".join(f"{2 * k},{k % 2},{k}\n" for k in range(30))
+    file.write_text("t,u,y\n" + lines)
+    with pytest.warns(DataWarning, match="column 't' has times every 2, without a unit; dt=5 s"):
+        assert read_record(file, dt=5.0).dt == 5.0
+    assert read_record(file, dt=2.0).dt == 2.0
+    file.write_text("t,u,y\n" + lines.replace("0,", "noon,", 1))
+    assert read_record(file, dt=5.0).dt == 5.0
+    file.write_text("time [s],u,y\n0,1,2\n")
+    with pytest.raises(DataError, match=r"time has shape \(1,\)"):
+        read_record(file, dt=5.0)
+
+
 @pytest.mark.parametrize("start", ["2025-01-31 23:59:30", "2025-01-02 23:59:30"])
 @pytest.mark.parametrize(
     "form",

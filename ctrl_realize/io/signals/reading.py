@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import re
+import warnings
 from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -11,17 +13,18 @@ from typing import Any
 import numpy as np
 
 from ..._checks import one_of, positive
+from ..._wording import ASSUMED
 from ...data import Record
 from ...data.samples import COARSE, Samples
-from ...errors import DataError, OptionError, TimeAxisError, warn_caller
+from ...errors import CtrlRealizeError, DataError, OptionError, TimeAxisError, warn_caller
 from ...numerics.signals.noise import far_value
 from ..frf import parts_of_frf
 from ..read import read_table
 from ..tables import Table
 from ..text_options import TextOptions
-from ..time_column import Clock, time_axis
+from ..time_column import AS_STATED, Clock, time_axis
 from .long_format import LongTable, long_table, tags_as_columns
-from .names import Parts, choose_columns
+from .names import Parts, choose_columns, clocks_of, dates_of
 from .quality import Rows, Rules, rules_of
 from .samples import check_part, labels_of, long_samples, span_of, wide_axis, wide_samples
 
@@ -146,12 +149,39 @@ def _samples(table: Table, how: Reading, taken: Sequence[int]) -> tuple[Samples,
         check_part(table.path, span, samples.time, axis)
         return samples, labels_of(signals, parts, axis.unit)
     parts = how.parts(table, [*taken, *how.rules.columns(table)])
+    if how.dt is not None:
+        _check_sample_time(table, how, [*taken, *parts.inputs, *parts.outputs])
     axis, rows = wide_axis(table, parts, how.clock)
     span = span_of(how.start, how.stop, axis)
     inside = (axis.seconds >= span[0]) & (axis.seconds <= span[1])
     check_part(table.path, span, axis.seconds[inside], axis)
     samples = wide_samples(table, parts, axis.seconds[inside], rows[inside], how.rules)
     return samples, labels_of(table, parts, axis.unit)
+
+
+@np.errstate(over="ignore", invalid="ignore")  # the largest doubles
+def _check_sample_time(table: Table, how: Reading, taken: Sequence[int]) -> None:
+    """Refuse a sample time beside a time column of other steps; without a unit it is told."""
+    clocks = clocks_of(table, taken)
+    axis = None
+    with suppress(CtrlRealizeError), warnings.catch_warnings(action="ignore"):
+        if len(clocks) == 1:
+            date = next(iter(dates_of(table, clocks[0], taken)), None)
+            axis = time_axis(table, clocks[0], how.clock, date)
+    if axis is None or axis.seconds.size < 2:  # no times: dt= is in their place
+        return
+    steps = np.diff(axis.seconds)
+    usual = np.array([np.median(steps), steps.mean()])  # with samples missing, with rounded stamps
+    if np.mean(steps == 0) > COARSE or np.isclose(usual, how.dt, rtol=AS_STATED).any():
+        return
+    said = f"{table.at(clocks[0])} has times every {usual[0]:g}"
+    if axis.unit == ASSUMED:
+        warn_caller(f"{said}, without a unit; dt={how.dt:g} s is used in their place")
+    else:
+        raise OptionError(
+            f"{said} s, and dt={how.dt:g} s is for files without times; omit dt=, or give "
+            "time_unit= if the times are in another unit"
+        )
 
 
 def tests_in(table: Table, how: Reading, separating: Sequence[int]) -> list[tuple[str, Rows]]:
