@@ -43,6 +43,20 @@ def test_stamps_of_full_precision_move_by_a_hundredth_of_their_distance_at_most(
     assert np.abs(record.time[seen] - stamps).max() < 0.01 * np.median(np.diff(stamps))
 
 
+@pytest.mark.parametrize("dropped", [False, True])
+@pytest.mark.parametrize("missing", [0.2, 0.5, 0.8])
+@pytest.mark.parametrize("step", [1 / 3, 1 / 1280, 7 / 60, 10.0])
+def test_regular_samples_of_which_some_are_missing_keep_their_step(step, missing, dropped):
+    """Beside an input that moves between the samples, so that the time axis is finer."""
+    time, rng = step * np.arange(400), np.random.default_rng(1)
+    y = np.where(rng.random(400) < missing, np.nan, rng.standard_normal(400))
+    keep = ~np.isnan(y) if dropped else np.full(400, True)
+    moves = [0.0, 100.37 * step]
+    record = cr.Record.from_samples(time[keep], [0.0, 1.0], y[keep], input_time=moves)
+    assert record.dt < 0.5 * step
+    assert_allclose(record.sample_time, step, rtol=1e-9)
+
+
 def test_an_input_stored_at_its_changes_is_held_from_each_to_the_next():
     changes, levels = np.array([-5.0, 37.0, 61.0]), np.array([1.0, 4.0, 2.0])
     time = 10.0 * np.arange(12)

@@ -14,8 +14,6 @@ from .resampling import MAX_DENSER, MIN_SAMPLES
 
 _AS_IT_IS = 1.5
 """Steps of the time axis from which on the distance of samples is no step of it."""
-_NEXT_TO_ANOTHER = 0.05
-"""Share of samples one step behind another, from which on they are regular, with many missing."""
 
 
 def on_one_axis(
@@ -71,9 +69,7 @@ def on_one_axis(
         for row, values in zip(known, np.atleast_2d(u), strict=True)
     ])  # fmt: skip
     measured = stamps[seen & ~np.isnan(np.atleast_2d(y)).all(axis=0)]
-    apart = np.diff(measured) / step
-    regular = regular_step(every) or np.mean(apart < _AS_IT_IS) > _NEXT_TO_ANOTHER
-    usual = step if regular else usual_step(measured)
+    usual = step if regular_step(every) else regular_step(measured) or usual_step(measured)
     signals = axis, drives[0] if u.ndim == 1 else drives, spread
     return signals, usual if usual > _AS_IT_IS * step else step
 

@@ -213,8 +213,9 @@ class RecordConversions(Drawable):
         -------
         Record
             With ``missing="keep"``. It starts with the first sample of the input. Its `sample_time`
-            is `dt` for regular samples, otherwise the median distance of the outputs, as short a
-            number as their jitter allows (1 s for stamps about 1.001 s apart).
+            is the step of regular samples, some of which may be missing, otherwise the median
+            distance of the outputs, as short a number as their jitter allows (1 s for stamps about
+            1.001 s apart).
 
         Raises
         ------

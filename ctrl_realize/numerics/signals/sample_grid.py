@@ -22,6 +22,7 @@ _WHOLE = 1e-3  # of the last decimal: rounding of stamps of 1e9 s is 2e-7 s
 _FINER = 50  # times as fine as the usual step
 _LARGEST = 2.0**53  # whole number that a float holds exactly
 _TURNS = 4  # of the step of regular samples, each from steps over longer gaps
+_NEXT_TO_ANOTHER = 0.05  # share of samples one step behind another, with many missing
 _ROUNDED = 0.01  # of the usual step of irregular samples, by which it may be rounded
 
 
@@ -78,9 +79,22 @@ def usual_step(stamps: FloatArray) -> float:
 
 
 def regular_step(stamps: FloatArray) -> float:
-    """Step of regular samples some of which are missing; 0 if they are not regular."""
+    """Step of regular samples some of which are missing; 0 if they are not regular.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from ctrl_realize.numerics.signals.sample_grid import regular_step
+    >>> regular_step(np.array([0, 2, 4, 5, 7, 9, 11]) / 3) * 3, regular_step(np.array([0, 1, 2.4]))
+    (1.0, 0.0)
+    """
+    starts = np.quantile(np.diff(stamps), [0.5, _NEXT_TO_ANOTHER])
+    return next(filter(None, (_refined_step(stamps, float(one)) for one in starts)), 0.0)
+
+
+def _refined_step(stamps: FloatArray, step: float) -> float:
+    """Step of regular samples near a first value; 0 if they are not regular."""
     steps = np.diff(stamps)
-    step = float(np.median(steps))
     for _ in range(_TURNS):
         counts = np.floor(steps / step + 0.5)
         if counts.min() < 1:
