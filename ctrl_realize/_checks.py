@@ -182,7 +182,14 @@ def one_of(value: Choice, name: str, choices: tuple[str, ...]) -> Choice:
         for choice in choices:
             if value.casefold() == choice.casefold():
                 return cast(Choice, choice)
+        value = cast(Choice, str(value))  # without the type of NumPy's text in the message
     raise OptionError(f"{name}={value!r}; choose one of {', '.join(map(repr, choices))}")
+
+
+def each_of(values: Any, name: str, choices: tuple[str, ...]) -> list[str]:
+    """Return the choices that one name, or each of several, names, ignoring case."""
+    several = isinstance(values, Iterable) and not isinstance(values, str)
+    return [one_of(value, name, choices) for value in (values if several else [values])]
 
 
 def check_type(

@@ -82,6 +82,50 @@ def test_values_that_make_no_sense_are_refused():
             call()
 
 
+DELAYED = ct.tf([2.0], [3.0, 1]) * cr.delay(0.7)
+TWO = ct.ss(-np.eye(2), np.eye(2), np.eye(2), 0)
+SAYS = {
+    "controller is a MeasuredFRF; expected": lambda: cr.design.performance(DELAYED, FRF),
+    "controller is a NoneType; expected": lambda: cr.design.performance(DELAYED, None),
+    "controller is a str; expected": lambda: cr.design.performance(PLANT, "PI"),
+    "needs one input and one output": lambda: cr.design.smith_predictor(DELAYED, TWO),
+    "got a NoneType; expected a control.StateSpace": lambda: ct.feedback(PLANT, None),
+    "got a complex128; expected a control.StateSpace": lambda: DELAYED.feedback(np.complex128(1j)),
+    "got the divisor nan; expected a finite number": lambda: DELAYED / np.nan,
+    "got the divisor inf; expected a finite number": lambda: PLANT / np.inf,
+    "got the divisor 0.0; expected": lambda: DELAYED / 0.0,
+    "got the divisor 0; expected": lambda: PLANT / 0,
+    "timepts=nan; expected a finite number": lambda: PLANT.step_response(np.nan),
+    "timepts=inf; expected a finite number": lambda: PLANT.impulse_response(np.inf),
+    "timepts=-1; expected a value >= 0": lambda: PLANT.step_response(-1),
+    "timepts='x'; expected a finite number": lambda: DELAYED.step_response("x"),
+    "a system is a float; expected": lambda: cr.interconnect([PLANT, 1.0]),
+    "systems is a DelayedStateSpace; expected a list": lambda: cr.interconnect(PLANT),
+    "expected a Record, .* got a NoneType": lambda: cr.valves.valve_report(None),
+    "rule=3.0; choose one of 'simc'": lambda: cr.design.compare_pid(PLANT, 3.0),
+    "rule='imcc'; choose one of 'simc'": lambda: cr.design.pid(PLANT, np.str_("imcc")),
+    "rule='itae_load' is for models with a lag": lambda: cr.design.pid(INTEGRATING, "itae_load"),
+    "rule='chr_load_0' is for models": lambda: cr.design.pid(INTEGRATING, "chr_load_0"),
+    "form=\\[\\]; choose one of 'ideal'": lambda: PID.as_form([]),
+    "uncertainty is a .*; expected that of": lambda: cr.design.robust_stability(PLANT, PID),
+}
+INTEGRATING = ct.tf([1.0], [1, 0]) * cr.delay(0.7)
+
+
+@pytest.mark.parametrize("words", SAYS)
+def test_what_is_wrong_is_said_in_our_words(words):
+    with pytest.raises(CtrlRealizeError, match=words):
+        SAYS[words]()
+
+
+def test_one_delay_and_one_rule_need_no_list_and_a_form_no_capitals():
+    system = cr.DelaySystem(TWO, 0.3)
+    assert system.internal_delays == cr.DelaySystem(TWO, [0.3]).internal_delays == (0.3,)
+    assert len(cr.design.compare_pid(PLANT, "simc", "PI").controllers) == 1
+    slow = cr.design.PIDController(0.5, 120.0, time_unit="min")
+    assert slow.as_form("Ideal").values == slow.as_form("ideal").values
+
+
 @pytest.mark.parametrize("wrong", [{"td": -1.0}, {"tf": -1.0}])
 def test_times_of_a_pid_are_not_negative(wrong):
     with pytest.raises(cr.errors.OptionError, match=r"t[df]=-1"):

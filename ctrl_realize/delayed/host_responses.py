@@ -14,7 +14,7 @@ import control as ct
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .._checks import finite
+from .._checks import finite, not_negative
 from ..errors import DataError, UnsuitableSystemError
 from ..numerics.arrays import ComplexArray, FloatArray, IntArray
 from ..numerics.internal_delays.form import DelayForm
@@ -328,7 +328,8 @@ class HostResponses(HostMargins):
         if timepts is None:
             count = self._settling_samples()
         elif np.size(timepts) == 1:
-            count = int(float(np.ravel(timepts)[0]) / dt) + 1
+            end = not_negative(np.asarray(timepts).item(), "timepts", "time in s")
+            count = int(end / dt) + 1
         else:
             return self._times(timepts, 0)
         return self._times(None, count)

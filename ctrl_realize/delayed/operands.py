@@ -96,13 +96,15 @@ def check_proper(system: ct.TransferFunction, purpose: str) -> None:
 
 
 def check_divisor(system: Any) -> None:
-    """Check that the inverse of a divisor without delay is proper.
+    """Check that a divisor without delay is not 0, and that its inverse is proper.
 
     Raises
     ------
     UnsuitableSystemError
     """
     lower = False
+    if isinstance(system, Numbers) and not (np.isfinite(system) and system):
+        raise UnsuitableSystemError(f"got the divisor {system}; expected a finite number, not 0")
     if isinstance(system, ct.TransferFunction) and system.issiso():
         num, den = (np.trim_zeros(part[0][0], "f") for part in (system.num, system.den))
         lower = num.size < den.size

@@ -168,9 +168,9 @@ class DelayOperators(DeferredMatrices):
             The feedthroughs of both form an algebraic loop without a solution, or the time bases
             differ.
         """
-        if not is_linear(other):
+        if not is_linear(other) and isinstance(other, (ct.NonlinearIOSystem, list, tuple)):
             return super().feedback(other, sign)
-        if isinstance(other, Numbers):
+        if isinstance(other, Numbers) and np.isrealobj(other):
             other = float(other) * np.eye(self.ninputs, self.noutputs)
         forward, back = self._form(), form_of(other)
         if (back.inputs, back.outputs) != (forward.outputs, forward.inputs):

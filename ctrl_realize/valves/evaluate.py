@@ -10,8 +10,7 @@ import numpy as np
 
 from .._flags import Flag, flagged
 from ..data import Record
-from ..data.given import as_record, check_complete
-from ..errors import DataError
+from ..data.given import as_records, check_complete
 from ..numerics.valve_test.play import slope_of
 from .flags import flags_of
 from .groups import Interval, grouped, linear_fit
@@ -107,9 +106,7 @@ def valve_report(
     >>> print(f"{1e3 * report.metric('t86').interval.value:.0f} ms")
     205 ms
     """
-    given = (records,) if isinstance(records, Record) else tuple(map(as_record, records))
-    if not given:
-        raise DataError("there are no records; expected at least one")
+    given = as_records(records)
     for record in given:
         check_complete(record, "a valve test")
     check_limits(limits)

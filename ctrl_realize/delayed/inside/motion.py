@@ -104,7 +104,7 @@ class Motion(InsidePoles):
     def _motion_times(self, timepts: ArrayLike | float | None) -> FloatArray:
         """Check the given times, or make those up to an end or until the response has settled."""
         if timepts is None or np.size(timepts) == 1:
-            end = self._settling() if timepts is None else float(np.ravel(timepts)[0])
+            end = self._settling() if timepts is None else np.asarray(timepts).item()
             end = positive(end, "timepts", "time in s")
             fastest = float(np.abs(self.dominant_poles(4)).max(initial=SMALLEST))
             return response_times(end, 1 / fastest, LEAST)

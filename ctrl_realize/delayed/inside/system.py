@@ -7,7 +7,7 @@ sums of those.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any, Self
 
 import control as ct
@@ -49,7 +49,7 @@ class DelaySystem(InsideResponses, InsideConversions, InsideCards, DelayOperator
     core : control.StateSpace
         With p + q outputs and m + q inputs; continuous, or discrete with a known sample time. A
         gain without delays may have the ``dt`` None, and adopts that of the other system.
-    internal_delays : sequence of float, optional
+    internal_delays : float or sequence of float, optional
         The q delays: whole samples for a discrete core, s for a continuous one. Those of 0 are
         closed at once.
     name, inputs, outputs : optional
@@ -111,14 +111,15 @@ class DelaySystem(InsideResponses, InsideConversions, InsideCards, DelayOperator
     def __init__(
         self,
         core: ct.StateSpace,
-        internal_delays: Sequence[float] = (),
+        internal_delays: float | Sequence[float] = (),
         *,
         name: str | None = None,
         inputs: str | Sequence[str] | None = None,
         outputs: str | Sequence[str] | None = None,
         time_unit: str = "s",
     ) -> None:
-        delays = tuple(real(d, "internal_delays", "delays >= 0") for d in internal_delays)
+        given = internal_delays if isinstance(internal_delays, Iterable) else (internal_delays,)
+        delays = tuple(real(d, "internal_delays", "delays >= 0") for d in given)
         dt = check_core(core, delays)
         check_delays(delays, core, dt)
         if dt:

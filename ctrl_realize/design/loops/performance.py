@@ -8,8 +8,10 @@ from typing import Any
 import control as ct
 import numpy as np
 
+from ..._checks import check_type
 from ..._wording import in_time
 from ...delayed import DelayedStateSpace, DelaySystem
+from ...delayed.operands import Numbers
 from ...errors import ModelWarning, UnsuitableSystemError, warn_caller
 from ...numerics.arrays import FloatArray
 from ...numerics.blas_threads import single_threaded
@@ -154,6 +156,10 @@ def performance(plant: DelayedStateSpace | DelaySystem, controller: Any) -> Perf
     """
     made = with_dead_time if is_continuous(plant) else delayed_system
     plant = made(plant, "the performance of a loop")
+    check_type(
+        controller, (ct.StateSpace, ct.TransferFunction, *Numbers), "controller",
+        "a linear system or a number", UnsuitableSystemError,
+    )  # fmt: skip
     warn_unresolved(plant)
     slow, turn = loop_times(plant, controller)
     if not plant.dt:

@@ -8,6 +8,7 @@ from typing import Any
 import control as ct
 import numpy as np
 
+from ..._checks import check_type
 from ...delayed import DelayedStateSpace, DelaySystem
 from ...numerics.arrays import FloatArray, read_only
 from ...numerics.blas_threads import single_threaded
@@ -177,6 +178,7 @@ def robust_stability(uncertainty: UncertaintyBound, controller: Any) -> Robustne
     10.00
     8.36
     """
+    check_type(uncertainty, UncertaintyBound, "uncertainty", "that of uncertainty_bound")
     plant = uncertainty.nominal
     nominal = margins(plant, controller)
     values = open_loop(plant, controller)(np.array(uncertainty.omega))

@@ -9,6 +9,7 @@ import numpy as np
 
 from ..._checks import positive
 from ...delayed import DelaySystem, delay
+from ...delayed.parts import check_single
 from ...errors import OptionError, UnsuitableSystemError
 from ..loops.loop_check import verified
 from ..siso import core_and_dead_time, proper_ss
@@ -45,6 +46,7 @@ def continuous_smith_predictor(
     if isinstance(controller, (int, float)):
         controller = ct.ss([], [], [], float(controller), 0)
     primary = proper_ss(controller, "a Smith predictor")
+    check_single(primary, "a controller for a Smith predictor")
     if not primary.isctime():
         raise UnsuitableSystemError(
             f"the controller has dt={primary.dt!r}, the plant is continuous; expected a continuous "

@@ -282,7 +282,8 @@ class PIDController(ShownSystem, BesideDelays):
           - source: Honeywell, HC900 Hybrid Control Designer Function Block Reference Guide,
             revision 11 (2007), page 281
         """
-        if time_unit is None and form in LAYOUTS and LAYOUTS[form].unit is None:
+        form = one_of(form, "form", tuple(LAYOUTS))
+        if time_unit is None and LAYOUTS[form].unit is None:
             time_unit = self.time_unit
         scaling = Scaling(measured_range, output_range, time_unit)
         proportional = 1.0 if setpoint_weight is None and derivative_weight else setpoint_weight

@@ -126,14 +126,14 @@ CHR_RULES: dict[str, dict[str, Parameters]] = {
 
 def _chr(rule: str, model: ProcessModel, kind: str, closed_loop_time: float | None) -> Parameters:
     """Chien, Hrones and Reswick (1952): fastest response to set-point or load, 0 or 20 % over."""
-    _needs_lag(model, "chr")
-    L, (kp, ti, td) = _dead_time(model, "chr"), CHR_RULES[rule][kind]
+    _needs_lag(model, rule)
+    L, (kp, ti, td) = _dead_time(model, rule), CHR_RULES[rule][kind]
     return kp * model.lag / (model.gain * L), ti * (L if "load" in rule else model.lag), td * L
 
 
 def itae_load(model: ProcessModel, kind: str, closed_loop_time: float | None) -> Parameters:
     """Lopez, Miller, Smith and Murrill (1967): least ITAE after a step of a load."""
-    r, T, K = _itae_ratio(model), model.lag, model.gain
+    r, T, K = _itae_ratio(model, "itae_load"), model.lag, model.gain
     if kind == "PI":
         return 0.859 * r**-0.977 / K, T / 0.674 * r**0.680, 0.0
     return 1.357 * r**-0.947 / K, T / 0.842 * r**0.738, 0.381 * T * r**0.995
@@ -141,15 +141,15 @@ def itae_load(model: ProcessModel, kind: str, closed_loop_time: float | None) ->
 
 def itae_setpoint(model: ProcessModel, kind: str, closed_loop_time: float | None) -> Parameters:
     """Rovira, Murrill and Smith (1969): least ITAE after a step of the set-point."""
-    r, T, K = _itae_ratio(model), model.lag, model.gain
+    r, T, K = _itae_ratio(model, "itae_setpoint"), model.lag, model.gain
     if kind == "PI":
         return 0.586 * r**-0.916 / K, T / (1.03 - 0.165 * r), 0.0
     return 0.965 * r**-0.85 / K, T / (0.796 - 0.1465 * r), 0.308 * T * r**0.929
 
 
-def _itae_ratio(model: ProcessModel) -> float:
+def _itae_ratio(model: ProcessModel, rule: str) -> float:
     """Ratio of dead time and lag, which these rules were fitted to between 0.1 and 1."""
-    _needs_lag(model, "itae")
+    _needs_lag(model, rule)
     ratio = model.dead_time / model.lag
     if not 0.1 <= ratio <= 1:
         raise UnsuitableSystemError(

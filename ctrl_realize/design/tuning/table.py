@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from ..._checks import one_of
+from ..._checks import each_of
 from ..._wording import in_time
 from ...data.shown_units import unit_among
 from ...errors import OptionError
@@ -160,8 +160,8 @@ class PIDComparison(Result):
 @single_threaded
 def compare_pid(
     system: Any,
-    rules: Sequence[str] | None = None,
-    kinds: Sequence[str] = ("PI", "PID"),
+    rules: str | Sequence[str] | None = None,
+    kinds: str | Sequence[str] = ("PI", "PID"),
     **options: Any,
 ) -> PIDComparison:
     """Tune by several rules and compare margins and step responses on the plant itself.
@@ -171,9 +171,9 @@ def compare_pid(
     system : DelayedStateSpace, DelaySystem or ProcessModel
         See `pid`. For the responses of a continuous plant and controller both are sampled finely
         (1000 samples per total time, 50 while the loop turns by 1 rad at its crossover).
-    rules : sequence of str, optional
+    rules : str or sequence of str, optional
         All by default.
-    kinds : sequence of str, optional
+    kinds : str or sequence of str, optional
     **options
         Further arguments of `pid`.
 
@@ -201,8 +201,7 @@ def compare_pid(
     >>> found.best(max_sensitivity=1.5).rule
     'optimal'
     """
-    tried = [one_of(rule, "rule", RULES) for rule in rules or RULES]
-    kinds = [one_of(kind, "kind", KINDS) for kind in kinds]
+    tried, kinds = each_of(rules or RULES, "rule", RULES), each_of(kinds, "kind", KINDS)
     plants = reference_plant(system, options.get("dt"))  # what no rule can tune is refused at once
     made: list[tuple[PIDController, Performance]] = []
     refused: list[tuple[str, str, str]] = []
