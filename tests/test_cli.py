@@ -137,6 +137,11 @@ def test_tune_tells_the_same_numbers_for_a_saved_model(tmp_path, capsys):
     assert of_the_record.endswith(rest)
     assert main(["tune", model, "--structures", "FOPDT"]) == 2
     assert "is a saved model" in capsys.readouterr().err
+    for files in ([model, str(file)], [str(file), model]):
+        assert main(["tune", *files, "--by", "run"]) == 2
+        told = capsys.readouterr().err
+        assert f"{model} is a saved model: expected options" in told
+        assert f"got {file}, --by; give the records alone" in told
 
 
 def test_a_record_is_told_from_a_saved_model_by_what_it_holds(tmp_path, capsys):

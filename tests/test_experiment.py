@@ -441,6 +441,9 @@ def test_what_is_refused():
         OptionError, match="are 300 samples; expected 314 to 20000, for a rest, the"
     ):
         cr.experiment.plan(late, **ASKED)
+    # 50 s and their rest, a fifth of the test, are 62.5 s, and two samples more
+    with pytest.raises(OptionError, match=r"a lower rate: .* take 62500002, of 20000 at most"):
+        cr.experiment.plan(late, **{**ASKED, "rate": 1e6})
     longer = cr.experiment.plan(late, **{**ASKED, "time": 314 / 5})
     assert longer.curve.time.min() == pytest.approx(314 / 5)
     assert longer.step.excursion > 0

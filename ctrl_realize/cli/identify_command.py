@@ -73,23 +73,25 @@ def run_tune(
 ) -> int:
     """Tune for one model of all records, or for a saved one, and return the exit code."""
     tuning = Tuning(tuned, entered)
-    if len(files) > 1 or not holds_model(files[0]):
+    saved = next(filter(holds_model, files), None)
+    if saved is None:
         return _identified(_Task(joint=True, tuning=tuning, **given), files, folder)
-    unused = [option_of(name) for kind in ("chosen", "tests", "record") for name in given[kind]]
+    unused = [str(one) for one in files if one != saved]
+    unused += [option_of(name) for kind in ("chosen", "tests", "record") for name in given[kind]]
     if folder is not None:
         unused.append("--output")
     if unused:
         raise OptionError(
-            f"{files[0]} is a saved model: expected options of the controller and --require only, "
-            f"got {', '.join(unused)}; give the records to have these"
+            f"{saved} is a saved model: expected options of the controller and --require only, "
+            f"got {', '.join(unused)}; give the records alone to have these"
         )
-    system, required = load_model(files[0]), _required(given["require"])
+    system, required = load_model(saved), _required(given["require"])
     if not isinstance(system, DelayedStateSpace) or (required and system.fit is None):
         raise UnsuitableSystemError(
-            f"{files[0]} holds no model of a plant that was identified; expected one written by "
+            f"{saved} holds no model of a plant that was identified; expected one written by "
             "identify, or without --require a DelayedStateSpace"
         )
-    say(printable(f"{files[0]}: {system!r}"))
+    say(printable(f"{saved}: {system!r}"))
     tuning.of(system)
     return _judged(system, required) if required else 0
 

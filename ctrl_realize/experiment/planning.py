@@ -155,9 +155,11 @@ def plan(
     count = round(length / dt)
     least = _least(known.model, dt)
     if not least <= count <= _MOST_SAMPLES:
+        room = f"{least} to {_MOST_SAMPLES}, for a rest, the dead time and a response"
+        if least > _MOST_SAMPLES:
+            room = f"a lower rate: dead time and response take {least}, of {_MOST_SAMPLES} at most"
         raise OptionError(
-            f"time={length:g} s at rate={1 / dt:g} are {count} samples; expected {least} to "
-            f"{_MOST_SAMPLES}, for a rest, the dead time and a response"
+            f"time={length:g} s at rate={1 / dt:g} are {count} samples; expected {room}"
         )
     heard = _noise(known, noise, noise_pole, resolution, dt)
     integrates = bool(np.any(known.model.poles == 0))

@@ -11,7 +11,7 @@ import numpy as np
 from ..data import Record, StepResponse
 from ..delayed import DelayedStateSpace, fit_of
 from ..delayed.parts import signals_of
-from ..errors import DelayRangeError
+from ..errors import DelayRangeError, OptionError
 from ..numerics.arrays import FloatArray
 from ..paper import SETTINGS
 from .realization.delay_scan import estimate_delay
@@ -81,6 +81,12 @@ def by_paper(
             "samples= and max_delay=, or use method='scan', which adapts them to the record"
         )
     cutoff = SETTINGS.cutoff_hz if cutoff_hz == "auto" else cutoff_hz
+    if cutoff_hz == "auto" and SETTINGS.cutoff_hz >= 0.5 / step.dt:
+        raise OptionError(
+            f"the settings of the paper filter at {cutoff:g} Hz, the record has {1 / step.dt:g} "
+            "samples per s; give cutoff_hz= below half of that, or use method='scan', which adapts "
+            "it to the record"
+        )
     impulse = impulse_from_step(step, cutoff_hz=cutoff, zero_phase=False, difference="central")
     n = SETTINGS.order if order is None else order
     direct = True if feedthrough is None else feedthrough

@@ -170,6 +170,8 @@ def model_to_text(
 
 def model_from_text(text: str) -> Model:
     """Make a model from the text that `save_model` has written; see `load_model`."""
+    if not text.lstrip().startswith("{"):
+        raise FileFormatError("not a model file; expected one that save_model or identify wrote")
     try:
         content = parsed(text)
     except (ValueError, RecursionError) as error:

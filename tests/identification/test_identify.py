@@ -9,6 +9,7 @@ from numpy.testing import assert_allclose
 from scipy.signal import lfilter
 
 import ctrl_realize as cr
+from ctrl_realize.errors import OptionError
 from tests.rigs import codes, step_record
 
 
@@ -22,6 +23,15 @@ def test_the_papers_method_is_the_paper_step_by_step():
     assert at_once.delay == by_hand.delay
     assert_allclose(at_once.markov(1101), by_hand.markov(1101), rtol=0, atol=0)
     assert isinstance(at_once.fit, cr.identification.DelayScan)
+
+
+def test_the_papers_filter_on_slow_samples_is_named_as_the_papers():
+    fast = step_record(noise=1e-3, seed=1)
+    slow = cr.Record(2.0 * np.arange(fast.n_samples), fast.input, fast.output)
+    with pytest.raises(OptionError, match=r"of the paper filter at 50 Hz, .* 0\.5 samples per s"):
+        cr.identify(slow, method="paper")
+    with pytest.raises(OptionError, match="cutoff_hz=50 Hz; expected"):
+        cr.identify(slow, method="paper", cutoff_hz=50.0)
 
 
 def test_the_paper_is_13_samples_late_and_says_so():

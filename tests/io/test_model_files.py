@@ -195,7 +195,7 @@ def test_content_that_makes_no_sense_is_refused_even_with_a_right_checksum(file,
         ('{"schema": 1, "schema": 1}', "a key occurs twice"),
         ("[]", "not a model file"),
         ("null", "not a model file"),
-        ("time,u,y\n0,1,2\n", "not a model file"),
+        ("time,u,y\n0,1,2\n", "not a model file; expected one that save_model or identify wrote$"),
         ("\x80\x04\x95", "not a model file"),
     ],
 )
