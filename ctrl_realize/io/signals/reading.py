@@ -22,9 +22,9 @@ from ..frf import parts_of_frf
 from ..read import read_table
 from ..tables import Table
 from ..text_options import TextOptions
-from ..time_column import AS_STATED, Clock, time_axis
+from ..time_column import AS_STATED, Clock, TimeAxis, time_axis
 from .long_format import LongTable, long_table, tags_as_columns
-from .names import Parts, choose_columns, clocks_of, dates_of
+from .names import Parts, choose_columns, clocks_of
 from .quality import Rows, Rules, rules_of
 from .samples import check_part, labels_of, long_samples, span_of, wide_axis, wide_samples
 
@@ -163,16 +163,14 @@ def _samples(table: Table, how: Reading, taken: Sequence[int]) -> tuple[Samples,
 def _check_sample_time(table: Table, how: Reading, taken: Sequence[int]) -> None:
     """Refuse a sample time beside a time column of other steps; without a unit it is told."""
     clocks = clocks_of(table, taken)
-    axis = None
+    axis = TimeAxis(np.empty(0))  # what is no time, or not one: dt= is in its place
     with suppress(CtrlRealizeError), warnings.catch_warnings(action="ignore"):
-        if len(clocks) == 1:
-            date = next(iter(dates_of(table, clocks[0], taken)), None)
-            axis = time_axis(table, clocks[0], how.clock, date)
-    if axis is None or axis.seconds.size < 2:  # no times: dt= is in their place
-        return
+        axis = time_axis(table, clocks[0], how.clock) if len(clocks) == 1 else axis
     steps = np.diff(axis.seconds)
+    if not steps.size or np.mean(steps == 0) > COARSE:
+        return
     usual = np.array([np.median(steps), steps.mean()])  # with samples missing, with rounded stamps
-    if np.mean(steps == 0) > COARSE or np.isclose(usual, how.dt, rtol=AS_STATED).any():
+    if np.isclose(usual, how.dt, rtol=AS_STATED).any():
         return
     said = f"{table.at(clocks[0])} has times every {usual[0]:g}"
     if axis.unit == ASSUMED:
