@@ -225,7 +225,7 @@ def correlation_of_noise(correlation: float, parameters: float) -> tuple[float, 
 def _correlation(residual: FloatArray) -> FloatArray:
     """Autocorrelation from lag 0 to where a pair is negative, in pairs: shape (K, 2)."""
     n = residual.size
-    centred = residual - residual.mean()
+    centred = residual - residual.sum() / max(n, 1)
     energy = float(centred @ centred)
     if n < 8 or energy == 0:
         return np.zeros((0, 2))

@@ -175,6 +175,11 @@ def test_clipped_noise_is_as_large_as_gaussian_noise_is():
     assert winsorised_sigma(spoilt, 0.0) == pytest.approx(3.0, rel=0.03)
 
 
+@pytest.mark.parametrize("count", [0, 1, 7])
+def test_too_few_samples_count_as_independent(count):
+    assert correlation_time(np.arange(float(count))) == 1.0
+
+
 @pytest.mark.parametrize("pole", [0.4, 0.7, 0.95])
 def test_the_correlation_time_of_a_lag(pole):
     found = correlation_time(5 + lfilter([1], [1, -pole], white(60_000)))
