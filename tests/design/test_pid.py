@@ -128,6 +128,30 @@ def test_the_optimal_controller_reaches_its_limit_on_sensitivity(valve, kind, li
     assert checked.ms == pytest.approx(limit, rel=1e-3)  # limit is read on a grid of 0.05 rad
 
 
+LAGS = 1 / np.array([1, 1.3, 1.7, 2.2, 2.9, 3.7])
+
+
+def in_parallel(lags):
+    """The series of the lags as their sum: residues of 150 cancel to a gain of 1e-16 beyond."""
+    residues = [1 / lag / np.prod([1 - other / lag for other in lags if other != lag])
+                for lag in lags]  # fmt: skip
+    return ct.ss(np.diag(-1 / lags), np.ones((lags.size, 1)), [residues], 0)
+
+
+@pytest.mark.parametrize(("core", "dead_time"), [
+    # rounding of a series of lags far above the slowest, and of a sum of lags that cancel
+    (ct.tf([1], np.poly(-1 / (6 * LAGS)) * np.prod(6 * LAGS)), 0.01),
+    (in_parallel(LAGS), 0.003), (in_parallel(LAGS), 0.2),
+])  # fmt: skip
+def test_an_optimal_controller_is_found_though_the_response_ends_in_rounding(core, dead_time):
+    (found,) = cr.design.compare_pid(core * cr.delay(dead_time), ["optimal"], ["PI"]).controllers
+    s = 1j * np.geomspace(1e-3, 1e2, 20_000)
+    lags = np.prod([1 - s / pole for pole in core.poles()], axis=0)
+    loop = found.kp * (1 + 1 / found.ti / s) / lags * np.exp(-s * dead_time)
+    # read on a grid of 0.05 rad, of a plant that is sampled 1000 times within its lags
+    assert np.max(1 / np.abs(1 + loop)) == pytest.approx(1.4, rel=2e-3)
+
+
 def test_no_neighbour_of_the_optimal_pi_is_better(valve):
     plant = valve(37)
     best = cr.design.pid(plant, "optimal", "PI", max_sensitivity=1.6)

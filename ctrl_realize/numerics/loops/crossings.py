@@ -19,12 +19,13 @@ from collections.abc import Callable
 
 import numpy as np
 
-from ..arrays import ComplexArray, FloatArray
+from ..arrays import BoolArray, ComplexArray, FloatArray, IntArray
 
 Curve = Callable[[FloatArray], ComplexArray]
 
 POINTS_PER_TURN = 16  # of the phase of a delay: 0.4 rad, less than what `follow` asks for
 MAX_REFINEMENTS = 24  # halvings: an interval is then a ten-millionth of what it was
+SMOOTH = 2  # halvings behind which few curves are left to be asked whether they are rounding
 MAX_STEPS = 100  # of a search for a root; smooth curves take six to eight
 
 
@@ -69,8 +70,9 @@ def follow(
     """Refine a grid until the curve turns by less than `largest_turn` rad between its points.
 
     Intervals whose ends differ by more than a factor of 2 in magnitude are halved too. A curve
-    through zero would need infinitely many points; the refinement stops after 24 halvings.
-    `values` are those of the curve on the grid, if they are known.
+    through zero would need infinitely many points; the refinement stops after 24 halvings, and
+    where the values are rounding, which no halving would make smooth. `values` are those of the
+    curve on the grid, if they are known.
 
     Returns
     -------
@@ -79,12 +81,14 @@ def follow(
         ``curve(grid)``.
     """
     values = curve(grid) if values is None else values
-    for _ in range(MAX_REFINEMENTS):
+    for halvings in range(MAX_REFINEMENTS):
         with np.errstate(divide="ignore", invalid="ignore"):
             ratio = values[1:] / values[:-1]
             growth = np.abs(np.log(np.abs(ratio)))
             coarse = (np.abs(np.angle(ratio)) > largest_turn) | (growth > 0.7)
         coarse &= np.isfinite(ratio) & (np.diff(grid) > 1e-13 * grid[1:])
+        if halvings >= SMOOTH:
+            coarse[coarse] = ~_rounded(curve, grid, values, np.flatnonzero(coarse), largest_turn)
         if not coarse.any():
             break
         middle = 0.5 * (grid[:-1] + grid[1:])[coarse]
@@ -92,6 +96,21 @@ def follow(
         grid = np.insert(grid, at, middle)
         values = np.insert(values, at, curve(middle))
     return grid, values
+
+
+def _rounded(
+    curve: Curve, grid: FloatArray, values: ComplexArray, at: IntArray, turn: float
+) -> BoolArray:
+    """Whether the curve jumps at both ends of intervals: far below its terms it is rounding.
+
+    Within a thousandth of an interval a smooth curve turns by a thousandth of half a turn at most.
+    A zero or pole on the axis may be at one end.
+    """
+    ends = np.stack([at, at + 1])
+    inside = grid[ends] + np.array([[1e-3], [-1e-3]]) * (grid[at + 1] - grid[at])
+    with np.errstate(divide="ignore", invalid="ignore"):
+        moved = np.abs(curve(inside.ravel()).reshape(ends.shape) / values[ends] - 1)
+    return np.asarray(np.all(moved > turn / 4, axis=0))
 
 
 def half_turns(values: ComplexArray) -> float:
@@ -164,7 +183,8 @@ def negative_axis_crossings(curve: Curve, grid: FloatArray, values: ComplexArray
 
     def height(omega: FloatArray) -> FloatArray:
         point = curve(omega)
-        return np.asarray(point.imag / np.abs(point), dtype=np.float64)
+        with np.errstate(invalid="ignore"):  # far below its terms a loop is rounded to 0
+            return np.asarray(point.imag / np.abs(point), dtype=np.float64)
 
     return _roots(height, grid[at], grid[at + 1])
 
