@@ -147,16 +147,3 @@ def interval_of_dead_time(
     if not 0 <= low <= high:
         raise OptionError(f"dead_time_interval=({low:g}, {high:g}); expected 0 <= low <= high in s")
     return low, high
-
-
-def held_fraction(system: DelayedStateSpace) -> float:
-    """Time in s by which the delay exceeds the identified dead time.
-
-    A dead time of (d + f) samples is represented by the delay d + 1 and a feedthrough; an interval
-    of the dead time refers to the former.
-    """
-    identified = None if system.fit is None else system.fit.dead_time
-    if identified is None:
-        return 0.0
-    over = float(system.dead_time) - float(identified)
-    return over if 0 < over < system.dt else 0.0

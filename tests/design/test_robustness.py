@@ -67,6 +67,30 @@ def test_an_interval_is_around_the_dead_time_and_not_around_the_delay_that_holds
     np.testing.assert_allclose(checked.table()["dead_time"], checked.dead_times)
 
 
+@pytest.mark.parametrize("samples", [2.21, 5.51, 13.87])
+def test_the_range_of_dead_times_is_that_of_the_plant_sampled_with_each(samples):
+    core, dt = ct.tf([2.0], [1, 1]), 0.05
+    system = cr.delayed_ss(core, dead_time=samples * dt, dt=dt)
+    controller = cr.design.pid(system)
+    found = cr.design.delay_robustness(system, controller, (samples * dt, 3 * samples * dt))
+    whole = int(np.ceil(samples))
+    # f from a feedthrough, which to_continuous solves for to 1e-9 of it
+    assert found.nominal_dead_time == pytest.approx(samples * dt, rel=1e-7)
+    assert found.fractional_time == pytest.approx((whole - samples) * dt, rel=1e-6)
+
+    def is_stable(later):
+        """Eigenvalues of the closed loop with the plant sampled later by whole samples."""
+        other = cr.delayed_ss(core, dead_time=(samples + later) * dt, dt=dt)
+        loop = ct.feedback(ct.ss(other), ct.ss(controller))
+        return np.abs(np.linalg.eigvals(loop.A)).max() < 1
+
+    last = next(later for later in range(200) if not is_stable(later + 1))
+    assert found.stable_to == pytest.approx((samples + last) * dt, rel=1e-7)
+    # the uncertainty of a dead time that is known is none
+    bound = cr.design.uncertainty_bound([], system, dead_time_interval=(samples * dt,) * 2)
+    assert bound.delay_part.max() < 1e-6
+
+
 TS = 0.01
 
 

@@ -12,14 +12,9 @@ from ...delayed import DelayedStateSpace
 from ...errors import OptionError
 from ...numerics.arrays import locked, read_only
 from ...numerics.blas_threads import single_threaded
+from ..models.conversions import held_fraction
 from ..resolved import warn_unresolved
-from ..siso import (
-    core_and_dead_time,
-    delayed_system,
-    held_fraction,
-    interval_of_dead_time,
-    is_continuous,
-)
+from ..siso import core_and_dead_time, delayed_system, interval_of_dead_time, is_continuous
 from .delay_robustness_result import DelayRobustness
 from .loop import Loop, open_loop
 from .margin_result import Margins

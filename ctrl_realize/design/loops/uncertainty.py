@@ -14,11 +14,11 @@ from ...delayed import DelayedStateSpace, DelaySystem
 from ...errors import DataError, OptionError
 from ...identification.campaign.campaign import Campaign
 from ...numerics.arrays import ComplexArray, FloatArray, read_only
+from ..models.conversions import held_fraction
 from ..resolved import warn_unresolved
 from ..siso import (
     core_and_dead_time,
     delayed_system,
-    held_fraction,
     interval_of_dead_time,
     is_continuous,
     with_dead_time,

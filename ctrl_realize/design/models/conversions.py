@@ -204,6 +204,26 @@ def to_continuous(system: DelayedStateSpace) -> ContinuousModel:
     return ContinuousModel(continuous, before, behind, dt, plant.time_unit)
 
 
+def held_fraction(plant: DelayedStateSpace) -> float:
+    """Time in s by which the delay of one input and output exceeds the dead time.
+
+    A dead time of (d + f) samples is represented by the delay d + 1 and a feedthrough. An
+    identified one is known to all digits; that of another model is found as by `to_continuous`.
+    """
+    over = _over(plant, None if plant.fit is None else plant.fit.dead_time)
+    if over or not (plant.delay and np.any(plant.delay_free.D)):
+        return over
+    try:
+        return _over(plant, to_continuous(plant).dead_time)
+    except UnsuitableSystemError:
+        return 0.0
+
+
+def _over(plant: DelayedStateSpace, dead_time: float | None) -> float:
+    over = 0.0 if dead_time is None else float(plant.dead_time) - float(dead_time)
+    return over if 0 < over < plant.dt else 0.0
+
+
 def to_discrete(
     core: Any, dead_time: float | None = None, dt: float | None = None, **names: Any
 ) -> DelayedStateSpace:

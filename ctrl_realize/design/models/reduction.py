@@ -19,8 +19,8 @@ from ...numerics.blas_threads import single_threaded
 from ...numerics.state_space.balancing import split_modes
 from ...numerics.state_space.process_models import half_rule, process_step
 from ..resolved import warn_unresolved
-from ..siso import core_and_dead_time, delayed_system, held_fraction
-from .conversions import ContinuousModel, to_continuous, to_discrete
+from ..siso import core_and_dead_time, delayed_system
+from .conversions import ContinuousModel, held_fraction, to_continuous, to_discrete
 from .process_model import ProcessModel
 
 METHODS = ("optimal", "half_rule")
@@ -136,7 +136,8 @@ def _reduce(system: Any, method: str, dead_time: float | None, order: int) -> Pr
     if method == "half_rule":
         model = _by_half_rule(continuous or to_continuous(plant), lags, integrating, gain)
     else:
-        least = continuous.dead_time if continuous else _dead_time(plant)
+        sampled = float(plant.dead_time) - held_fraction(plant)
+        least = continuous.dead_time if continuous else sampled
         model = _by_fit(time, step / gain, lags, integrating, gain, least)
     total = _total(time, step / gain, integrating)
     square = np.trapezoid((model.step(time) - step) ** 2, time) / total
@@ -169,16 +170,6 @@ def both_forms(
         return model, to_discrete(model)
     warn_unresolved(system)
     return None, delayed_system(system, "a reduction")
-
-
-def _dead_time(plant: DelayedStateSpace) -> float:
-    """Dead time in s, without the fraction of a sample that a feedthrough may represent."""
-    if plant.delay and np.any(plant.delay_free.D):
-        try:
-            return float(to_continuous(plant).dead_time)
-        except UnsuitableSystemError:
-            return float(plant.dead_time) - held_fraction(plant)
-    return float(plant.dead_time)
 
 
 def _step_record(plant: DelayedStateSpace) -> tuple[FloatArray, FloatArray, bool, float]:
