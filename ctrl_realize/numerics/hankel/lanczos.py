@@ -56,8 +56,9 @@ FLOOR, NOTHING = 1e-14, 1e-13
 """Residual, and product with a random vector, relative to the largest eigenvalue, that count as
 rounding."""
 
-CANCELLED = 1e-3
-"""Part of a vector that is left by a projection below which it is projected once more."""
+CANCELLED = 0.1
+"""Part of a vector that is left by a projection below which it is projected once more: each step
+multiplies what is not orthogonal by the inverse of that part."""
 
 
 @dataclass(frozen=True, eq=False)

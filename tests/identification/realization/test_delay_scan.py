@@ -2,6 +2,7 @@
 
 import re
 
+import control as ct
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -86,3 +87,16 @@ def test_the_report_tells_the_part_of_the_gain_that_is_before_the_delay():
     assert left == pytest.approx(100 * markov[:delay].sum() / markov.sum(), rel=0.05)
     assert left > 1
     assert model.dcgain() < 2 * (1 - 0.01)
+
+
+@pytest.mark.parametrize(
+    "lags", [(5.0, 8.0, 20.0, 30.0), (4, 6, 10, 20, 30), (3, 4, 6, 10, 20, 30)]
+)
+def test_the_delay_of_exact_data_depends_on_no_scale_or_sign(lags):
+    # d and d + 1 are exact (see Notes), up to the stated accuracy
+    plant = cr.delayed_ss(ct.tf([1.0], np.poly(-1 / np.array(lags))), 49, dt=1.0)
+    pulse = plant.markov(800)
+    for scale in (1.0, -1.0, 3.0, 1e5, 1e-6):
+        found = cr.estimate_delay(scale * pulse, len(lags), max_delay=100, dt=1.0)
+        assert (found.delay, found.fit.delay_interval) == (49, (49, 50))
+        assert found.fit.iae[[49, 50]].max() <= 1e-11 * abs(scale) * pulse.sum()
