@@ -14,7 +14,7 @@ from ..data.shown_units import unit_among
 from ..errors import UnsuitableSystemError
 from ..numerics.internal_delays import form as forms
 from .inside.system import DelaySystem
-from .operands import common_dt, core_states, form_of
+from .operands import Linear, common_dt, core_states, form_of
 from .operators import solvable
 from .parts import stand_in
 
@@ -54,10 +54,9 @@ def interconnect(systems: Sequence[Any], *args: Any, **settings: Any) -> Any:
     >>> loop
     <DelaySystem: r -> y, u, order 2, internal delay 30 samples, dt = 0.01 s>
     """
-    linear = (ct.StateSpace, ct.TransferFunction)
     check_type(systems, Sequence, "systems", "a list of systems", UnsuitableSystemError)
     for system in systems:
-        check_type(system, linear, "a system", "one with signal names", UnsuitableSystemError)
+        check_type(system, Linear, "a system", "one with signal names", UnsuitableSystemError)
     dt = _time_base(systems)
     all_ = reduce(forms.append, map(form_of, systems))
     wired = ct.interconnect([*map(stand_in, systems)], *args, **settings)

@@ -17,7 +17,7 @@ from ..numerics.internal_delays.merging import ends_apart
 from .deferred import DeferredMatrices
 from .parts import check_entries, signals_of
 
-Numbers = (int, float, np.number)
+Numbers, Linear = (int, float, np.number), (ct.StateSpace, ct.TransferFunction)
 
 
 def plain(form: DelayForm, dt: float | None, states: Sequence[str] | None = None) -> ct.StateSpace:
@@ -32,7 +32,7 @@ def is_linear(system: Any) -> bool:
     """Whether an object can be converted to a form."""
     if isinstance(system, (np.ndarray, np.number)):
         return bool(np.isrealobj(system))
-    return isinstance(system, (int, float, ct.StateSpace, ct.TransferFunction))
+    return isinstance(system, (int, float, *Linear))
 
 
 def form_of(system: Any) -> DelayForm:

@@ -15,12 +15,11 @@ from functools import cached_property
 from math import prod
 from typing import Any
 
-import control as ct
 import numpy as np
 
-from ..._checks import sample_time_of
+from ..._checks import check_type, sample_time_of
 from ...data.shown_units import unit_among
-from ...delayed.operands import Numbers
+from ...delayed.operands import Linear, Numbers
 from ...delayed.parts import check_entries
 from ...errors import UnsuitableSystemError
 from ...numerics.arrays import ComplexArray, FloatArray
@@ -186,11 +185,8 @@ def open_loop(plant: Any, controller: Any = None, dead_time: float = 0.0) -> Loo
 
 def _time_base(system: Any) -> float | None:
     """Return dt; 0.0 for continuous, None for a static gain."""
-    if not isinstance(system, (ct.StateSpace, ct.TransferFunction, *Numbers)):
-        raise UnsuitableSystemError(
-            f"got a {type(system).__name__}; expected a control.StateSpace, TransferFunction, "
-            "FrequencyResponseData or a number"
-        )
+    expected = "a control.StateSpace, TransferFunction, FrequencyResponseData or a number"
+    check_type(system, (*Linear, *Numbers), "a system", expected, UnsuitableSystemError)
     check_entries(system)
     if isinstance(system, Numbers):
         return None

@@ -11,7 +11,7 @@ import numpy as np
 from ..._checks import check_type
 from ..._wording import in_time
 from ...delayed import DelayedStateSpace, DelaySystem
-from ...delayed.operands import Numbers
+from ...delayed.operands import Linear, Numbers
 from ...errors import ModelWarning, UnsuitableSystemError, warn_caller
 from ...numerics.arrays import FloatArray
 from ...numerics.blas_threads import single_threaded
@@ -156,10 +156,8 @@ def performance(plant: DelayedStateSpace | DelaySystem, controller: Any) -> Perf
     """
     made = with_dead_time if is_continuous(plant) else delayed_system
     plant = made(plant, "the performance of a loop")
-    check_type(
-        controller, (ct.StateSpace, ct.TransferFunction, *Numbers), "controller",
-        "a linear system or a number", UnsuitableSystemError,
-    )  # fmt: skip
+    expected = "a linear system or a number"
+    check_type(controller, (*Linear, *Numbers), "controller", expected, UnsuitableSystemError)
     warn_unresolved(plant)
     slow, turn = loop_times(plant, controller)
     if not plant.dt:

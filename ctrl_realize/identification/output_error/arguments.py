@@ -8,9 +8,11 @@ from typing import Any
 import control as ct
 import numpy as np
 
+from ..._checks import check_type
 from ..._wording import named
 from ...data import Record, StepEdge
 from ...data.given import as_records, check_input
+from ...delayed.operands import Linear
 from ...errors import DataError, NoStepError, UnsuitableSystemError
 from ...numerics.arrays import FloatArray
 from ...numerics.constants import SMALLEST
@@ -48,10 +50,8 @@ def known_factor(known: Any) -> KnownFactor:
     """
     if known is None:
         return KnownFactor()
-    if not isinstance(known, (ct.StateSpace, ct.TransferFunction)):
-        raise UnsuitableSystemError(
-            f"known is a {type(known).__name__}; expected a control.TransferFunction or StateSpace"
-        )
+    expected = "a control.TransferFunction or StateSpace"
+    check_type(known, Linear, "known", expected, UnsuitableSystemError)
     if not known.issiso() or not known.isctime():
         raise UnsuitableSystemError(
             f"known has {known.ninputs} inputs, {known.noutputs} outputs and dt={known.dt}; "
