@@ -8,7 +8,7 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from .._checks import not_negative, numbers
+from .._checks import check_type, not_negative, numbers
 from ..data import MeasuredFRF, Record
 from ..data.given import as_records, check_complete
 from ..errors import DataError, OptionError
@@ -134,8 +134,7 @@ def stepped_sine_frf(
 
 def _as_points(records: Sweep) -> list[list[Record]]:
     """Check the records and give every point a list of repeats."""
-    if not isinstance(records, Iterable):
-        raise DataError(f"expected records, got a {type(records).__name__}")
+    check_type(records, Iterable, "records", "a list of Records")
     points = [list(as_records(entry)) for entry in records]
     if not points:
         raise DataError("no records; expected at least one for each frequency")

@@ -9,6 +9,7 @@ from contextlib import contextmanager
 from numbers import Real
 from pathlib import Path
 
+from .._checks import check_type
 from ..errors import FileFormatError, MissingFileError, OptionError
 
 MAX_COLUMNS = 10_000
@@ -35,10 +36,7 @@ def usable_file(path: str | os.PathLike[str], max_bytes: float) -> Path:
     """
     if not isinstance(max_bytes, Real) or not max_bytes > 0:
         raise OptionError(f"max_bytes={max_bytes!r} must be a positive number")
-    if not isinstance(path, str | os.PathLike):
-        raise OptionError(
-            f"expected the name of a file as text or Path, got a {type(path).__name__}"
-        )
+    check_type(path, str | os.PathLike, "path", "the name of a file, text or Path", OptionError)
     try:
         path = Path(path)
         status = path.stat()

@@ -11,7 +11,7 @@ import control as ct
 import numpy as np
 from matplotlib.axes import Axes
 
-from .._checks import numbers
+from .._checks import check_type, numbers
 from ..delayed import DelayedStateSpace
 from ..errors import DataError, UnsuitableSystemError
 from ..frequency.comparison import FRFComparison
@@ -49,10 +49,7 @@ def curves_of(
 ) -> list[Curve]:
     """Evaluate systems and FRFs with consistent phases; `dead_time` is removed for unwrapping."""
     for item in items:
-        if not isinstance(item, ct.LTI):
-            raise UnsuitableSystemError(
-                f"expected systems of python-control or FRFs, got a {type(item).__name__}"
-            )
+        check_type(item, ct.LTI, "a system", "one of python-control", UnsuitableSystemError)
         check_single_channel(item, str(item.name))
     if not items:
         raise DataError("no frequency response to plot")

@@ -214,8 +214,9 @@ def realize_mimo(
 
     Notes
     -----
-    Aligned responses are realized by Kung's algorithm [1]_ with the block Hankel matrix [2]_; the
-    split of the delays and the comparison of structures are our own.
+    Aligned responses are realized by Kung's algorithm [1]_ with the block Hankel matrix [2]_, all
+    entries of which have about the same size: units of channels do not matter. The split of the
+    delays and the comparison of structures are our own.
 
     References
     ----------

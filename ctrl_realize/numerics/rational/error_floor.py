@@ -52,14 +52,12 @@ def fits_with_unknown_errors(
     """
     uniform = replace(data, weight=np.ones(data.s.size))
     ways = [(way, fit_structures(way, orders, degrees)) for way in (data, uniform)]
-    values = [_criterion(*way, 0) for way in ways]
     for way, fits in ways[:2]:
         residual = way.misfit(_best(way, fits)) / way.weight
-        floor = error_floor(np.abs(way.response - residual), np.abs(residual))
-        if floor:
+        if floor := error_floor(np.abs(way.response - residual), np.abs(residual)):
             between = replace(data, weight=1 / np.hypot(np.abs(data.response), floor))
             ways.append((between, fit_structures(between, orders, degrees)))
-            values.append(_criterion(*ways[-1], 1))
+    values = [_criterion(*way, int(k > 1)) for k, way in enumerate(ways)]
     # A part of the response that the model does not follow is no noise.
     noise = [True, *(correlation_cost(way, _best(way, fits)) == 1.0 for way, fits in ways[1:])]
     taken = np.where(noise, values, np.inf)
@@ -74,9 +72,8 @@ def _criterion(data: FRFData, fits: dict[Structure, Candidate], floors: int) -> 
     """
     best, count = _best(data, fits), 2 * data.s.size
     weights = 4 * float(np.sum(np.log(data.weight)))
-    freedom = max(count - parameters(best), 1)
     own = information_criterion(data, best, count, floors)
-    return float(own - count * np.log(freedom) - weights)
+    return float(own - count * np.log(max(count - parameters(best), 1)) - weights)
 
 
 def _best(data: FRFData, fits: dict[Structure, Candidate]) -> Candidate:

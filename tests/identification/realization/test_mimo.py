@@ -84,6 +84,18 @@ def test_noise_is_not_taken_for_a_response():
     assert np.all(check.fit_percent > 97)
 
 
+def test_the_model_does_not_depend_on_the_units_of_channels():
+    # of an output in Pa instead of bar the Hankel matrix saw the others no more: 10 % off
+    plant = cr.DelayedStateSpace(CORE, (4, 7), output_delay=(0, 2, 0))
+    g = plant.markov(60)
+    g = g + 0.02 * np.abs(g).max() * np.random.default_rng(0).standard_normal(g.shape)
+    units = np.array([1.0, 1e5, 1e-3])[:, None] * [1e3, 0.1]
+    one, other = (cr.identification.realize_mimo(each, 3, level=0.2, dt=DT).markov(60)
+                  for each in (g, units[:, :, None] * g))  # fmt: skip
+    # sizes and their products are rounded to some 1e-16, which singular vectors multiply
+    assert_allclose(other / units[:, :, None], one, rtol=0, atol=1e-10 * np.abs(one).max())
+
+
 class _Plain:
     pass
 
