@@ -91,8 +91,7 @@ def chosen_model(
         more = compared_fits(other, its, unit, noise_known)
         beside.append(more.interval(other, key_of(more.rows[0]), solved=True))
     within, beside = ([(low / unit, high / unit) for low, high in e] for e in (ends, beside))
-    bound, shortest = data.max_dead_time / unit, 1 / float(frequency[-1])
-    interval, flags = _cover(rows, within, beside, bound, shortest)
+    interval, flags = _cover(rows, within, beside, data.max_dead_time / unit, 1 / frequency[-1])
     ratio = residual_ratio(data, chosen)
     if not noise_known and n > max(DEFAULT_ORDERS) and ratio < _ACCURACY:
         interval, systematic = _of_lower_orders(data, compared, unit, interval)

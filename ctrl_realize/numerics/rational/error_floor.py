@@ -61,7 +61,10 @@ def fits_with_unknown_errors(
     # A part of the response that the model does not follow is no noise.
     noise = [True, *(correlation_cost(way, _best(way, fits)) == 1.0 for way, fits in ways[1:])]
     taken = np.where(noise, values, np.inf)
-    return [ways[k] for k in np.argsort(taken) if taken[k] <= taken.min() + VERY_STRONG]
+    # Of few points a good model leaves as little by chance, as in an F test.
+    part = max(parameters(_best(*way)) for way in ways) / (2 * data.s.size)
+    reach = taken.min() + VERY_STRONG / (1 - part)
+    return [ways[k] for k in np.argsort(taken) if taken[k] <= reach]
 
 
 def _criterion(data: FRFData, fits: dict[Structure, Candidate], floors: int) -> float:
@@ -71,9 +74,8 @@ def _criterion(data: FRFData, fits: dict[Structure, Candidate], floors: int) -> 
     in points of small errors is no sign of them.
     """
     best, count = _best(data, fits), 2 * data.s.size
-    weights = 4 * float(np.sum(np.log(data.weight)))
     own = information_criterion(data, best, count, floors)
-    return float(own - count * np.log(max(count - parameters(best), 1)) - weights)
+    return float(own - count * np.log(count - parameters(best)) - 4 * np.sum(np.log(data.weight)))
 
 
 def _best(data: FRFData, fits: dict[Structure, Candidate]) -> Candidate:
