@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -19,7 +19,7 @@ from ...numerics.signals.edges import difference_noise
 from ...numerics.state_space.delay_split import split_delays
 from ...results import Flag, ModelFit
 from .impulses import as_impulse, channels
-from .mimo_cores import Assembly, aligned_core, channel_iae, cores_one_by_one
+from .mimo_cores import Assembly, aligned_core, channel_iae, channel_sizes, cores_one_by_one
 
 Structure = Literal["auto", "common", "rows", "columns"]
 NOISE_STDS = 5.0
@@ -214,9 +214,9 @@ def realize_mimo(
 
     Notes
     -----
-    Aligned responses are realized by Kung's algorithm [1]_ with the block Hankel matrix [2]_, all
-    entries of which have about the same size: units of channels do not matter. The split of the
-    delays and the comparison of structures are our own.
+    Aligned responses are realized by Kung's algorithm [1]_ with the block Hankel matrix [2]_, in
+    which the entries that respond have about the same size: units of channels do not matter. The
+    split of the delays and the comparison of structures are our own.
 
     References
     ----------
@@ -247,13 +247,18 @@ def realize_mimo(
     known = found >= 0
     if not known.any():
         raise DataError("no channel has a response; check that the input is connected")
-    way, pieces, errors = _assembled(data, count, found, choice, samples)
+    outputs, inputs = channel_sizes(channels(data), known)
+    each = outputs[:, None] * inputs
+    even = ImpulseResponse(channels(data) / each[:, :, None], data.dt, filter=data.filter)
+    way, pieces, errors = _assembled(even, count, found, choice, samples)
     later = np.where(known, found + 1, -1)
     if errors.sum() > EXACT * data.noutputs and later.max() + 2 * count < data.n_samples:
         # A dead time that is no whole number of samples has its fraction in B and D.
-        direct = _assembled(data, count, later, choice, samples)
+        direct = _assembled(even, count, later, choice, samples)
         if ALIKE * direct[2].sum() < errors.sum():
             found, (way, pieces, errors) = later, direct
+    A, B, C, D = pieces.core
+    pieces = replace(pieces, core=(A, B * inputs, C * outputs[:, None], D * each))
     apart = np.add.outer(pieces.outputs, pieces.inputs)
     fit = MimoRealization(
         delays=locked(found),

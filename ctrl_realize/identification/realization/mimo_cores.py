@@ -12,13 +12,15 @@ from ...data import ImpulseResponse
 from ...delayed import DelayedStateSpace, fit_of
 from ...delayed.parts import matrices_of
 from ...errors import OrderError
-from ...numerics.arrays import FloatArray, IntArray, Matrices
+from ...numerics.arrays import BoolArray, FloatArray, IntArray, Matrices
 from ...numerics.hankel.delay_models import realize_at
 from ...numerics.state_space.delay_split import aligned, joined_columns, joined_rows, least_known
 from ...results import Flag
 from ..realization.result import Realization
 from .impulses import channels, check_samples
 from .realize import realize
+
+_ASIDE = 1e-6  # weight of an entry without response, of which nothing is to be seen beside others
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,33 +59,34 @@ def channel_iae(pieces: Assembly, data: ImpulseResponse) -> FloatArray:
 def _realized(
     data: ImpulseResponse, markov: FloatArray, order: int, samples: int | None
 ) -> tuple[Matrices, tuple[Flag, ...]]:
-    """Realize aligned data with at most `order` states, whatever the units of its channels."""
-    outputs, inputs = _sizes(markov)
-    each = outputs[:, None] * inputs
-    sized = markov / each[:, :, None]
-    moved: ImpulseResponse = ImpulseResponse(sized, data.dt, filter=data.filter, name=data.name)
+    """Realize aligned data with at most `order` states."""
+    moved: ImpulseResponse = ImpulseResponse(markov, data.dt, filter=data.filter, name=data.name)
     used = check_samples(moved, samples, order, 0, padded=False, what="delays")
     try:
         system = realize(moved, order, samples=samples)
     except OrderError:
-        found = realize_at(sized, 0, used, order, padded=False).singular_values[:order]
+        found = realize_at(markov, 0, used, order, padded=False).singular_values[:order]
         rank = int(np.count_nonzero(found))
         if rank == 0:
             p, m, _ = markov.shape
             return (np.zeros((0, 0)), np.zeros((0, m)), np.zeros((p, 0)), markov[:, :, 0]), ()
         system = realize(moved, rank, samples=samples)
-    A, B, C, D = matrices_of(system.delay_free)
-    return (A, B * inputs, C * outputs[:, None], D * each), fit_of(system, Realization).flags
+    return matrices_of(system.delay_free), fit_of(system, Realization).flags
 
 
-def _sizes(markov: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Sizes of outputs (p,) and inputs (m,), by whose products the entries have similar peaks."""
+def channel_sizes(markov: FloatArray, known: BoolArray) -> tuple[FloatArray, FloatArray]:
+    """Sizes of outputs (p,) and inputs (m,), in whose products the entries have similar peaks.
+
+    Least squares of the logarithms, of the entries that respond. Where these leave two sizes apart,
+    as of a diagonal plant, the noise of the others decides.
+    """
     peak = np.abs(markov).max(axis=-1)
     row, column = np.nonzero(peak)
+    weight = np.where(known, 1.0, _ASIDE)[row, column]
     outputs, inputs = map(np.eye, peak.shape)
-    beside = np.concatenate([outputs[row], inputs[column]], axis=1)
-    sizes = np.exp(np.linalg.lstsq(beside, np.log(peak[row, column]), rcond=None)[0])
-    return sizes[: len(peak)], sizes[len(peak) :]
+    beside = np.concatenate([outputs[row], inputs[column]], axis=1) * weight[:, None]
+    logs = np.linalg.lstsq(beside, weight * np.log(peak[row, column]), rcond=None)[0]
+    return np.exp(logs[: len(peak)]), np.exp(logs[len(peak) :])
 
 
 def aligned_core(
