@@ -10,7 +10,7 @@ import numpy as np
 from .._checks import band
 from ..data.shown_units import unit_among
 from ..delayed import DelayedStateSpace, DelaySystem
-from ..delayed.operands import check_proper, in_state_space
+from ..delayed.operands import Linear, check_proper, in_state_space
 from ..delayed.parts import check_entries, check_single
 from ..errors import OptionError, UnsuitableSystemError
 
@@ -26,7 +26,7 @@ def delayed_system(system: Any, purpose: str, *, siso: bool = True) -> DelayedSt
     UnsuitableSystemError
         Not a linear system, a continuous one, or several channels if one is needed.
     """
-    if not isinstance(system, (ct.StateSpace, ct.TransferFunction)):
+    if not isinstance(system, Linear):
         advice = "; its system(dt) is one" if callable(getattr(system, "system", None)) else ""
         raise UnsuitableSystemError(
             f"{purpose} needs a linear system, a StateSpace or TransferFunction; got a "
@@ -73,8 +73,7 @@ def with_dead_time(system: Any, purpose: str, dt: float | None = None) -> Any:
 
 def is_continuous(system: Any) -> bool:
     """Whether a linear system is one in continuous time."""
-    linear = isinstance(system, (ct.StateSpace, ct.TransferFunction))
-    return linear and system.dt is not None and not system.dt
+    return isinstance(system, Linear) and system.dt is not None and not system.dt
 
 
 def core_and_dead_time(system: Any, purpose: str) -> tuple[ct.StateSpace, float]:
