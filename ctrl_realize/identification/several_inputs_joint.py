@@ -37,9 +37,9 @@ _STEP = 1e-4  # of these logarithms, for derivatives
 _REACH = 5.0  # logarithm of the factor by which a time constant or a damping may change
 
 
-def of_step(fit: OutputErrorFit) -> bool:
-    """Whether an input is that of a step experiment, which begins at rest."""
-    return bool(np.isfinite(fit.onset))
+def from_rest(fit: OutputErrorFit) -> bool:
+    """Whether a fit is that of a step experiment, or of another record that begins at rest."""
+    return bool(np.isfinite(fit.onset)) or not fit.data.relaxing
 
 
 def prescribed(fit: OutputErrorFit) -> bool:
@@ -57,16 +57,30 @@ def bounds_of(fits: Sequence[OutputErrorFit]) -> list[Bound]:
 
 
 def fitted_together(
-    fits: Sequence[OutputErrorFit], record: Record
+    fits: Sequence[OutputErrorFit], record: Record, rested: bool
 ) -> tuple[FloatArray, FloatArray]:
     """Responses (m, N) to all inputs, and the free responses (N,), level and drift beside them.
 
-    The latter are zero for steps from rest, and NaN where inputs before the record may act.
+    The latter are zero from rest, and NaN where inputs before the record may act. A record that
+    `rested` before its first move is fitted from rest unless drift and free responses have
+    evidence by BIC.
     """
+    found = _together(fits, record, at_rest=all(map(from_rest, fits)))
+    if not rested or all(map(from_rest, fits)):
+        return found
+    seen, size = ~np.isnan(found[1]), np.count_nonzero(~np.isnan(found[1]))
+    ways = _together(fits, record, at_rest=True), found
+    rest, free = (np.var((np.ravel(record.output) - r.sum(axis=0) - e)[seen]) for r, e in ways)
+    terms = 1 + sum(np.count_nonzero(fit.poles) for fit in fits)
+    return ways[0] if size * np.log(rest / free) <= terms * np.log(size) else found
+
+
+def _together(
+    fits: Sequence[OutputErrorFit], record: Record, at_rest: bool
+) -> tuple[FloatArray, FloatArray]:
     inputs, output = np.atleast_2d(record.input), np.ravel(record.output)
     seen, clock = ~np.isnan(output), record.time - record.time[0]
     starts = bounds_of(fits)
-    at_rest = all(map(of_step, fits))
     if not at_rest:  # what inputs before the record do may arrive as late as this
         seen &= clock >= min(BEYOND * max(fit.dead_time for fit in fits), clock[-1] / 2)
     own = orth(np.hstack([own_columns(fit, clock[seen], at_rest) for fit in fits]))
@@ -134,6 +148,8 @@ def fitted_together(
 
 def own_columns(fit: OutputErrorFit, clock: FloatArray, at_rest: bool) -> FloatArray:
     """Columns (N, q) of level, drift and what else is estimated beside a model."""
+    if at_rest and not np.isfinite(fit.onset):
+        return np.ones((clock.size, 1))
     # A fit may have left out the first samples, or spikes.
     if at_rest and fit.data.rows.size == clock.size:
         return own_regressors(fit.data, fit.poles)

@@ -63,13 +63,18 @@ def test_the_parameters_of_all_inputs_are_listed(sys):
         assert table.loc[(name, "lag_1"), "low"] < table.loc[(name, "lag_1"), "high"]
 
 
-def test_inputs_that_move_alike_have_wider_intervals(sys):
+def test_inputs_that_move_alike_have_wider_intervals():
     # correlation of 0.8 between the inputs: variance inflation 1 / (1 - 0.64) for gains
-    together = cr.identify(record(0, alike=0.57), structures="FOPDT").fit
-    for one, other in zip(sys.fit.fits, together.fits, strict=True):
+    def fits(alike):
+        whole = record(0, alike=alike)  # in operation, so that both are fitted alike
+        part = cr.Record(T[25:], whole.input[:, 25:], whole.output[25:])
+        return cr.identify(part, structures="FOPDT").fit.fits
+
+    together = fits(0.57)
+    for one, other in zip(fits(0.0), together, strict=True):
         ratio = other.gain_std_given_structure / one.gain_std_given_structure
         assert ratio > 1.2
-    for fit, (gain, _, _) in zip(together.fits, PLANTS.values(), strict=True):
+    for fit, (gain, _, _) in zip(together, PLANTS.values(), strict=True):
         assert abs(fit.gain - gain) < 3 * fit.gain_std_given_structure
 
 
@@ -139,6 +144,24 @@ def test_structures_that_describe_every_plant_converge_and_others_say_that_they_
     except cr.errors.DataError as error:
         said = str(error)
     assert re.search(r"not converged: give|still change after \d+ iterations", said)
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_two_valves_of_a_tank_have_an_integrator_each(seed):
+    """What one valve does is far larger than the noise, and never ends."""
+    rng = np.random.default_rng(seed)
+    plants = [(0.01, 8.0, 3.3), (-0.015, 15.0, 12.0)]
+    u = np.repeat(rng.choice([-1.0, 1.0], (2, 30)), 20, axis=1)
+    u[:, :20] = 0.0
+    y = 0.02 * rng.standard_normal(600)
+    for (gain, lag, dead_time), each in zip(plants, u, strict=True):
+        core = ct.tf([gain], [lag, 1, 0])
+        y = y + cr.delayed_ss(core, dead_time=dead_time, dt=1.0).simulate(each)
+    fit = cr.identify(cr.Record(np.arange(600.0), u + 5, y + 2), structures="P1DI").fit
+    assert fit.converged
+    for one, (gain, _, dead_time) in zip(fit.fits, plants, strict=True):
+        assert one.interval[0] <= dead_time <= one.interval[1]
+        assert one.gain_interval[0] <= gain <= one.gain_interval[1]
 
 
 def test_fits_that_leave_out_the_first_samples_have_intervals_of_both_together():

@@ -93,7 +93,7 @@ def _fit(
     # A free response that begins with the record explains a slow one from rest as well.
     # Ablation: fits from rest.
     whole = max(y.size for y in outputs) <= MOST_SAMPLES and not requested.loop
-    rested = whole and Rule.FROM_REST.on and all(map(_begins_at_rest, records))
+    rested = whole and Rule.FROM_REST.on and all(map(begins_at_rest, records))
     found = _sought(outputs, inputs, dt, replace(requested, rested=rested))
     if refuses and not found.follows:
         latest = requested.latest or SOUGHT_THEN * found.data.longest
@@ -140,13 +140,13 @@ def _advice(records: Sequence[Record], outputs: Sequence[FloatArray]) -> str:
     return "check the columns, and whether the input excites the plant"
 
 
-def _begins_at_rest(record: Record) -> bool:
-    """Whether a record begins with a constant input and an output that does not move."""
-    y, u = _signals(record)
-    first = int(np.argmax(u != u[0]))
+def begins_at_rest(record: Record) -> bool:
+    """Whether a record begins with constant inputs and an output that does not move."""
+    y, u = np.ravel(record.output), np.atleast_2d(record.input)
+    first = int(np.argmax(np.any(u != u[:, :1], axis=0)))
     if np.count_nonzero(~np.isnan(y[:first])) < _LEAST_REST:
         return False
-    rest = step_data(y, u, record.dt, [(first, 1)])
+    rest = step_data(y, u[0], record.dt, [(first, 1)])
     return not (rest.drift or rest.relaxing or rest.bend)
 
 
@@ -220,7 +220,8 @@ def joined(
         times.append(time if not times else time - time[0] + times[-1][-1] + data.step)
     signal = np.concatenate([u[rows] for u, rows in zip(data.held, data.rows, strict=True)])
     output, span = np.concatenate(data.measured), sum(data.lengths) * data.step
-    return bare_data(output, signal, data.dt, noise, span, data.every), np.concatenate(times)
+    seen = bare_data(output, signal, data.dt, noise, span, data.every, not data.rested)
+    return seen, np.concatenate(times)
 
 
 def _cut(records: Sequence[Record], found: SampledFit) -> Iterator[Flag]:

@@ -441,7 +441,8 @@ class OutputErrorFit(FractionalDelayFit):
         """What was estimated together with the model, in words."""
         if not np.isfinite(self.onset):
             loads = any(flag.code == "load_disturbance" for flag in self.flags)
-            return "loads, and " * loads + "the level, drift and initial state of the record"
+            more = ", drift and initial state" * self.data.relaxing
+            return "loads, and " * loads + f"the level{more} of the record"
         parts = ["the free response to an earlier input"] * self.data.relaxing
         parts += ["the load"] * (self.data.load is not None)
         parts += ["the drift"] * bool(self.data.drift) + ["the hum"] * bool(self.data.hum)

@@ -221,11 +221,12 @@ def _unseen_at_rest(rest: FloatArray) -> float:
 
 
 def bare_data(
-    output: FloatArray, signal: FloatArray, dt: float, sigma: float, span: float, every: int = 1
-) -> StepData:
+    output: FloatArray, signal: FloatArray, dt: float, sigma: float, span: float, every: int = 1,
+    relaxing: bool = True,
+) -> StepData:  # fmt: skip
     """Data of records without a step, with a duration `span` in s: there is no baseline."""
     rows = np.arange(output.size)
-    seen = sigma, 0.0, 0.0, 1.0, list[float](), None, output
+    seen = sigma, 0.0, 0.0, 1.0, list[float](), None, output, relaxing
     return StepData(output, signal, dt, [(0, 1)], rows, *seen, span=span, every=every)
 
 
