@@ -142,12 +142,14 @@ def _level(flags: Iterable[Flag], question: str, good: bool, some: bool) -> tupl
 
 def _dead_time(fit: Any) -> Verdict:
     low, high = fit.interval
-    width, least = high - low, _FEW * fit.dt
+    width, least, flags = high - low, _FEW * fit.dt, fit.flags
     if fit.onset is not None and np.isfinite(fit.onset):
         least = max(least, _NARROW * min(fit.onset, high))
+        # The start of the response to a step tells it, whatever its end leaves open.
+        flags = [flag for flag in flags if flag.code != "gain_not_resolved"]
     if fit.total_delay is not None and np.isfinite(fit.total_delay_interval or np.inf).all():
         least = max(least, _OF_TOTAL * fit.total_delay)
-    level, why = _level(fit.flags, "dead_time", width <= least, some=True)
+    level, why = _level(flags, "dead_time", width <= least, some=True)
     if level == "good" and fit._answered_noise:
         level, why = "with care", "slow noise in a loop"
     said = interval_in_time(low, high)

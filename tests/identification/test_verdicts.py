@@ -46,6 +46,18 @@ def test_a_record_that_ends_in_the_rise_does_not_tell_the_gain():
     assert levels(fit)["gain"] != "good"
 
 
+def test_an_open_gain_leaves_a_dead_time_good_that_is_narrow():
+    # the record ends 1.4 lags after the dead time, whose own evidence is the start of the response
+    t = np.arange(123.0)
+    plant = cr.delayed_ss(ct.tf([2], np.polymul([20, 1], [8, 1])), dead_time=35.3, dt=1.0)
+    u = 1.0 * (t >= 60)
+    y = plant.simulate(u) + 0.02 * np.random.default_rng(1).standard_normal(t.size)
+    fit = cr.fit_output_error(cr.Record(t, u, y)).fit
+    assert "gain_not_resolved" in {flag.code for flag in fit.flags}
+    assert (levels(fit)["dead time"], levels(fit)["gain"]) == ("good", "no")
+    assert fit.interval[0] <= 35.3 <= fit.interval[1]
+
+
 def test_what_two_lags_leave_open_is_no_matter_for_a_controller():
     # the dead time may be lag: each is open, and every split has a robust loop
     record = rigs.step_record(rigs.R2, before=300, after=900, dt=0.02, delay=5, noise=0.03, seed=2)
