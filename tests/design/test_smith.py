@@ -64,3 +64,18 @@ def test_the_range_of_stable_dead_times_ends_where_it_says(valve, pi_controller)
     assert checked.stable
     assert checked.worst_modulus_margin == checked.table()["modulus_margin"].min()
     assert "stable" in checked.report()
+
+
+@pytest.mark.parametrize("delay", [5, 700])
+def test_the_response_is_smiths_in_any_units(delay):
+    unit, gain = 1e6, 1e-6
+    plant = cr.delayed_ss(ct.tf([gain], [unit, 1]), delay, dt=0.1 * unit)
+    controller = ct.tf([0.66 / gain, -0.6 / gain], [1, -1], 0.1 * unit)
+    z = np.exp(1j * np.geomspace(0.01, 3, 40))
+    pole = np.exp(-0.1)
+    core = gain * (1 - pole) / (z - pole)
+    C = 0.6 / gain * (1.1 * z - 1) / (z - 1)
+    predictor = cr.design.smith_predictor(plant, controller)
+    expected = C / (1 + C * core * (1 - z**-delay))
+    # z^-d has d times the rounding of z
+    np.testing.assert_allclose(predictor(z), expected, rtol=1e-11)

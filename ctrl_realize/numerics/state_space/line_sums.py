@@ -42,7 +42,7 @@ class LineSum:
     ) -> None:
         self._mix, self._few = _low_rank(rows)
         self._length = d = rows.shape[1]
-        self._reach = np.abs(rows).sum(axis=1).max(initial=0.0)
+        self._reach = np.abs(rows).sum(axis=1, keepdims=True)
         self._pulses = None
         if pulses is not None and d >= LONG:
             A, B, C = pulses
@@ -61,8 +61,8 @@ class LineSum:
             behind = z ** (-self._length)
             out = here + (self._last - there) * behind
             # Rounding of either term, with n products each; not finite at an eigenvalue itself.
-            rough = np.abs(here).max(axis=0) * 1e-16 * B.shape[0]
-        lost = ~(rough <= LOST * self._reach)
+            rough = np.abs(here) * 1e-16 * B.shape[0]
+        lost = ~np.all(rough <= LOST * self._reach, axis=0)
         out[:, lost] = self._summed(z[lost])
         return np.asarray(out, dtype=np.complex128)
 
@@ -75,10 +75,15 @@ class LineSum:
 
 
 def _low_rank(rows: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Write rows = mix @ few; all rows of a predictor are combinations of one or two taps."""
-    U, s, V = np.linalg.svd(rows, full_matrices=False)
+    """Write rows = mix @ few; all rows of a predictor are combinations of one or two taps.
+
+    The rows have the units of their states: without scaling the smaller ones are lost in rounding.
+    """
+    size = np.abs(rows).max(axis=1, initial=0.0, keepdims=True)
+    size[size == 0] = 1.0
+    U, s, V = np.linalg.svd(rows / size, full_matrices=False)
     rank = int(np.sum(s > 1e-15 * s.max(initial=0.0)))
-    return U[:, :rank] * s[:rank], V[:rank]
+    return size * U[:, :rank] * s[:rank], V[:rank]
 
 
 def _in_powers(rows: FloatArray, x: ComplexArray) -> ComplexArray:
