@@ -36,6 +36,21 @@ def test_half_rule_reproduces_the_examples_of_the_paper():
     assert wait == pytest.approx(0.77)
 
 
+@pytest.mark.parametrize("dt", [0.05, 0.3])
+def test_the_half_rule_keeps_the_gain_of_lags_without_a_dead_time(dt):
+    # the zeros of a sampled model beyond its lags are rounding; half of 0.5 s to each side
+    found = cr.design.reduce_fopdt(
+        cr.delayed_ss(-2 * lags(1, 0.5, 0.3, 0.2), 0, dt=dt), method="half_rule"
+    )
+    values = [found.gain, found.lag, found.dead_time]
+    np.testing.assert_allclose(values, [-2, 1.25, 0.75], rtol=1e-3)
+    # rule T3 with the final dead time: of 0.2 s a lead of 10 ms leaves 0.19 s
+    lead = lags(1, 0.5, 0.2) * ct.tf([0.01, 1], [1])
+    found = cr.design.reduce_fopdt(lead, method="half_rule")
+    values = [found.gain, found.lag, found.dead_time]
+    np.testing.assert_allclose(values, [1, 1.25, 0.25 + 0.19], rtol=1e-6)
+
+
 @given(
     lag=st.floats(0.1, 5), second=st.floats(0, 1), wait=st.floats(0, 3), integrating=st.booleans()
 )

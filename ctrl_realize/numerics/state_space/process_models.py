@@ -13,6 +13,13 @@ import numpy as np
 
 from ..arrays import FloatArray
 
+SHORT_LEAD = 1e-3
+"""Share of all times together up to which a lead counts as none. The zeros of a sampled model far
+beyond its lags are rounding, and rule T2 would take them for its gain."""
+
+ITERATIONS = 20
+"""How often the rules for leads are repeated at most."""
+
 
 def process_step(
     time: FloatArray, lag: float, second_lag: float, dead_time: float, *, integrating: bool
@@ -64,7 +71,8 @@ def half_rule(
 
     Leads are cancelled first with neighbouring lags (rules T1-T3). Then half of the largest
     neglected lag is added to the smallest kept one and half to the dead time, which also takes all
-    further lags and all inverse-response time constants [1]_.
+    further lags and all inverse-response time constants [1]_. The rules for leads compare with the
+    final dead time, so they are repeated until it stays as it is.
 
     Parameters
     ----------
@@ -94,16 +102,22 @@ def half_rule(
     .. [1] S. Skogestad, Simple analytic rules for model reduction and PID controller tuning, J.
        Process Control 13 (2003) 291-309, sections 2 and 5.
     """
-    theta = dead_time + float(inverse.sum())
-    factor, rest = _cancel_leads(sorted(lags, reverse=True), sorted(leads, reverse=True), theta)
-    kept = rest[:order] + [0.0] * (order - len(rest))
-    neglected = rest[order:]
-    if neglected:
-        if order > 0:
-            kept[-1] += neglected[0] / 2
-        # With order 0 the other half is added to the integrator, an infinite lag, without effect.
-        half = neglected[0] / 2 if order > 0 or integrating else neglected[0]
-        theta += half + float(np.sum(neglected[1:]))
+    given = theta = dead_time + float(inverse.sum())
+    leads = leads[leads > SHORT_LEAD * (given + float(lags.sum()))]
+    for _ in range(ITERATIONS):
+        before = theta
+        factor, rest = _cancel_leads(sorted(lags, reverse=True), sorted(leads, reverse=True), theta)
+        kept = rest[:order] + [0.0] * (order - len(rest))
+        theta, neglected = given, rest[order:]
+        if neglected:
+            if order > 0:
+                kept[-1] += neglected[0] / 2
+            # With order 0 the other half is added to the integrator, an infinite lag, without
+            # effect.
+            half = neglected[0] / 2 if order > 0 or integrating else neglected[0]
+            theta += half + float(np.sum(neglected[1:]))
+        if theta == before:
+            break
     return factor, np.array(kept), theta
 
 
