@@ -79,6 +79,14 @@ def test_dominant_poles_of_a_long_loop_are_roots_of_its_equation():
     assert ct.feedback(cr.delayed_ss(ct.ss(a, 1, 0.009, 0, DT), d)).is_stable()
 
 
+@pytest.mark.parametrize("gain", [2.7, 0.9, -0.5])
+def test_poles_of_a_gain_behind_a_long_delay_are_roots_of_the_gain(gain):
+    # z^d = -gain; an iteration for all of them takes minutes
+    loop = ct.feedback(cr.delayed_ss(ct.ss([], [], [], gain, DT), 10_000))
+    assert_allclose(loop.dominant_poles(5) ** 10_000, -gain, rtol=1e-10)
+    assert loop.is_stable() == (abs(gain) < 1)
+
+
 @pytest.mark.parametrize(("seed", "delays"), [(0, [700]), (1, [250, 301]), (2, [90, 200, 333])])
 def test_dominant_poles_of_random_long_loops_are_the_largest_of_all(seed, delays):
     rng = np.random.default_rng(seed)

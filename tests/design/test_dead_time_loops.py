@@ -192,3 +192,10 @@ def test_responses_of_a_fast_loop_around_a_slow_plant_are_resolved():
         assert of.overshoot == pytest.approx(fine.overshoot, rel=0.03)
         assert of.settling_time == pytest.approx(fine.settling_time, rel=0.01)
         assert of.setpoint_error == pytest.approx(fine.setpoint_error, rel=0.02)
+
+
+def test_performance_of_a_gain_without_dead_time_is_that_of_the_lag_of_its_controller():
+    found = design.performance(2 * cr.delay(0), ct.tf([1], [1, 0]))
+    assert found.setpoint_error == pytest.approx(0.5, rel=1e-3)
+    assert found.settling_time == pytest.approx(np.log(50) / 2, rel=0.01)
+    assert np.isinf(design.performance(cr.delay(0), 0.1).load_error)

@@ -205,7 +205,8 @@ def plant_time(plant: DelayedStateSpace | DelaySystem) -> float:
     if isinstance(plant, DelaySystem):
         features, dead_time = plant.features()
         rates = -features.real[features.real < -1e-9 * np.abs(features).max(initial=1.0)]
-        return dead_time + 2 / float(rates.min(initial=np.inf)) + 4 * float(plant.dt)
+        slow = dead_time + 2 / float(rates.min(initial=np.inf)) + 4 * float(plant.dt)
+        return slow or 1.0  # a gain has no time of its own
     poles = np.abs(plant.delay_free.poles())
     slow = poles[poles < 1 - 1e-9]
     slowest = -1 / np.log(slow.max()) if slow.size and slow.max() > 0 else 1.0

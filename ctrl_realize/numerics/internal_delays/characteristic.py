@@ -157,6 +157,9 @@ def _loop_poles(part: DelayForm) -> ComplexArray:
     if not np.any(part.D) and not (np.any(part.B) and np.any(part.C)):
         zeros = np.zeros(count - part.states, dtype=np.complex128)
         return np.concatenate([np.linalg.eigvals(part.A), zeros])
+    if count > DENSE and not part.states and len(part.delays) == 1:  # a gain and a delay: z^d = D
+        turns = np.exp(2j * np.pi * np.arange(count) / count)
+        return np.asarray(turns * complex(part.D[0, 0]) ** (1 / count), dtype=np.complex128)
     if count > DENSE:
         roots, found = simultaneous_roots(part, _starts(part, count))
         if found:

@@ -65,7 +65,8 @@ def with_whole_pairs(poles: ComplexArray, count: int) -> ComplexArray:
 
 def _of_loop(part: DelayForm, count: int) -> ComplexArray:
     total = part.states + int(sum(part.delays))
-    if total <= ALL or not part.delays or (not np.any(part.D) and not part.states):
+    single = len(part.delays) < 2 or not np.any(part.D)
+    if total <= ALL or not part.delays or (single and not part.states):
         return discrete_poles(part)
     # The upper half; the system is real.
     circle = np.exp(1j * np.pi * np.arange(total + 1) / total)
