@@ -233,6 +233,20 @@ def test_a_loop_before_its_first_echo_is_the_plant():
     assert_allclose(impulse, k * np.exp(-(t[t > tau] - tau)), atol=1e-7)
 
 
+@pytest.mark.parametrize("unit", [1e-9, 1e6])
+def test_the_unit_of_time_does_not_matter_to_a_response(unit):
+    # five lags in companion form; the echoes make steps of unequal lengths
+    t = np.linspace(0, 12, 41)
+
+    def response(unit):
+        den = np.poly(-1 / (unit * np.linspace(0.6, 1, 5)))
+        loop = ct.feedback(1.5 * ct.tf([den[-1]], den) * cr.delay(0.37 * unit))
+        return loop.step_response(unit * t).outputs
+
+    # both within the tolerance of 1e-8
+    assert_allclose(response(unit), response(1.0), atol=3e-8)
+
+
 def test_any_input_is_taken_as_straight_between_its_samples_or_as_a_function():
     t = np.linspace(0, 6, 601)
     # a plant that remembers its own state, in a loop whose delay is another one

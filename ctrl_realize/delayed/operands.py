@@ -14,6 +14,7 @@ from ..errors import OptionError, UnsuitableSystemError
 from ..numerics.internal_delays import form as forms
 from ..numerics.internal_delays.form import DelayForm
 from ..numerics.internal_delays.merging import ends_apart
+from ..numerics.state_space.sampling import state_units
 from .deferred import DeferredMatrices
 from .parts import check_entries, signals_of
 
@@ -75,7 +76,9 @@ def in_state_space(system: Any) -> ct.StateSpace:
     scale = np.exp2(np.round(np.log2(np.abs(num[0] / den[0]))))
     names = {"name": system.name, **signals_of(system)}
     found = ct.ss(ct.TransferFunction(num / scale, den, system.dt, **names))
-    found.C, found.D = scale * found.C, scale * found.D
+    units = state_units(found.A)
+    found.A, found.B = found.A * units / units[:, None], found.B / units[:, None]
+    found.C, found.D = scale * found.C * units, scale * found.D
     return found
 
 

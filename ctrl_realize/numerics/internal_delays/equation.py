@@ -27,6 +27,7 @@ import numpy as np
 from scipy.special import roots_jacobi
 
 from ..arrays import FloatArray, IntArray
+from ..state_space.sampling import state_units
 from .form import DelayForm
 
 STAGES = 6
@@ -121,6 +122,9 @@ def solve(
     ------
     TooManyStepsError
     """
+    units = state_units(form.A)
+    alike = form.A * units / units[:, None], form.B / units[:, None], form.C * units
+    form, initial_state = DelayForm(*alike, form.D, form.delays), initial_state / units
     end = float(times[-1])
     points = np.concatenate([times, breaking_points(form, breaks, end)])
     longest = min([end or 1.0, *form.delays, _shortest_time(form)])
@@ -234,7 +238,7 @@ def _stepped(
     S, K = mesh.size - 1, NODES.size
     lengths = np.diff(mesh)
     # Rounded, so that steps which are alike share their matrices.
-    key, same = np.unique(np.round(lengths / lengths.max(initial=1.0), 12), return_inverse=True)
+    key, same = np.unique(np.round(lengths / lengths.max(initial=0.0), 12), return_inverse=True)
     matrices = [_step_matrices(form, float(lengths[same == k][0])) for k in range(key.size)]
     inner = mesh[:-1, None] + lengths[:, None] * NODES
     # The end of a step belongs to it: a jump there is the next one's.

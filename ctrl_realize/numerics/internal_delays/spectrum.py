@@ -97,7 +97,8 @@ def _of_loop(part: DelayForm, count: int) -> ComplexArray:
         starts = in_order(starts, starts.size)[: 6 * count + 30]
         roots, last = newton_polished(part, starts, discrete=False)
         near = np.abs(roots - starts) < 0.5 * (1 + np.abs(starts))
-        near &= roots.real * max(part.delays) > VANISHED
+        with np.errstate(over="ignore"):  # of iterations that went to infinity
+            near &= roots.real * max(part.delays) > VANISHED
         roots = in_order(with_pairs(apart(roots[(last < RESIDUAL) & near])), count)
         same = roots.size == before.size and np.allclose(roots, before, rtol=1e-8, atol=1e-10)
         if (same and roots.size) or points >= MOST_POINTS:

@@ -24,6 +24,7 @@ from scipy.linalg import schur, solve_sylvester
 
 from ..arrays import FloatArray
 from ..hankel.svd import thin_svd
+from .sampling import state_units
 
 Part = tuple[FloatArray, FloatArray, FloatArray]
 
@@ -53,9 +54,10 @@ def split_modes(
     def select(re: float, im: float = 0.0) -> bool:
         return first(complex(re, im))
 
-    T, Q, count = schur(A, "real", sort=select)
+    units = state_units(A)
+    T, Q, count = schur(A * units / units[:, None], "real", sort=select)
     k = int(count)
-    right, left = Q.T @ B, C @ Q
+    right, left = Q.T @ (B / units[:, None]), C * units @ Q
     # [I X; 0 I] decouples T when T11 X - X T22 = -T12.
     if 0 < k < n:
         X = np.asarray(solve_sylvester(T[:k, :k], -T[k:, k:], -T[:k, k:]), dtype=np.float64)

@@ -52,10 +52,12 @@ def schur_form(A: FloatArray) -> Schur:
     if A.shape[0] == 0:
         empty = np.zeros((0, 0), dtype=np.complex128)
         return empty, empty, empty
-    balanced, scale = matrix_balance(A)
-    T, Q = schur(balanced, output="complex")
+    with np.errstate(invalid="ignore"):  # SciPy makes positions of the scales, too
+        # without the diagonal, which for a sampled model is as large as all the rest
+        _, scale = matrix_balance(A - np.diag(np.diag(A)))
     # The scale is a permuted diagonal matrix of powers of two: all of this is exact.
     back = np.divide(1.0, scale, where=scale != 0, out=np.zeros_like(scale)).T
+    T, Q = schur(back @ A @ scale, output="complex")
     V, W = scale @ Q, Q.conj().T @ back
     return np.asarray(T, dtype=np.complex128), np.asarray(V), np.asarray(W)
 

@@ -11,6 +11,8 @@ References
    Control 23 (1978) 395-404, doi:10.1109/TAC.1978.1101743.
 .. [3] N. J. Higham, Functions of Matrices, SIAM 2008, chapter 11 (Matrix logarithm),
    doi:10.1137/1.9780898717778.
+.. [4] B. N. Parlett and C. Reinsch, Balancing a matrix for calculation of eigenvalues and
+   eigenvectors, Numer. Math. 13 (1969) 293-304, doi:10.1007/BF02165404.
 """
 
 from __future__ import annotations
@@ -21,7 +23,7 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from scipy.linalg import expm
+from scipy.linalg import expm, matrix_balance
 from scipy.optimize import brentq, fminbound
 
 from ..arrays import FloatArray, Matrices
@@ -29,6 +31,18 @@ from .matrix_logarithm import principal_logarithm
 
 _EXPLAINED = 1e-9
 """Relative rounding of a feedthrough that a fraction of a sample explains."""
+
+
+def state_units(A: FloatArray) -> FloatArray:
+    """Find units of the states, powers of two, in which the entries of A are of similar size [4]_.
+
+    Those of a companion form grow with powers of its speeds: for lags of 1e6 s, exponentials and
+    Schur forms of four of them have no correct digits otherwise. The diagonal is left out: it has
+    no units, and that of a sampled model, next to 1, is as large as all the rest.
+    """
+    coupled = A - np.diag(np.diag(A))
+    with np.errstate(invalid="ignore"):  # SciPy makes positions of the units, too
+        return np.asarray(matrix_balance(coupled, permute=False, separate=True)[1][0], np.float64)
 
 
 def zero_order_hold(A: FloatArray, B: FloatArray, dt: float) -> tuple[FloatArray, FloatArray]:
@@ -46,10 +60,14 @@ def zero_order_hold(A: FloatArray, B: FloatArray, dt: float) -> tuple[FloatArray
         exp(A dt) and the integral of exp(A s) B over 0..dt.
     """
     n, m = B.shape
-    block = np.zeros((n + m, n + m))
-    block[:n, :n], block[:n, n:] = A, B
+    block, units = np.zeros((n + m, n + m)), np.ones(n + m)
+    block[:n, :n], block[:n, n:] = A * dt, B * dt
+    units[:n] = state_units(A)
+    # Inputs of a far larger size than A would cost digits, too: one for each squaring.
+    size = np.abs(block[:n, n:] / units[:n, None]).max(axis=0, initial=0.0)
+    units[n:] = 1 / np.where(size > 0, size, 1.0)
     # exp([[A, B], [0, 0]] dt) = [[Phi, Gamma], [0, I]] (Van Loan 1978).
-    grown = expm(block * dt)
+    grown = expm(block * units / units[:, None]) * units[:, None] / units
     return grown[:n, :n], grown[:n, n:]
 
 

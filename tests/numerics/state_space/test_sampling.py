@@ -1,11 +1,14 @@
 """Dead times in samples, delays of channels, half rule, step responses in closed form."""
 
+import control as ct
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
+from scipy.linalg import companion
 
+import ctrl_realize as cr
 from ctrl_realize.numerics.state_space.delay_split import split_delays
 from ctrl_realize.numerics.state_space.process_models import half_rule
 from ctrl_realize.numerics.state_space.sampling import split_dead_time
@@ -79,3 +82,26 @@ def test_a_lead_is_cancelled_by_its_rule(lags, leads, dead_time, factor, kept):
     assert found == pytest.approx(factor)
     assert left == pytest.approx(kept)
     assert theta == dead_time
+
+
+@pytest.mark.parametrize("unit", [1e-9, 1e-3, 1e6])
+@pytest.mark.parametrize("dt", [0.1, 2e-4])
+@pytest.mark.parametrize("kind", ["transfer function", "companion form"])
+def test_lags_are_sampled_alike_in_any_unit_of_time(unit, dt, kind):
+    """Six lags against their partial fractions; expm of the matrix as it is has no digits."""
+    speeds = np.linspace(0.3, 3, 6)
+    den = np.poly(-speeds / unit)
+    core = ct.tf([den[-1]], den)
+    if kind == "companion form":
+        first = np.r_[1.0, np.zeros(5)][:, None]
+        core = ct.ss(companion(den), first, den[-1] * first[::-1].T, 0)
+    plant = cr.delayed_ss(core, 5, dt=dt * unit)
+    shares = [np.prod(np.delete(speeds, i) / (np.delete(speeds, i) - speeds[i])) for i in range(6)]
+    z = np.exp(dt * (1e-2 + 1j * np.array([0, 0.1, 1.0])))
+    fall = np.expm1(-speeds * dt)[:, None]
+    expected = z**-5 * (np.array(shares)[:, None] * fall / (1 - z + fall)).sum(axis=0)
+    # the shares are up to 300 of the sum; poles of six lags have lost some digits more
+    assert_allclose(plant(z), expected, rtol=0, atol=1e-9)
+    if kind == "transfer function":
+        found = np.sort(-np.log(plant.delay_free.poles().real)) / dt
+        assert_allclose(found, speeds, rtol=1e-5)
