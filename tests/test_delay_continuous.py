@@ -371,6 +371,14 @@ UNEQUAL = {
     + np.array([[0], [1]]) * cr.delay(0.55) * P2,
     "an output beside its echo": (np.ones((2, 1)) + np.array([[0], [1]]) * cr.delay(0.42)) * LAG,
     "paths of one plant": P1 + 3 * LAG * cr.delay(0.87),
+    "one fraction for two inputs": LAG * cr.delay(0.425) * np.array([[1, 2]]),
+    "fractions before and behind": ct.append(cr.delay(0.0), cr.delay(0.37))
+    * (np.array([[1], [2]]) * (LAG * cr.delay(0.03))),
+    "a fraction behind the only output": cr.delay(0.05)
+    * (
+        cr.DelaySystem(ct.ss([[-1.0]], [[1, 2]], [[1]], [[0, 0]]))
+        * ct.append(cr.delay(0.1), cr.delay(0.0))
+    ),
 }
 
 

@@ -6,11 +6,12 @@ alike: the same signal twice, a chain of two delays, a channel that nothing read
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TypeAlias
 
 import numpy as np
 
-from ..arrays import FloatArray
+from ..arrays import FloatArray, IntArray
 from .form import DelayForm, without_zero_delays
 
 Paths: TypeAlias = tuple[DelayForm, FloatArray, FloatArray, FloatArray, FloatArray]
@@ -155,8 +156,8 @@ def _inputs_apart(form: DelayForm) -> tuple[list[float], DelayForm]:
 def paths_apart(form: DelayForm) -> Paths | None:
     """Take all delays out of a form without loops through them: left, delays, core, delays, right.
 
-    A delay that reads one input and no state is one before a further input of the core, which has
-    the same signal; one that drives one output and no state is behind a further output.
+    A delay that reads inputs of equal delays and no state is one before a further input of the
+    core, which has their signal; one that drives outputs and no state is behind a further output.
 
     Returns
     -------
@@ -174,11 +175,11 @@ def paths_apart(form: DelayForm) -> Paths | None:
     reads, drives = _out_of(rest), _into(rest).T
     heads, tails = [], []
     for i in range(len(rest.delays)):
-        (read,), (driven,) = np.nonzero(reads[i]), np.nonzero(drives[i])
-        if read.size == 1 and n <= read[0] < n + m:
-            heads.append((i, int(read[0]) - n))
-        elif driven.size == 1 and n <= driven[0] < n + p:
-            tails.append((i, int(driven[0]) - n))
+        read, driven = np.flatnonzero(reads[i]) - n, np.flatnonzero(drives[i]) - n
+        if _alike(read, before):
+            heads.append((i, int(read[0])))
+        elif _alike(driven, behind):
+            tails.append((i, int(driven[0])))
         else:
             return None
     columns = [*range(m), *(m + i for i, _ in heads)]
@@ -194,6 +195,12 @@ def paths_apart(form: DelayForm) -> Paths | None:
         np.hstack([np.eye(p), rest.D[:p, late]]),
         np.vstack([np.eye(m), rest.D[[p + i for i, _ in heads], :m]]),
     )
+
+
+def _alike(signals: IntArray, delays: Sequence[float]) -> bool:
+    """Whether all signals are ends of a form, and have the same delay."""
+    some = signals.size > 0 and signals.min() >= 0 and signals.max() < len(delays)
+    return some and np.ptp(np.take(delays, signals)) == 0
 
 
 def _reaches(form: DelayForm, column: int, row: int) -> bool:

@@ -205,7 +205,7 @@ def continuous_ends(
     """
     A, B, C, D = core
     late = np.array(before, dtype=np.float64), np.array(behind, dtype=np.float64)
-    if D.shape == (1, 1):
+    if D.shape[0] == 1:  # a fraction behind the only output is one of each input
         late = (late[0] + late[1], np.zeros(1))
     if not A.size:
         return core, tuple((late[0] * dt).tolist()), tuple((late[1] * dt).tolist())
@@ -247,6 +247,8 @@ def continuous_ends(
     for j, f in columns.items():
         G[:, [j]], D[:, j] = inputs(f, [j]), 0.0
         late[0][j] -= 1 - f
+    if D.shape[1] == 1 and not columns:
+        late = (np.zeros(1), late[0] + late[1])
     direct = np.flatnonzero(np.any(D, axis=1) & (late[1] > 0)).tolist()
     rows = {} if columns else {i: fraction([i], slice(None)) for i in direct}
     for i, f in rows.items():
