@@ -4,6 +4,7 @@ import control as ct
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from scipy.optimize import brentq
 
 import ctrl_realize as cr
 from ctrl_realize import design
@@ -96,6 +97,36 @@ def test_the_ultimate_gain_of_a_continuous_plant_is_exact():
     assert sampled.dt == 0.01
     table = design.compare_pid(ct.tf([1], [1, 1]) * cr.delay(1.0), ["simc"], ["PI"])
     assert table.margins[0].ms == design.pid(ct.tf([1], [1, 1]) * cr.delay(1.0)).check.margins.ms
+
+
+@pytest.mark.parametrize("gain", [1, -1])
+def test_the_ultimate_gain_of_an_integrator_with_a_lead(gain):
+    # (10 s + 1) exp(-0.1 s) / (s (s + 1)): the lead turns the slow response to a positive real part
+    plant = gain * ct.tf([10, 1], [1, 1, 0]) * cr.delay(0.1)
+    found = design.ultimate(plant)
+
+    def phase(w):
+        return np.arctan(10 * w) - np.pi / 2 - np.arctan(w) - 0.1 * w + np.pi
+
+    w = brentq(phase, 1, 40)
+    assert found.period == pytest.approx(2 * np.pi / w, rel=1e-8)
+    size = w * np.hypot(1, w) / np.hypot(1, 10 * w)
+    assert found.gain == pytest.approx(gain * size, rel=1e-8)
+
+
+@pytest.mark.parametrize("unit", [1e-3, 1e6])
+def test_an_integrator_in_any_states_is_one_in_any_unit_of_time(unit):
+    turn = np.random.default_rng(3).standard_normal((3, 3))
+    back = np.linalg.inv(turn)
+    A = turn @ np.array([[0, 1, 0], [0, -1, 1], [0, 0, -3.0]]) @ back / unit
+    core = ct.ss(A, turn[:, 2:] / unit, back[:1], 0)
+    plant = cr.DelaySystem(core) * cr.delay(0.5 * unit)
+    # 1/3 exp(-0.5 s) / (s (s + 1)(s/3 + 1)): half of the lag of 1/3 s goes to either side
+    found = design.reduce_sopdt(plant, method="half_rule")
+    assert found.integrating
+    values = [found.gain * unit, found.lag / unit, found.dead_time / unit]
+    assert_allclose(values, [1 / 3, 7 / 6, 2 / 3], rtol=1e-9)
+    assert design.ultimate(plant).gain > 0
 
 
 def test_robustness_to_the_dead_time_ends_where_the_loop_becomes_unstable():

@@ -128,7 +128,9 @@ def _inside_factor(system: DelaySystem) -> Factor:
     def characteristic(w: ComplexArray, rate: float) -> ComplexArray:
         return system.characteristic(w + shift)
 
-    poles = np.exp(features * dt) if dt else features
+    # the first ones are the core's, which those of the system repeat, or replace in a loop
+    own = features[in_s_plane(np.linalg.eigvals(system.core.A), dt).size :]
+    poles = np.exp(own * dt) if dt else own
     return Factor(response, characteristic, 0, dead_time / dt if dt else dead_time, features, poles)
 
 

@@ -158,7 +158,7 @@ def both_forms(
         core, total = core_and_dead_time(system, "a reduction")
         total += 0.0 if dead_time is None else dead_time
         speeds = np.abs(core.poles())
-        speeds = speeds[speeds > 1e-12]
+        speeds = speeds[speeds > 1e-10 * speeds.max(initial=0.0)]  # an integrator is none
         span = float(np.sum(1 / speeds)) + total
         if span == 0:
             raise UnsuitableSystemError(f"{core.name!r} has no lag and no dead time to reduce")
