@@ -179,7 +179,7 @@ def _answer_chance(output: FloatArray, drive: FloatArray, past: int, first: int 
 
     With `first` 1 the present output, which may respond to it within the sample, is left out.
     """
-    past = min(2 * past, output.size // 5)
+    past, drive = min(2 * past, output.size // 5), _about_mean(drive)
     here = np.arange(past, output.size)
     own = np.stack([np.ones(here.size), *(drive[here - i] for i in range(1, past + 1))], axis=1)
     outputs = np.stack([output[here - i] for i in range(first, _OUTPUTS)], axis=1)
@@ -207,7 +207,7 @@ def late_samples(output: FloatArray, drive: FloatArray, past: int) -> tuple[int,
         And the part of what earlier inputs leave of the output that those of the same sample and of
         later ones explain; 0 and 0 if they explain less than half of it.
     """
-    here = np.arange(past, output.size - _LATE)
+    here, drive = np.arange(past, output.size - _LATE), _about_mean(drive)
     if here.size < LEAST_FREEDOM + 2 * past:
         return 0, 0.0
     earlier = [drive[here - i] for i in range(1, past + 1)]
@@ -288,10 +288,16 @@ def _past(
     if rows < LEAST_FREEDOM + 2 * (OWN_PAST + past):
         return None
     here = np.arange(before, before + rows)
+    output, drive = _about_mean(output), _about_mean(drive)
     own = [output[here - i] for i in range(1, OWN_PAST + 1)]
     earlier = [drive[here - i] for i in range(1, past + 1)]
     level = [np.ones(rows), here / rows]
     return here, np.stack([*level, *own, *earlier], axis=1)
+
+
+def _about_mean(values: FloatArray) -> FloatArray:
+    """Leave the level to the constant of a regression: beside a large one moves are rounding."""
+    return values - np.mean(values)
 
 
 def _tamed(values: FloatArray) -> FloatArray:

@@ -205,6 +205,16 @@ def test_set_points_hide_no_feedback_and_units_change_no_chance():
     assert feedback_chance(1e3 * y + 7, 1e-3 * u - 2, 20) == pytest.approx(one, rel=1e-4)
 
 
+@pytest.mark.parametrize("level", [0.0, 1e5, 1e7])  # such as a pressure in Pa
+def test_a_smooth_input_is_told_by_its_own_past_at_any_level(level):
+    """Fifteen sinusoids follow an equation of thirty past samples exactly: nothing can be asked."""
+    tones = np.arange(1, 16)[:, None]
+    u = np.sin(2 * np.pi * tones * np.arange(N) / N + tones**2).sum(axis=0)
+    y = first_order(u) + 0.05 * np.random.default_rng(0).standard_normal(N)
+    assert feedback_chance(y, u + level, 60) == 1.0
+    assert nonlinear_chance(y, u + level, 60) == (1.0, 0.0)
+
+
 def test_where_nothing_can_be_told_nothing_is_said():
     rng = np.random.default_rng(0)
     u = np.sin(0.1 * np.arange(N))  # told by its own past
