@@ -57,6 +57,18 @@ def test_an_integrator_is_exact_in_the_model_and_in_words():
     assert re.fullmatch(form, system.fit.formula)
 
 
+@pytest.mark.parametrize("noise", [0.0, 1e-4])  # of an output that moves by 10
+def test_an_integrator_behind_a_pulse_is_not_ruled_out_by_exact_data(noise):
+    t = np.arange(300.0)
+    ramps = np.clip(t - 51.3, 0, None) - np.clip(t - 91.3, 0, None)  # the integral, 7.3 s late
+    y = 20 + 0.25 * ramps + noise * np.random.default_rng(1).standard_normal(t.size)
+    pulse = 30 + 5.0 * ((t >= 44) & (t < 84))
+    fit = cr.identify(cr.Record(t, pulse, y), structures="P0DI").fit
+    assert not codes(fit) & {"apparent_dead_time", "structured_misfit"}
+    assert fit.interval[0] <= 7.3 <= fit.interval[1]
+    assert fit.gain == pytest.approx(0.05, rel=1e-5)  # the pole, over the length of the record
+
+
 @pytest.mark.parametrize(("asked", "count"), [("P1ID", 600), ([(2, 2)], 8000)])
 def test_a_longer_ramp_tells_no_less_of_lag_and_dead_time(asked, count):
     # Integrator and lag are one pair of poles, whose ratio grows with the length of the ramp.
