@@ -31,7 +31,7 @@ from ..data.shown_units import in_shown_units
 from ..delayed import DelayedStateSpace, fit_of
 from ..delayed.parts import signals_of
 from ..errors import DataError, DataWarning
-from ..numerics.arrays import BoolArray, FloatArray
+from ..numerics.arrays import FloatArray
 from ..numerics.blas_threads import single_threaded
 from ..numerics.constants import SMALLEST
 from ..numerics.engine.plausible_models import PlausibleModel
@@ -58,6 +58,8 @@ Both leave the noise of steps whose response ends; a tank's two valves leave 2 t
 _SETTLED = 0.02
 """Change of a response, in standard deviations of the residual, from which on all is settled: a
 tenth of the error of a response that five parameters have from a thousand samples."""
+_A_LITTLE = 0.2
+"""The same, up to which fits in turn may move about the fit of all together: three such errors."""
 
 
 @single_threaded
@@ -129,14 +131,13 @@ def fit_several_inputs(
             responses, earlier = fitted_together(fits, record, rested)
             apart = np.std(responses - together, axis=1) / fits[-1].residual_std
             # Fits in turn may weight samples in another way, and move a little for ever.
-            settled, together = bool(apart.max() < _SETTLED), responses.copy()
+            settled = bool(apart.max() < _SETTLED) and moved < _A_LITTLE
+            together = responses.copy()
     if record.irregular:
         systems = [_sampled(system, record.sample_time) for system in systems]
     fits = [fit_of(system, OutputErrorFit) for system in systems]
     fits[0] = replace(fits[0], flags=(*repeated, *fits[0].flags))
-    result = SeveralInputsFit(
-        _wider(fits, record, ~np.isnan(output - earlier)), (record,), responses, cycle, settled
-    )
+    result = SeveralInputsFit(_wider(fits, record, earlier), (record,), responses, cycle, settled)
     return _joined(systems, result)
 
 
@@ -210,13 +211,15 @@ def _sampled(system: DelayedStateSpace, step: float) -> DelayedStateSpace:
 
 
 def _wider(
-    fits: list[OutputErrorFit], record: Record, seen: BoolArray
+    fits: list[OutputErrorFit], record: Record, earlier: FloatArray
 ) -> tuple[OutputErrorFit, ...]:
     """Widen the intervals from those with the other models known to those with all estimated."""
     bounds = bounds_of(fits)
     inputs = np.atleast_2d(record.input)
     tangents = [bound.slopes(u)[0] for bound, u in zip(bounds, inputs, strict=True)]
-    clock, at_rest = (record.time - record.time[0])[seen], all(map(from_rest, fits))
+    seen = ~np.isnan(np.ravel(record.output) - earlier)
+    clock = (record.time - record.time[0])[seen]
+    at_rest = not np.any(earlier) and all(map(from_rest, fits))
     every = [own_columns(fit, clock, at_rest) for fit in fits]
     found = []
     for i, fit in enumerate(fits):

@@ -24,7 +24,7 @@ from scipy.optimize import least_squares
 
 from ..data import Record
 from ..numerics.arrays import FloatArray
-from ..numerics.constants import HUBER, SMALLEST
+from ..numerics.constants import HUBER, SMALLEST, STRONG
 from ..numerics.engine.plausible_models import PlausibleModel
 from ..numerics.output_error.any_input.data import BEYOND
 from ..numerics.output_error.step_data import own_regressors
@@ -38,8 +38,8 @@ _REACH = 5.0  # logarithm of the factor by which a time constant or a damping ma
 
 
 def from_rest(fit: OutputErrorFit) -> bool:
-    """Whether a fit is that of a step experiment, or of another record that begins at rest."""
-    return bool(np.isfinite(fit.onset)) or not fit.data.relaxing
+    """Whether a fit has no free response to what was before its record."""
+    return not fit.data.relaxing
 
 
 def prescribed(fit: OutputErrorFit) -> bool:
@@ -62,17 +62,18 @@ def fitted_together(
     """Responses (m, N) to all inputs, and the free responses (N,), level and drift beside them.
 
     The latter are zero from rest, and NaN where inputs before the record may act. A record that
-    `rested` before its first move is fitted from rest unless drift and free responses have
-    evidence by BIC.
+    `rested` before its first move is fitted from rest if that has strong evidence by BIC over drift
+    and free responses: fits in turn may have been made without these.
     """
-    found = _together(fits, record, at_rest=all(map(from_rest, fits)))
-    if not rested or all(map(from_rest, fits)):
+    steps = all(np.isfinite(fit.onset) and from_rest(fit) for fit in fits)
+    found = _together(fits, record, at_rest=steps)
+    if steps or not rested:
         return found
     seen, size = ~np.isnan(found[1]), np.count_nonzero(~np.isnan(found[1]))
     ways = _together(fits, record, at_rest=True), found
     rest, free = (np.var((np.ravel(record.output) - r.sum(axis=0) - e)[seen]) for r, e in ways)
     terms = 1 + sum(np.count_nonzero(fit.poles) for fit in fits)
-    return ways[0] if size * np.log(rest / free) <= terms * np.log(size) else found
+    return ways[0] if size * np.log(rest / free) + STRONG < terms * np.log(size) else found
 
 
 def _together(
