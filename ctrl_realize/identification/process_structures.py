@@ -199,9 +199,10 @@ def _named(given: Any, what: str, form: ProcessForm) -> list[tuple[str, Any]]:
 
 def _value(name: str, value: Any) -> float:
     number = real(value, name, "value of a parameter, times in s")
-    low, high = _range(name)
-    if not low <= number <= high or (number == 0 and name not in ("dead_time", "lead_1")):
-        raise OptionError(f"{name}={value!r}; expected a number in {low:g}...{high:g}, not 0")
+    (low, high), zero = _range(name), name in ("dead_time", "lead_1")
+    if not low <= number <= high or (number == 0 and not zero):
+        least = "" if zero else ", not 0"
+        raise OptionError(f"{name}={value!r}; expected a number in {low:g}...{high:g}{least}")
     return number
 
 

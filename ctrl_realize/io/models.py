@@ -13,11 +13,12 @@ from typing import Any, TypeAlias
 import control as ct
 import numpy as np
 
+from .._checks import check_type
 from .._facts import version_of
 from ..delayed import DelayedStateSpace, DelaySystem
 from ..delayed.inside.pure import TransferDelay
 from ..delayed.parts import signals_of
-from ..errors import CtrlRealizeError, FileFormatError, OptionError
+from ..errors import CtrlRealizeError, FileFormatError, OptionError, UnsuitableSystemError
 from .atomic import write_text
 from .checks import usable_file
 from .json_content import field, finite_numbers, matrix, parsed, texts, whole_numbers
@@ -141,10 +142,10 @@ def model_to_text(
     """Return a model as the text that `save_model` writes."""
     model: Model = system
     if not isinstance(system, DelayedStateSpace | DelaySystem):
-        # anything but a system is refused by DelayedStateSpace
-        name = system.name if isinstance(system, ct.InputOutputSystem) else None
+        expected = "a state-space model, after the path of its file"
+        check_type(system, ct.InputOutputSystem, "system", expected, UnsuitableSystemError)
         continuous = isinstance(system, ct.StateSpace) and not system.dt
-        model = (DelaySystem if continuous else DelayedStateSpace)(system, name=name)
+        model = (DelaySystem if continuous else DelayedStateSpace)(system, name=system.name)
     fit = model.fit if isinstance(model, DelayedStateSpace) else None
     content = {
         "format": FORMAT,

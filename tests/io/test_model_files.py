@@ -225,6 +225,8 @@ def test_what_cannot_be_saved_leaves_the_old_model_and_no_file(file, model):
     ):
         with pytest.raises((OptionError, UnsuitableSystemError)):
             save_model(file, what, settings=settings)
+    with pytest.raises(UnsuitableSystemError, match=r"system is a str; .* after the path"):
+        save_model(model, str(file))
     with pytest.raises(FileNotFoundError):
         save_model(file.parent / "nowhere" / "a.json", model)
     assert file.read_bytes() == before

@@ -269,6 +269,8 @@ def fit_output_error(
             raise OptionError(
                 f"actuator={actuator!r} with known dynamics or gains='own': expected one of them"
             )
+    if include_known and known is None:
+        raise OptionError("include_known=True without known dynamics; expected them as known=")
     factor = known_factor(known)
     several = on_common_axis(checked_records(records))
     # Of long records every sample tells, where the response is not fitted by means of blocks.

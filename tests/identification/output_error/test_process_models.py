@@ -220,6 +220,13 @@ def test_all_parameters_may_be_prescribed_and_a_contradiction_is_told(name):
         assert {"structured_misfit", "apparent_dead_time"} <= codes(fit)
 
 
+def test_a_value_that_is_not_possible_is_told_with_those_that_are():
+    with pytest.raises(cr.errors.OptionError, match=r"a number in 0\.\.\.inf$"):
+        cr.identify(record(TWO_LAGS), structures=ProcessStructure("P2D", fixed={"Td": -7.3}))
+    with pytest.raises(cr.errors.OptionError, match=r"not 0$"):
+        cr.identify(record(TWO_LAGS), structures=ProcessStructure("P2D", fixed={"gain": 0}))
+
+
 def test_the_apparent_dead_time_of_an_approximation_may_be_later_than_the_visible_onset():
     """One lag for three: with the dead time that is best the error is 0.6 times as large."""
     t = np.arange(400.0)

@@ -53,6 +53,8 @@ def test_known_dynamics_stay_out_of_the_model_unless_asked_for():
     s = 2j * np.pi * 5.0
     ratio = within(np.exp(s * TS)) / without(np.exp(s * TS))
     assert_allclose(ratio, sensor(s), atol=2e-3)  # the hold acts once, not twice: (5/1280)^2
+    with pytest.raises(cr.errors.OptionError, match="include_known=True without known"):
+        cr.fit_output_error(record, include_known=True)
 
 
 def test_hum_and_drift_before_the_step_are_fitted_along():
