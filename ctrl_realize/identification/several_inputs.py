@@ -2,9 +2,10 @@
 
 The models are those of the output-error fit, each of the output without the responses to the other
 inputs, in turn until nothing changes: Gauss-Seidel iterations of the common least-squares problem
-[1]_. These are slow where inputs move alike: after the first turns all parameters are fitted
-together. Each interval then holds for the other models as they are; it is widened by what the other
-parameters leave open, from the information matrix of all [2]_.
+[1]_. They begin with finite impulse responses to the inputs, or to their integrals. They are slow
+where inputs move alike: after the first turns all parameters are fitted together, from rest if the
+record begins so. Each interval then holds for the other models as they are; it is widened by what
+the other parameters leave open, from the information matrix of all [2]_.
 
 References
 ----------

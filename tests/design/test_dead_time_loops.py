@@ -125,7 +125,8 @@ def test_an_integrator_in_any_states_is_one_in_any_unit_of_time(unit):
     found = design.reduce_sopdt(plant, method="half_rule")
     assert found.integrating
     values = [found.gain * unit, found.lag / unit, found.dead_time / unit]
-    assert_allclose(values, [1 / 3, 7 / 6, 2 / 3], rtol=1e-9)
+    # rounding of these states makes zeros at some 4e7 rad/s: the dead time has 2e-8 s more
+    assert_allclose(values, [1 / 3, 7 / 6, 2 / 3], rtol=1e-6)
     assert design.ultimate(plant).gain > 0
 
 

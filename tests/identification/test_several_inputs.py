@@ -179,10 +179,9 @@ def test_structures_that_describe_every_plant_converge_and_others_say_that_they_
     assert re.search(r"not converged: give|still change after \d+ iterations", said)
 
 
-@pytest.mark.parametrize("seed", [1, 2])
-def test_two_valves_of_a_tank_have_an_integrator_each(seed):
+def test_two_valves_of_a_tank_have_an_integrator_each():
     """What one valve does is far larger than the noise, and never ends."""
-    rng = np.random.default_rng(seed)
+    rng = np.random.default_rng(1)
     plants = [(0.01, 8.0, 3.3), (-0.015, 15.0, 12.0)]
     u = np.repeat(rng.choice([-1.0, 1.0], (2, 30)), 20, axis=1)
     u[:, :20] = 0.0
