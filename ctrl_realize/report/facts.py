@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import product
+
 import control as ct
 import numpy as np
 
@@ -57,9 +59,12 @@ def poles_of(system: DelayedStateSpace) -> str:
 
 
 def gain_of(system: DelayedStateSpace) -> str:
-    """Write the gain at zero frequency, or that there is none."""
-    gain = float(np.real(np.ravel(system.delay_free.dcgain())[0]))
-    return f"{gain:.4g}" if np.isfinite(gain) else INTEGRATING
+    """Write the gain at zero frequency, of each channel, or that there is none."""
+    core = system.delay_free
+    # one by one: python-control has no zeros where inputs are not as many as outputs
+    channels = product(range(core.noutputs), range(core.ninputs))
+    gains = [float(np.real(core[i, j].dcgain())) for i, j in channels]
+    return ", ".join(f"{gain:.4g}" for gain in gains) if np.isfinite(gains).all() else INTEGRATING
 
 
 def disagreement(comparison: FRFComparison | None) -> list[tuple[str, str]]:

@@ -5,6 +5,7 @@ import hashlib
 import re
 from html.parser import HTMLParser
 
+import control as ct
 import numpy as np
 import pytest
 
@@ -261,3 +262,14 @@ def test_the_part_of_a_controller_lists_the_models_on_which_its_loop_is_unstable
     # robust on all models that are drawn, and still not what the fit can promise
     safe = controller_of(system, cr.design.pid(system, closed_loop_time="robust"))
     assert safe.level == "caution"
+
+
+@pytest.mark.parametrize(("ends", "said"), [([1], "gain 1, 2"), ([1, 0], "integrating")])
+def test_a_model_of_two_inputs_has_its_gains_in_the_verdict(ends, said):
+    """Two valves of a tank had no report: python-control has no zeros of two inputs, one output."""
+    one, other = (
+        cr.delayed_ss(ct.tf([gain], np.polymul([lag, 1], ends)), 2, dt=1.0)
+        for gain, lag in ((1, 5), (2, 3))
+    )
+    system = np.ones((1, 2)) * one.append(other)
+    assert said in verdict_of(system).headline
