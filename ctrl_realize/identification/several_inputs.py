@@ -166,7 +166,8 @@ def _starting(record: Record, rested: bool) -> FloatArray:
     even = record.at_equal_distances()
     start: Literal["rest", "unknown"] = "rest" if rested else "unknown"
     moves = np.atleast_2d(even.input) - even.input[..., :1]
-    seen, output = ~np.isnan(np.ravel(even.output)), np.ravel(even.output)
+    output = np.ravel(even.output)
+    seen = ~np.isnan(output)
     line = np.stack([np.ones(seen.sum()), even.time[seen]], axis=1)  # a drift is no response
     found, left = [], []
     for driven in (moves, np.cumsum(moves, axis=1)):

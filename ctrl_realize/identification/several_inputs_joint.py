@@ -69,7 +69,8 @@ def fitted_together(
     found = _together(fits, record, at_rest=steps)
     if steps or not rested:
         return found
-    seen, size = ~np.isnan(found[1]), np.count_nonzero(~np.isnan(found[1]))
+    seen = ~np.isnan(found[1])
+    size = np.count_nonzero(seen)
     ways = _together(fits, record, at_rest=True), found
     rest, free = (np.var((np.ravel(record.output) - r.sum(axis=0) - e)[seen]) for r, e in ways)
     terms = 1 + sum(np.count_nonzero(fit.poles) for fit in fits)

@@ -146,7 +146,7 @@ def _dead_time(fit: Any) -> Verdict:
     if fit.onset is not None and np.isfinite(fit.onset):
         least = max(least, _NARROW * min(fit.onset, high))
         # The start of the response to a step tells it, whatever its end leaves open.
-        flags = [flag for flag in flags if flag.code != "gain_not_resolved"]
+        flags = [flag for flag in flags if flag.code not in marked("not_of_a_step")]
     if fit.total_delay is not None and np.isfinite(fit.total_delay_interval or np.inf).all():
         least = max(least, _OF_TOTAL * fit.total_delay)
     level, why = _level(flags, "dead_time", width <= least, some=True)

@@ -149,7 +149,8 @@ def test_gains_in_operation_are_those_of_least_squares_with_their_errors(seed):
     for fit, i in zip(fits, (0, 3), strict=True):
         # Huber's loss has 5 % more variance, so that estimates differ by a quarter of an error
         assert abs(fit.gain - best.x[i]) < 0.5 * errors[i]
-        assert np.ptp(fit.gain_interval) / 3.92 == pytest.approx(errors[i], rel=0.15)
+        # the noise, of 385 samples, is known to 4 %
+        assert np.ptp(fit.gain_interval) / 3.92 == pytest.approx(errors[i], rel=0.1)
 
 
 def integrator_and_gain(seed):

@@ -13,11 +13,11 @@ import numpy as np
 
 from ..arrays import FloatArray
 
-SHORT_LEAD = 1e-3
+_SHORT_LEAD = 1e-3
 """Share of all times together up to which a lead counts as none. The zeros of a sampled model far
 beyond its lags are rounding, and rule T2 would take them for its gain."""
 
-ITERATIONS = 20
+_ITERATIONS = 20
 """How often the rules for leads are repeated at most."""
 
 
@@ -103,8 +103,8 @@ def half_rule(
        Process Control 13 (2003) 291-309, sections 2 and 5.
     """
     given = theta = dead_time + float(inverse.sum())
-    leads = leads[leads > SHORT_LEAD * (given + float(lags.sum()))]
-    for _ in range(ITERATIONS):
+    leads = leads[leads > _SHORT_LEAD * (given + float(lags.sum()))]
+    for _ in range(_ITERATIONS):
         before = theta
         factor, rest = _cancel_leads(sorted(lags, reverse=True), sorted(leads, reverse=True), theta)
         kept = rest[:order] + [0.0] * (order - len(rest))
