@@ -21,9 +21,10 @@ from __future__ import annotations
 from typing import TypeAlias
 
 import numpy as np
-from scipy.linalg import matrix_balance, schur
+from scipy.linalg import schur
 
 from ..arrays import ComplexArray, FloatArray, block_powers
+from .sampling import state_units
 
 BLOCK = 64
 """Samples that are computed together; the block powers are built by doubling."""
@@ -52,13 +53,9 @@ def schur_form(A: FloatArray) -> Schur:
     if A.shape[0] == 0:
         empty = np.zeros((0, 0), dtype=np.complex128)
         return empty, empty, empty
-    with np.errstate(invalid="ignore"):  # SciPy makes positions of the scales, too
-        # without the diagonal, which for a sampled model is as large as all the rest
-        _, scale = matrix_balance(A - np.diag(np.diag(A)))
-    # The scale is a permuted diagonal matrix of powers of two: all of this is exact.
-    back = np.divide(1.0, scale, where=scale != 0, out=np.zeros_like(scale)).T
-    T, Q = schur(back @ A @ scale, output="complex")
-    V, W = scale @ Q, Q.conj().T @ back
+    units = state_units(A)  # powers of two: all of this is exact
+    T, Q = schur(A * units / units[:, None], output="complex")
+    V, W = units[:, None] * Q, Q.conj().T / units
     return np.asarray(T, dtype=np.complex128), np.asarray(V), np.asarray(W)
 
 
