@@ -193,6 +193,21 @@ def test_units_and_directions_do_not_matter():
     assert first.verdict == other.verdict == STICKS
 
 
+def test_stiction_is_fitted_in_units_far_apart_and_movements_at_a_valve_that_acts_in_reverse():
+    """OP as a fraction and PV in Pa: a threshold of the fit was in the unit of PV."""
+    loop = cr.bench.valve_loop(cr.actuators.KanoStiction(5, 2), process="flow", noise=0.1)
+    record = loop.simulate(600.0, rng=4).record
+    first = diagnosed(record.input, record.output, process="flow")
+    other = diagnosed(0.01 * record.input, 1e6 * record.output, process="flow")
+    assert other.verdict == first.verdict == STICKS
+    # the grids scale with OP: only rounding differs
+    sticks = [one.stiction_fit.S for one in (first, other)]
+    assert sticks[1] == pytest.approx(0.01 * sticks[0], rel=1e-3)
+    reverse = diagnosed(100 - record.input, record.output, process="flow")
+    here, there = (one.method("movements") for one in (first, reverse))
+    assert there.second_index == pytest.approx(here.second_index, rel=1e-6)
+
+
 def test_records_that_cannot_tell_say_why():
     t = TIME[:600]
     wave, lagging = np.sin(2 * np.pi * t / 40), np.sin(2 * np.pi * (t - 7) / 40)

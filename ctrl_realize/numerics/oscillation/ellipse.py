@@ -32,6 +32,11 @@ class Ellipse:
     phase: float
     width: float
 
+    @property
+    def sign(self) -> float:
+        """Sign of the gain: a PI controller lags by 0 to 90 degrees behind minus the value."""
+        return 1.0 if np.cos(self.phase - 0.75 * np.pi) > 0 else -1.0
+
 
 def fit_ellipse(output: FloatArray, value: FloatArray, period: float) -> Ellipse:
     """Fit the ellipse to each segment of both signals (N,), and return the one of median width."""

@@ -82,20 +82,18 @@ class StictionFit:
 
 
 def fit_stiction(
-    output: FloatArray, value: FloatArray, period: float, phase: float, integrating: bool
+    output: FloatArray, value: FloatArray, period: float, sign: float, integrating: bool
 ) -> StictionFit | None:
     """Fit S, J and the linear part to controller output and process value (N,), with drift.
 
-    `phase` is that of the output before the value, in rad, at the oscillation. None if there are
-    fewer than `FEWEST_BLOCKS` cycles, or no linear part with the sign of the process fits.
+    `sign` is that of the gain. None if there are fewer than `FEWEST_BLOCKS` cycles, or no linear
+    part with this sign fits.
     """
     most = min(round(MOST_CYCLES * period), max(MOST_SAMPLES, round((FEWEST_BLOCKS + 4) * period)))
     start = max((output.size - most) // 2, 0)
     output, value = output[start : start + most], value[start : start + most]
     if output.size < (FEWEST_BLOCKS + 2) * period:
         return None
-    # a PI controller lags by 0 to 90 degrees behind minus the value, for a process of gain > 0
-    sign = 1.0 if np.cos(phase - 0.75 * np.pi) > 0 else -1.0
     swing = 2 * float(np.sqrt(2) * without_drift(output, period).std())
     if swing == 0:
         return None

@@ -71,6 +71,8 @@ class StickingLoop:
         self._half = round(self.period) // 2
         self.value = without_drift(self._thinned(value[None]), self.period)[0, self._first :]
         self.power = float(self.value @ self.value)
+        # A stem whose motion is below it stands still, but for rounding.
+        self._still = 1e-12 * float(output.var()) * self.value.size
 
     def linear(self, lags: Sequence[float], delays: Sequence[int]) -> Trial:
         """Fit the linear part without stiction."""
@@ -121,7 +123,7 @@ class StickingLoop:
         level = self._level(positions)
         for each in lags:
             power, product = self._sums(self._lagged(level, each), self._first - np.array(delays))
-            good = (power > 1e-12 * self.power) & (self.sign * product > 0)
+            good = (power > self._still) & (self.sign * product > 0)
             factor = np.where(good, product / np.where(good, power, 1.0), 0.0)
             left = 1 - factor * product / self.power
             best = np.argmin(left, axis=1)

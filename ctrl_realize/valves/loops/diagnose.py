@@ -132,9 +132,9 @@ def diagnose_loop(
         correlation = cross_correlation(output, deviation, period)
         if period >= SHORTEST_PERIOD:
             halves_op, halves_pv = _halves(output, period), _halves(deviation, period)
-            moved = movement_indices(output, deviation, period)
+            moved = movement_indices(output, ellipse.sign * deviation, period)
             if state:
-                fit = fit_stiction(data.op, value, period, ellipse.phase, kind == "integrating")
+                fit = fit_stiction(data.op, value, period, ellipse.sign, kind == "integrating")
         else:
             note = "too few samples in a cycle"
     found = (
