@@ -31,8 +31,9 @@ def simulate_record(
     """Simulate the outputs of a record, shape (p, N), with the best initial state.
 
     Errors are weighted by the range of each output. An offset of every output is always estimated,
-    with ``start="estimate"`` also the state of the core and the input within the dead times before
-    the record. With `gaps`, outputs may be missing.
+    with ``start="estimate"`` also the state of the core, the input within the dead times before
+    the record, and its level at rest, of which an integrator makes a slope. With `gaps`, outputs
+    may be missing.
     """
     start = one_of(start, "start", ("estimate", "rest"))
     (check_input if gaps else check_complete)(record, "a simulation")
@@ -79,7 +80,7 @@ def _unknown_starts(model: DelayedStateSpace, N: int) -> list[FloatArray]:
     n, p, m = core.nstates, core.noutputs, core.ninputs
     free = markov(core.A, np.eye(n), core.C, np.zeros((p, n)), N + 1)[:, :, 1:]
     parts = [_through_outputs(free, model)] if n else []
-    held = [(j, *ends) for j in range(m) for ends in _pieces(min(model.input_delays[j], N))]
+    held = [(j, *e) for j in range(m) for e in [*_pieces(min(model.input_delays[j], N)), (0, N)]]
     if held:
         steps = step_response(*matrices_of(core), N)
         pulses = [later(steps[:, [j]], a) - later(steps[:, [j]], b) for j, a, b in held]

@@ -47,7 +47,8 @@ def analyse_residuals(
         Level of bounds and tests.
     start : {"estimate", "rest"}
         Initial state of the simulation: ``"estimate"`` fits the offset, the state and the past
-        input within the dead time (16 constant pieces for a long dead time); ``"rest"`` is the
+        input within the dead time (16 constant pieces for a long dead time), and of a plant that
+        integrates the level of the input at which it rests; ``"rest"`` is the
         steady state for the first sample of the input, with the best offset.
 
     Returns

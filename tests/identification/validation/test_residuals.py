@@ -145,3 +145,18 @@ def test_measured_plants_are_predicted_on_the_half_that_was_not_used(plant, leng
     model = cr.estimate_delay(cr.impulse_from_io(first, length), order, max_delay=10)
     assert cr.validation.analyse_residuals(model, second).fit_percent[0] > least
     assert cr.validation.predict(model, second, 1).fit_percent[0] > least + 3
+
+
+@pytest.mark.parametrize("delay", [0, 4])
+def test_an_integrating_plant_rests_at_a_level_of_the_input_that_is_not_the_first(delay):
+    """The record starts in operation: about its first input the model was a ramp."""
+    rng = np.random.default_rng(0)
+    u, noise = 3 + rng.standard_normal(500), 0.05 * rng.standard_normal(500)
+    late = np.r_[np.zeros(1 + delay), (u - 3)[: 499 - delay]]
+    y = 0.1 * np.cumsum(late) + noise
+    tank = cr.DelayedStateSpace(ct.ss([[1.0]], [[1.0]], [[0.1]], [[0.0]], DT), delay)
+    check = cr.validation.analyse_residuals(tank, cr.Record(DT * np.arange(500), u, y))
+    # noise, less what the unknown start takes of 500 samples
+    assert check.residual.std() == pytest.approx(0.05, rel=0.1)
+    assert check.independent
+    assert check.white
