@@ -222,6 +222,8 @@ def spelled_out(text: str) -> str:
 
 def system_name(name: str) -> str:
     """Replace dots, which python-control reserves for ``system.signal``."""
+    if not isinstance(name, str):
+        raise OptionError(f"name={name!r}; expected a text")
     return name.replace(".", "_")
 
 
@@ -235,9 +237,9 @@ def system_names(names: Sequence[str]) -> list[str]:
     ['FIC101_OP_2', 'FIC101_OP', 'TIC7_PV']
     """
     made: list[str] = []
+    wishes = [system_name(name) for name in names]
     taken = {name for name in names if "." not in name}
-    for name in names:
-        wish = system_name(name)
+    for name, wish in zip(names, wishes, strict=True):
         tries = chain([wish], (f"{wish}_{number}" for number in count(2)))
         made.append(name if name == wish else next(one for one in tries if one not in taken))
         taken.add(made[-1])

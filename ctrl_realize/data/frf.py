@@ -243,6 +243,7 @@ class MeasuredFRF(FRFAlgebra):
 
     def between_hz(self, low: float, high: float) -> MeasuredFRF:
         """Return the points with low <= frequency <= high, in Hz."""
+        low, high = numbers([low, high], "low and high")
         inside = (self.frequency_hz >= low) & (self.frequency_hz <= high)
         return self._select(inside, f"between {low:g} and {high:g} Hz")
 

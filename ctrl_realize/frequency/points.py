@@ -72,11 +72,12 @@ def frf_points(
     if band_hz is not None:
         low, high = rising(band_hz, "band_hz", "frequencies in Hz")
         usable &= (frequency >= low) & (frequency <= high)
-    if usable.sum() < 3:
+    different = np.unique(frequency[usable]).size
+    if different < 3:
         limit = f", below {below_hz:.4g} Hz" if np.isfinite(below_hz) else ""
         raise DataError(
-            f"{int(usable.sum())} usable points (above 0 Hz{limit}, non-zero and inside the "
-            "band); expected at least 3"
+            f"{different} frequencies with usable points (above 0 Hz{limit}, non-zero and inside "
+            "the band); expected at least 3"
         )
     span = float(frequency[usable].max() / frequency[usable].min())
     if span > _WIDEST:

@@ -150,8 +150,9 @@ def _as_points(records: Sweep) -> list[list[Record]]:
                 raise DataError(
                     f"{record!r} is too short for a sine; expected at least {LEAST_SAMPLES} samples"
                 )
-            if np.ptp(record.input) == 0:
-                raise DataError(f"the input of {record!r} is constant; it contains no sine")
+            for name in ("input", "output"):
+                if np.ptp(getattr(record, name)) == 0:
+                    raise DataError(f"the {name} of {record!r} is constant; it contains no sine")
     return points
 
 

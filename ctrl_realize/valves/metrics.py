@@ -9,7 +9,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from .._checks import positive, real
+from .._checks import check_type, positive, real
 from ..errors import OptionError
 from .definitions import DEFINITIONS, Definition
 from .groups import Interval, SizeAndDirection
@@ -127,7 +127,8 @@ def _rate(groups: list[SizeAndDirection]) -> tuple[Interval, str]:
 
 def check_limits(limits: Mapping[str, Any] | None) -> None:
     """Refuse limits that cannot be compared with a metric."""
-    given = dict(limits or {})
+    given = limits or {}
+    check_type(given, Mapping, "limits", "metrics with their limits, {'t86': 0.4}", OptionError)
     unknown = sorted(set(given) - set(DEFINITIONS))
     if unknown:
         raise OptionError(

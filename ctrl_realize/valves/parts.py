@@ -8,7 +8,7 @@ from itertools import groupby
 
 import numpy as np
 
-from .._checks import positive
+from .._checks import band, positive
 from ..data import Record
 from ..data.given import as_record
 from ..errors import DataError
@@ -92,9 +92,7 @@ def split_test(record: Record, *, command_range: Sequence[float] | None = None) 
 
 def range_of(ends: Sequence[float]) -> tuple[float, float, float]:
     """Check a range; return its ends and its span."""
-    if len(ends) != 2:
-        raise DataError(f"range {ends!r}; expected two numbers: at closed and at open valve")
-    low, high = (float(end) for end in ends)
+    low, high = band(ends, "range", "at closed and at open valve")
     return low, high, positive(abs(high - low), "range", "difference of the two ends")
 
 

@@ -107,7 +107,7 @@ def valve_test_plan(
     ends = range_of(command_range)[:2]
     late, fast, t98 = _speed(first_step, dead_time, time_constant)
     sample = _rounded(fast / _SAMPLES) if dt is None else positive(dt, "dt", "sample time in s")
-    sizes = [positive(one, "sizes", "step size in %") for one in sizes]
+    sizes = [positive(one, "sizes", "step size in %") for one in np.atleast_1d(sizes)]
     middle = real(center, "center", "command in % of the span")
     largest = max(sizes, default=0.0)
     step = positive(small_step, "small_step", "step in %")

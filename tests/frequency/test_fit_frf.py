@@ -670,3 +670,16 @@ def test_a_gain_behind_a_hold_has_a_dead_time_of_up_to_a_sample_less():
     low, high = model.fit.interval
     assert 3 <= low < 3.1
     assert 3.85 < high <= 4
+
+
+def test_points_at_one_frequency_and_names_that_are_no_text_are_refused():
+    with pytest.raises(cr.errors.DataError, match="1 frequencies with usable points"):
+        cr.fit_frf(cr.MeasuredFRF(np.ones(20), np.ones(20)))
+    f = np.geomspace(0.1, 2, 12)
+    lag = cr.MeasuredFRF(1 / (1 + 2j * np.pi * f), f)
+    with pytest.raises(cr.errors.OptionError, match="name=5; expected a text"):
+        cr.fit_frf(lag, 1, name=5)
+    with pytest.raises(cr.errors.OptionError, match="name=1; expected a text"):
+        cr.MeasuredFRF(lag.complex, f, inputs=[1])
+    with pytest.raises(cr.errors.DataError, match="real numbers"):
+        lag.between_hz("0.1", 1)

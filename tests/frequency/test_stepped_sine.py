@@ -94,3 +94,9 @@ def test_drift_is_taken_out_on_request():
     drifting = cr.Record(record.time, record.input, record.output + 0.7 * record.time)
     frf = cr.stepped_sine_frf([drifting], drift=True)
     assert frf.complex[0] == pytest.approx(0.5, rel=1e-8)
+
+
+def test_an_output_without_a_signal_is_refused():
+    t = 0.01 * np.arange(400)
+    with pytest.raises(cr.errors.DataError, match=r"output of .* is constant"):
+        cr.stepped_sine_frf([cr.Record(t, np.sin(6 * t), 0 * t)])

@@ -1,6 +1,7 @@
 """Valve tests on simulated valves whose metrics are known in closed form."""
 
 import pickle
+import warnings
 
 import numpy as np
 import pytest
@@ -579,3 +580,26 @@ def test_a_stem_that_creeps_to_the_end_of_its_hold_has_the_error_of_its_level(se
     assert t98.low <= true <= t98.high
     overshoot = result.metric("overshoot").interval
     assert overshoot.low == 0.0
+
+
+def test_a_stem_that_follows_at_once_has_no_times():
+    """Its response has no noise at all: a median over no samples was taken, with a warning."""
+    t = 0.1 * np.arange(600)
+    u = np.where(t < 20, 50.0, 55.0)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        report = cr.valves.valve_report(cr.Record(t, u, u, units={"u": "%", "y": "%"}))
+    assert report.metric("gain").interval.value == pytest.approx(1)
+    assert report.metric("fitted_dead_time").interval.high <= 0.1  # a sample
+
+
+def test_ranges_and_limits_of_other_types_are_refused():
+    t = 0.1 * np.arange(600)
+    record = cr.Record(t, np.where(t < 20, 50.0, 55.0), 50 + np.sin(t))
+    with pytest.raises(OptionError, match="range=5; expected two numbers"):
+        cr.valves.valve_report(record, command_range=5)
+    with pytest.raises(OptionError, match="limits is a int; expected metrics"):
+        cr.valves.valve_report(record, limits=5)
+    speed = {"dead_time": 0.3, "time_constant": 0.5}
+    one, same = (cr.valves.valve_test_plan(**speed, sizes=sizes) for sizes in (5, (5,)))
+    assert np.array_equal(one.command, same.command)

@@ -52,7 +52,8 @@ def fit_state_space(
         States without delays, or candidates. Default: from 1 up to 20, until three in a row bring
         no improvement.
     delays : array_like of int, shape (p, m), optional
-        Delay of every channel, -1 if there is no response. Default: estimated.
+        Delay of every channel, -1 if there is no response: it then follows from the others, and a
+        response that the records show is fitted. Default: estimated.
     feedthrough : bool, optional
         Whether there is a feedthrough after the delays. Default: chosen by BIC.
 

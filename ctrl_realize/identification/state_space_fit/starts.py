@@ -182,10 +182,11 @@ def _given_delays(delays: ArrayLike, markov: FloatArray) -> IntArray:
     """Check given delays against the data."""
     found = np.asarray(delays)
     p, m, N = markov.shape
-    if found.shape != (p, m) or found.dtype.kind not in "iu" or np.any(found < -1):
+    whole = found.shape == (p, m) and found.dtype.kind in "iu"
+    if not whole or found.min() < -1 or found.max() < 0:
         raise DelayRangeError(
             f"delays has shape {found.shape} and dtype {found.dtype}; expected whole numbers "
-            f">= -1 of shape {(p, m)}"
+            f">= -1 of shape {(p, m)}, not all -1"
         )
     if found.max() > N - 3:
         raise DelayRangeError(f"a delay of {found.max()} leaves none of the {N} samples to realize")

@@ -135,7 +135,7 @@ def _plateaus(
     smooth = uniform_filter1d(values, _WIDTH)
     sigma = max(_noise(np.diff(values, 3)), 1e-4 * float(np.ptp(values)))
     error = _WITHIN * max(sigma / np.sqrt(_WIDTH), slow)
-    level = float(np.median(values[smooth > smooth.max() - 2 * error]))
+    level = float(np.median(values[smooth >= smooth.max() - 2 * error]))
     on = np.flatnonzero(smooth > level - error)
     runs = [(i, k + 1) for i, k in _joined(on, _LONG) if k + 1 - i >= _LONG]
     shortest = sorted(stop - start for start, stop in runs)[-_ENOUGH:][0] if runs else 0

@@ -203,3 +203,10 @@ def test_gains_that_slow_noise_made_are_named_with_what_tells_them():
     gains = cr.identify(record, structures="FOPDT").dcgain().ravel()
     # half widths of their 95 % intervals: 0.10 and 0.13
     np.testing.assert_allclose(gains, [2, -1.2], rtol=0, atol=0.13)
+
+
+def test_delays_of_no_channel_are_refused():
+    u, noise = np.random.default_rng(0).standard_normal((2, 300))
+    record = cr.Record(np.arange(300.0), u, u + 0.1 * noise)
+    with pytest.raises(cr.errors.DelayRangeError, match="not all -1"):
+        cr.fit_state_space(record, 1, delays=[[-1]])
