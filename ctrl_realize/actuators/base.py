@@ -11,7 +11,7 @@ import control as ct
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .._checks import finite, positive
+from .._checks import finite, positive, real
 from ..errors import DataError, OptionError
 from ..numerics.arrays import FloatArray
 
@@ -157,7 +157,7 @@ class Actuator(ABC):
         >>> cr.actuators.Backlash(2.0).initial_state(50.0).tolist()
         [50.0]
         """
-        return np.subtract(self._rest(float(command)), self._rest(0.0))
+        return np.subtract(self.steady_state(command), self._rest(0.0))
 
     def steady_state(self, command: float) -> State:
         """State of `advance` at rest at a command.
@@ -176,7 +176,7 @@ class Actuator(ABC):
         >>> cr.actuators.Backlash(2.0).steady_state(50.0)
         (50.0,)
         """
-        return self._rest(float(command))
+        return self._rest(real(command, "command", "command at rest"))
 
     def advance(self, state: State, command: float, dt: float) -> tuple[State, float]:
         """Advance by one sample.

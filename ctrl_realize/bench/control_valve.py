@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import paper
-from .._checks import integer, positive
+from .._checks import integer, numbers, positive
 from ..actuators import Actuator
 from ..data import Record
 from ..errors import OptionError
@@ -165,7 +165,7 @@ class Valve:
             self.step_record(
                 amplitude, generator, name=f"valve_{amplitude:g}mA_{k:02d}".replace(".", "p")
             )
-            for amplitude in amplitudes
+            for amplitude in numbers(np.atleast_1d(amplitudes), "amplitudes").tolist()
             for k in range(1, repeats + 1)
         )
 

@@ -172,3 +172,9 @@ def test_the_open_loop_is_process_and_controller(process):
 def test_impossible_parameters_are_refused(make, match):
     with pytest.raises(ValueError, match=match):
         make()
+
+
+@pytest.mark.parametrize("command", [np.nan, "50", None])
+def test_a_stem_rests_at_a_number(command):
+    with pytest.raises(cr.errors.OptionError, match="expected a finite number: command at rest"):
+        Backlash(2.0).initial_state(command)

@@ -134,3 +134,13 @@ def test_the_papers_method_on_the_papers_valve_gives_table_1():
     assert cr.compare_frf(valve.truth.sampled, frf).band_hz[1] == pytest.approx(13, rel=0.25)
     gain = np.abs(valve.truth.response(2 * np.pi * np.array([1e-3, 2.0])))
     assert 20 * np.log10(gain[1] / gain[0]) == pytest.approx(-3, abs=0.6)  # "around 2 Hz"
+
+
+def test_steps_of_a_campaign_are_one_number_or_several():
+    one, same = (
+        cr.bench.valve().step_campaign(1, amplitudes=sizes, repeats=1) for sizes in (8, (8.0,))
+    )
+    assert np.array_equal(one[0].output, same[0].output)
+    assert one[0].name == same[0].name
+    with pytest.raises(cr.errors.DataError, match="amplitudes holds"):
+        cr.bench.valve().step_campaign(1, amplitudes="large", repeats=1)
