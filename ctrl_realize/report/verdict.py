@@ -16,6 +16,7 @@ from ..frequency.comparison import FRFComparison
 from ..frequency.disagreement import CLOSE, FAR
 from ..identification.campaign.campaign import Campaign
 from ..identification.output_error.words import gain_scatter, sign_is_told
+from ..identification.several_inputs_result import SeveralInputsFit
 from ..plots.delays import estimate_of, interval_of
 from .facts import INTEGRATING, disagreement, facts_of, formula_of, gain_of
 
@@ -126,6 +127,9 @@ def _flags_in(comparison: FRFComparison | None) -> tuple[Flag, ...]:
 def headline_of(system: DelayedStateSpace) -> str:
     """Describe the model in one sentence."""
     wait, fit, interval = estimate_of(system), system.fit, interval_of(system)
+    if isinstance(fit, SeveralInputsFit):
+        waits = [time_within(one.dead_time, *one.interval) for one in fit.fits]
+        return f"Dead times {', '.join(map(' from '.join, zip(waits, fit.inputs, strict=True)))}."
     said, samples, within = in_time(wait, 4), f"{wait / system.dt:.4g}", ""
     if fit is not None and interval is not None:
         said = time_within(wait, *interval)

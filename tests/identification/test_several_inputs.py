@@ -45,6 +45,15 @@ def test_every_input_has_gain_and_dead_time_with_intervals(sys):
     assert "degC/(t/h)" in sys.fit.report()
 
 
+def test_the_headline_of_a_report_has_the_dead_time_of_every_input(sys):
+    found = re.findall(r"([\d.]+) s from (\w+)", cr.report.verdict_of(sys).headline)
+    for said, name in found:
+        row = sys.fit.table().loc[name]
+        # written with the digits that the interval leaves
+        assert row.dead_time_low <= float(said) <= row.dead_time_high
+    assert [name for _, name in found] == list(PLANTS)
+
+
 def test_the_model_has_both_inputs_and_leaves_the_noise(sys):
     data = sys.fit.records[0]
     assert sys.input_labels == list(PLANTS)
