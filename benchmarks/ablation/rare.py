@@ -270,6 +270,21 @@ def drive_with_friction(rng: Rng) -> Case:
     return Case(record(*rigs.drive_with_friction(rng, dead_time, friction, 0.05)), DT * dead_time)
 
 
+def swinging_before(rng: Rng) -> Case:
+    """A pair with a damping of 3 to 6 % still swings from a step 2 to 4 s before; 0.2 % noise."""
+    size, damping = float(rng.uniform(3.0, 6.0)), float(rng.uniform(0.03, 0.06))
+    late_by, earlier = float(rng.uniform(0.1, 0.5)), float(rng.uniform(2.0, 4.0))
+    time = DT * np.arange(2400)
+
+    def response(since: np.ndarray) -> np.ndarray:
+        along = size * np.sqrt(1 - damping**2) * np.maximum(since - late_by, 0.0)
+        decay = damping / np.sqrt(1 - damping**2)
+        return 1 - np.exp(-decay * along) * (np.cos(along) + decay * np.sin(along))
+
+    u, y = step(2400, 600), response(time + earlier) + 2.0 * response(time - 600 * DT)
+    return Case(record(u, noisy(rng, y, 0.002)), late_by, 2.0)
+
+
 def faster_than_a_sample(rng: Rng) -> Case:
     """One lag of a fifth to four fifths of a sample, 1 % noise."""
     plant, u = drawn(rng, ((0.002, 0.008),), (0.05, 0.3)), step(400, 150)
@@ -302,7 +317,7 @@ WORLDS = (
 )
 
 
-def running_loop(rng: Rng) -> Case:
+def running_loop(rng: Rng, noise: tuple[float, float] = (0.01, 0.15)) -> Case:
     """A gain of 0.5 to 1.5, with an integral or not, and 6 to 15 levels of a set point.
 
     The set point is not recorded; the noise of 1 to 15 % has a pole at 0.6 to 0.9.
@@ -311,15 +326,20 @@ def running_loop(rng: Rng) -> Case:
     integral = float(rng.choice([0.0, 0.04]))
     wanted = np.repeat(rng.choice([-1.0, 1.0], count // 100), 100)
     white = np.sqrt(1 - slow**2) * rng.standard_normal(count)
-    noise = rng.uniform(0.01, 0.15) * lfilter([1.0], [1.0, -slow], white)
+    added = rng.uniform(*noise) * lfilter([1.0], [1.0, -slow], white)
     u, y, state, left = np.zeros(count), np.zeros(count), 0.0, 0.0
     for k in range(count):
         # a lag of ten samples behind a dead time of three, and the hold
         state += (1 - np.exp(-0.1)) * ((u[k - 4] if k > 3 else 0.0) - state)
-        y[k] = state + noise[k]
+        y[k] = state + added[k]
         left += wanted[k] - y[k]
         u[k] = gain * (wanted[k] - y[k] + integral * left)
     return Case(record(u, y), 3 * DT, 1.0, 4 * DT)
+
+
+def quiet_loop(rng: Rng) -> Case:
+    """As `running_loop`, with a noise of 0.01 %, beside which no controller is told."""
+    return running_loop(rng, (1e-4, 1e-4))
 
 
 def rounded_loop(rng: Rng) -> Case:
@@ -359,6 +379,7 @@ MADE_FOR = {
     Rule.MEANS: little_step_in_noise,
     Rule.EXPONENTIAL: settling_in_a_long_rest,
     Rule.BEND: pulse_before,
+    Rule.SWING: swinging_before,
     Rule.BRIEF_REST: moved_before,
     Rule.HUM: humming,
     Rule.LOAD: steps.load_moves,
@@ -383,7 +404,7 @@ MADE_FOR = {
     Rule.NO_SLOPE: rest_like_a_slope,
     Rule.NO_DISPERSION: sensors.coarse,
     Rule.PINNED: drive_with_friction,
-    Rule.HELD_STEPS: running_loop,
+    Rule.HELD_STEPS: quiet_loop,
     Rule.LOOP: running_loop,
     Rule.LOOP_ROUNDED: rounded_loop,
     Rule.PAST: coarse_controller,
