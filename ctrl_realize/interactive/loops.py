@@ -13,6 +13,7 @@ from .._wording import in_time
 from ..delayed import DelayedStateSpace, delayed_ss
 from ..design import LoopSimulation, PIDController, margins, simulate_loop
 from ..design.tuning.pid import TuningOptions, pid, tuned
+from ..design.tuning.plant import TuningPlant
 from ..errors import CtrlRealizeError, CtrlRealizeWarning
 from ..identification import OutputErrorFit
 from ..identification.plausible import continuous_core
@@ -51,7 +52,7 @@ def rule_options(settings: Mapping[str, Any], system: DelayedStateSpace) -> JSON
     if rule == "optimal":
         options["max_sensitivity"] = float(f"{_MS[0] + speed * (_MS[1] - _MS[0]):.3g}")
     elif rule in SPEEDS and speed != _MIDDLE:
-        model = tuned(system, TuningOptions(rule, kind))[0].model
+        model = tuned(TuningPlant(system, None), TuningOptions(rule, kind)).model
         usual = SPEEDS[rule] * max(model.dead_time if model else 0.0, float(system.dt))
         options["closed_loop_time"] = float(f"{usual * _RATIO ** (1 - speed / _MIDDLE):.3g}")
     return options
@@ -67,7 +68,7 @@ def tuned_loop(
             warnings.simplefilter("always", CtrlRealizeWarning)
             controller = pid(system, **options)
     else:
-        controller, _ = tuned(system, TuningOptions(**options))
+        controller = tuned(TuningPlant(system, None), TuningOptions(**options))
     said = tuple(str(one.message) for one in told)
     found = (margins(one, controller) for one in (_plants(system) if checked else [system]))
     sizes = np.array([one.ms if one.stable else np.inf for one in found])

@@ -10,7 +10,6 @@ import numpy as np
 
 from ..._checks import one_of, positive, within
 from ...data.shown_units import in_shown_units
-from ...delayed import DelayedStateSpace, DelaySystem
 from ...errors import OptionError
 from ...numerics.blas_threads import single_threaded
 from ..loops.loop_check import MOST_SENSITIVE, loop_check, refuse_unstable, warn_of
@@ -19,7 +18,7 @@ from ..models.reduction import METHODS as REDUCTIONS
 from .algorithm import DISCRETIZATIONS
 from .controller import PIDController
 from .optimal import optimal
-from .plant import gain_and_time_units, reduced, reference_plant, total_time, turned_feedthrough
+from .plant import TuningPlant, gain_and_time_units, turned_feedthrough
 from .rules import MODEL_RULES, SYSTEM_RULES, from_ultimate, kinds_of
 from .ultimate import critical_point
 
@@ -161,14 +160,15 @@ def pid(
     """
     given = locals()
     options = TuningOptions(**{one.name: given[one.name] for one in fields(TuningOptions)})
+    plant = TuningPlant(system, dt)
     if options.closed_loop_time == "robust":  # as a number, with which the advice compares
-        options = _robust(system, options)
-    made, plant = tuned(system, options)
-    check = loop_check(plant, made)
+        options = _robust(plant, options)
+    made = tuned(plant, options)
+    check = loop_check(plant.exact, made)
     if not check.stable or check.flags:
         with warnings.catch_warnings():  # what the record leaves open has been said
             warnings.simplefilter("ignore")
-            advice = _one_that_works(system, options)
+            advice = _one_that_works(plant, options)
         refuse_unstable(check, f"the {kind} controller of rule={rule!r}", advice)
         warn_of(check, advice)
     return made.checked(check)
@@ -210,48 +210,40 @@ class TuningOptions:
             within(self.max_sensitivity, "max_sensitivity", "Ms", 1.01, 10)
 
 
-def tuned(
-    system: Any, options: TuningOptions, plants: Any = None
-) -> tuple[PIDController, DelayedStateSpace | DelaySystem]:
-    """Tune by a rule without checking the loop; return the controller and its plant.
-
-    The plant is in the time base of the controller; `plants` are those of `reference_plant`.
-    """
+def tuned(plant: TuningPlant, options: TuningOptions) -> PIDController:
+    """Tune by a rule without checking the loop."""
     if isinstance(options.closed_loop_time, str):
-        return tuned(system, _robust(system, options), plants)
-    rule, kind, ratio = options.rule, options.kind, options.derivative_filter
-    plant, exact, step = plants or reference_plant(system, options.dt)
+        return tuned(plant, _robust(plant, options))
+    rule, kind, ratio, step = options.rule, options.kind, options.derivative_filter, plant.step
     model: ProcessModel | None = None
     if rule in MODEL_RULES:
-        model = reduced(system, plant, rule, kind, options.reduction, step)
+        model = plant.reduced(rule == "simc" and "D" in kind, options.reduction)
         kp, ti, td = MODEL_RULES[rule][0](model, kind, options.closed_loop_time)
     elif rule == "optimal":
         limit = _USUAL_MS if options.max_sensitivity is None else options.max_sensitivity
         kp, ti, td = optimal(
-            plant, total_time(system, plant), kind, max_sensitivity=limit, filter_ratio=ratio,
-            method=options.method, direct=0.0 if step else turned_feedthrough(exact),
+            plant.sampled, plant.total_time, kind, max_sensitivity=limit, filter_ratio=ratio,
+            method=options.method, direct=0.0 if step else turned_feedthrough(plant.exact),
         )  # fmt: skip
     else:
-        kp, ti, td = from_ultimate(rule, kind, *critical_point(exact))
-    units = gain_and_time_units(plant)
-    made = PIDController(
+        kp, ti, td = from_ultimate(rule, kind, *critical_point(plant.exact))
+    units = gain_and_time_units(plant.sampled)
+    return PIDController(
         kp, ti, td, td / ratio, dt=step, method=options.method, rule=rule, model=model,
         name=options.name, gain_unit=units[0], time_unit=units[1],
     )  # fmt: skip
-    return made, exact
 
 
-def _robust(system: Any, options: TuningOptions) -> TuningOptions:
+def _robust(plant: TuningPlant, options: TuningOptions) -> TuningOptions:
     """Options with the shortest closed-loop time that is robust."""
-    model = tuned(system, replace(options, closed_loop_time=None))[0].model
+    model = tuned(plant, replace(options, closed_loop_time=None)).model
     assert model is not None
     shortest = model.dead_time or 0.1 * model.lag
     tried = []
     for share in LONGER:
         time = None if share == 1 else float(f"{share * shortest:.3g}")  # as it is suggested
         changed = replace(options, closed_loop_time=time)
-        made, plant = tuned(system, changed)
-        check = loop_check(plant, made)
+        check = loop_check(plant.exact, tuned(plant, changed))
         if check.stable and not check.flags:
             return changed
         worst = np.inf if check.worst is None else check.worst.ms
@@ -259,7 +251,7 @@ def _robust(system: Any, options: TuningOptions) -> TuningOptions:
     return min(tried, key=lambda one: one[0])[1]
 
 
-def _one_that_works(system: Any, options: TuningOptions) -> str:
+def _one_that_works(plant: TuningPlant, options: TuningOptions) -> str:
     """Suggest a call whose loop is robust, on the model and over its intervals."""
     usual = replace(options, closed_loop_time=None, max_sensitivity=None)
     tries = [
@@ -275,13 +267,13 @@ def _one_that_works(system: Any, options: TuningOptions) -> str:
     for changed in tries:
         try:
             if changed.closed_loop_time == "robust":  # as a number, which can be given
-                changed = _robust(system, changed)
+                changed = _robust(plant, changed)
             if changed == options:
                 continue
-            made, plant = tuned(system, changed)
+            made = tuned(plant, changed)
         except ValueError:
             continue
-        check = loop_check(plant, made)
+        check = loop_check(plant.exact, made)
         if not check.stable or check.margins.ms > MOST_SENSITIVE:
             continue
         worst = check.margins.ms if check.worst is None else check.worst.ms

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cache, cached_property
 from typing import Any
 
 from ..._parameters import gain_unit
@@ -17,6 +18,37 @@ from ..siso import core_and_dead_time, delayed_system, is_continuous
 
 FINE = 50
 """Samples within a dead time, or a turn of the loop by 1 rad, so many that a hold has no effect."""
+
+
+class TuningPlant:
+    """A plant as tuning rules need it: sampled, in the time base of the controller, and reduced.
+
+    `sampled` and `exact` are those of `reference_plant`, `step` is the sample time.
+    """
+
+    def __init__(self, system: Any, dt: float | None) -> None:
+        self.system = system
+        self.sampled, self.exact, self.step = reference_plant(system, dt)
+        self.reduced = cache(self._reduced)
+
+    def _reduced(self, second: bool, method: str) -> ProcessModel:
+        """Reduce it to one lag or two, with the dead time of the hold."""
+        system = self.system
+        model = isinstance(system, ProcessModel)
+        if model and bool(system.lag) + bool(system.second_lag) + system.integrating <= 1 + second:
+            found: ProcessModel = system
+        else:
+            given = system if model or is_continuous(system) else self.sampled
+            found = (reduce_sopdt if second else reduce_fopdt)(given, method=method)
+        # A held controller output is half a sample old on average.
+        return replace(found, dead_time=found.dead_time + self.step / 2)
+
+    @cached_property
+    def total_time(self) -> float:
+        """Dead time and lags together, in s."""
+        if isinstance(self.system, ProcessModel):
+            return self.system.total_time
+        return reduce_sopdt(self.sampled).total_time + float(self.sampled.dt)
 
 
 def reference_plant(
@@ -56,28 +88,6 @@ def turned_feedthrough(exact: Any) -> float:
     """|D| of a continuous plant with dead time, 0 without: its loops have that gain at infinity."""
     core, dead_time = core_and_dead_time(exact, "a PID controller")
     return abs(float(core.D[0, 0])) if dead_time else 0.0
-
-
-def reduced(
-    system: Any, plant: DelayedStateSpace, rule: str, kind: str, reduction: str, step: float
-) -> ProcessModel:
-    """Reduce the plant to the model that a rule needs, with the dead time of the hold."""
-    second = rule == "simc" and "D" in kind
-    model = isinstance(system, ProcessModel)
-    if model and bool(system.lag) + bool(system.second_lag) + system.integrating <= 1 + second:
-        found: ProcessModel = system
-    else:
-        given = system if model or is_continuous(system) else plant
-        found = (reduce_sopdt if second else reduce_fopdt)(given, method=reduction)
-    # A held controller output is half a sample old on average.
-    return replace(found, dead_time=found.dead_time + step / 2)
-
-
-def total_time(system: Any, plant: DelayedStateSpace) -> float:
-    """Dead time and lags of the plant together, in s."""
-    if isinstance(system, ProcessModel):
-        return system.total_time
-    return reduce_sopdt(plant).total_time + float(plant.dt)
 
 
 def gain_and_time_units(plant: DelayedStateSpace) -> tuple[str, str]:

@@ -17,7 +17,7 @@ from ..loops.margin_result import Margins
 from ..loops.performance import Performance, plant_time, sampled_performance, settled_responses
 from .controller import PIDController
 from .pid import KINDS, RULES, TuningOptions, tuned
-from .plant import finely_sampled, reference_plant
+from .plant import TuningPlant, finely_sampled
 from .rules import kinds_of
 
 if TYPE_CHECKING:
@@ -202,7 +202,7 @@ def compare_pid(
     'optimal'
     """
     tried, kinds = each_of(rules or RULES, "rule", RULES), each_of(kinds, "kind", KINDS)
-    plants = reference_plant(system, options.get("dt"))  # what no rule can tune is refused at once
+    plant = TuningPlant(system, options.get("dt"))  # what no rule can tune is refused at once
     made: list[tuple[PIDController, Performance]] = []
     refused: list[tuple[str, str, str]] = []
     for rule in tried:
@@ -210,7 +210,7 @@ def compare_pid(
             if kind not in kinds_of(rule):
                 continue
             try:
-                controller, exact = tuned(system, TuningOptions(rule, kind, **options), plants)
+                controller = tuned(plant, TuningOptions(rule, kind, **options))
             except ValueError as error:
                 # A rule that does not apply to this plant becomes a row of the result.
                 refused.append((rule, kind, str(error)))
@@ -218,8 +218,8 @@ def compare_pid(
             if controller.kind != kind and controller.kind in kinds:
                 refused.append((rule, kind, f"for this plant it is the {controller.kind}"))
                 continue
-            check = loop_check(exact, controller)
-            reached = _performance(exact, controller, check) if check.stable else UNSTABLE
+            check = loop_check(plant.exact, controller)
+            reached = _performance(plant.exact, controller, check) if check.stable else UNSTABLE
             made.append((controller.checked(check), reached))
     if not made:
         reasons = "; ".join(f"{kind} {rule}: {why}" for rule, kind, why in refused)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -371,8 +372,15 @@ class OutputErrorFit(FractionalDelayFit):
     @property
     def plausible_models(self) -> PlausibleModels | None:
         """Models that the data do not rule out; None beside an actuator."""
-        models = self.estimate.plausible
-        return PlausibleModels(models, self.dt, self.time_unit) if models else None
+        models, unit = self.estimate.plausible, self.time_unit
+        if models and unit not in self._drawn:
+            self._drawn[unit] = PlausibleModels(models, self.dt, unit)
+        return self._drawn.get(unit)
+
+    @cached_property
+    def _drawn(self) -> dict[str, PlausibleModels]:
+        """Plausible models by the unit of their times: sampled once, as every check needs them."""
+        return {}
 
     @property
     def _answered_noise(self) -> bool:  # type: ignore[override]
