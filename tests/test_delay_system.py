@@ -419,3 +419,18 @@ def test_the_unit_of_a_signal_does_not_close_an_algebraic_loop(scale):
     answers_itself = ct.ss([], [], [], [[1 / scale]])
     with pytest.raises(UnsuitableSystemError, match="algebraic loop"):
         (plant + scale).feedback(answers_itself, sign=1)
+
+
+@pytest.mark.parametrize("lag", [1e-6, 1.0, 1e6])
+@pytest.mark.parametrize("gain", [1.0, 1e6])
+def test_the_response_of_parallel_paths_does_not_depend_on_units(lag, gain):
+    # lags of microseconds have output matrices of 1e15, and both paths share their poles
+    lags = np.polymul(np.polymul([3 * lag, 1], [9 * lag, 1]), [20 * lag, 1])
+    plant = cr.delayed_ss(ct.tf([gain], lags), dead_time=5.5 * lag, dt=lag)
+    filtered = cr.DelayedStateSpace(ct.ss(ct.tf([0.1, -0.05], [1, -0.7], lag)), 7)
+    z = np.exp(1j * np.linspace(0.01, 3, 30))
+    # rounding grows with the distance of the poles from z, up to 1 / 0.01
+    assert_allclose((plant + filtered * plant)(z), plant(z) * (1 + filtered(z)), rtol=1e-12)
+    loop = ct.feedback(plant / gain * filtered, filtered)
+    through = plant(z) / gain * filtered(z)
+    assert_allclose(loop(z), through / (1 + through * filtered(z)), rtol=1e-10)

@@ -94,7 +94,7 @@ class HostResponses(HostMargins):
         if points.ndim > 1:
             raise ValueError("input list must be 1D")
         if self._schur is None:
-            self._schur = schur_form(self._core.A)
+            self._schur = schur_form(self._core.A, self._core.B)
         values = self._values(self._schur, points)
         return settled_values(values, points, warn_infinite=warn_infinite)
 

@@ -94,3 +94,17 @@ def test_a_core_and_back_is_the_core(F):
     back = cr.design.to_continuous(cr.design.to_discrete(core, 3.0, 1.0)).core
     # exp keeps 1e-16 of its norm; the logarithm loses what the slowest mode has less than that
     np.testing.assert_allclose(back.A, F, rtol=0, atol=1e-7 * np.abs(F).max())
+
+
+# a feedthrough that starts as the cube of the fraction tells it to the cube root of rounding
+@pytest.mark.parametrize(("samples", "near"), [(4.0, 1e-12), (4.3, 5e-5)])
+@pytest.mark.parametrize("dt", [1e-6, 1.0, 1e4])
+def test_a_plain_core_of_any_speed_and_back_has_its_response(dt, samples, near):
+    # python-control's companion form of lags of microseconds has entries from 1 to 1e15
+    den = np.polymul(np.polymul([0.6 * dt, 1], [0.9 * dt, 1]), [1.8 * dt, 1])
+    sampled = cr.design.to_discrete(ct.ss(ct.tf([3.0], den)), samples * dt, dt)
+    found = cr.design.to_continuous(sampled)
+    s = 1j * np.geomspace(0.01, 2, 9) / dt
+    expected = 3.0 / np.polyval(den, s) * np.exp(-samples * dt * s)
+    response = found.core(s) * np.exp(-found.dead_time * s)
+    np.testing.assert_allclose(response, expected, rtol=near)

@@ -138,7 +138,7 @@ def _without_delays(part: DelayForm) -> ComplexArray:
 def between_delays(part: DelayForm, points: ComplexArray) -> ComplexArray:
     """Response of the core between the delays at points (K,), shape (K, q, q)."""
     with np.errstate(divide="ignore", invalid="ignore"):
-        core = frequency_response(schur_form(part.A), part.B, part.C, part.D, points)
+        core = frequency_response(schur_form(part.A, part.B), part.B, part.C, part.D, points)
     return np.asarray(np.moveaxis(core, -1, 0))
 
 

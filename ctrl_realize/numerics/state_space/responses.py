@@ -34,7 +34,7 @@ Schur: TypeAlias = tuple[ComplexArray, ComplexArray, ComplexArray]
 """T, V and W with A = V T W and W = V^-1."""
 
 
-def schur_form(A: FloatArray) -> Schur:
+def schur_form(A: FloatArray, B: FloatArray | None = None) -> Schur:
     """Return T, V and W with A = V T W, W = V^-1, T upper triangular.
 
     A is balanced first (Parlett and Reinsch, Numerische Mathematik 13, 1969): the Schur form is
@@ -45,6 +45,9 @@ def schur_form(A: FloatArray) -> Schur:
     Parameters
     ----------
     A : ndarray, shape (n, n)
+    B : ndarray, shape (n, m), optional
+        Parts that A does not connect are mixed by rounding: their states are of similar size with
+        that of inputs.
 
     Returns
     -------
@@ -53,7 +56,7 @@ def schur_form(A: FloatArray) -> Schur:
     if A.shape[0] == 0:
         empty = np.zeros((0, 0), dtype=np.complex128)
         return empty, empty, empty
-    units = state_units(A)  # powers of two: all of this is exact
+    units = state_units(A, B)  # powers of two: all of this is exact
     T, Q = schur(A * units / units[:, None], output="complex")
     V, W = units[:, None] * Q, Q.conj().T / units
     return np.asarray(T, dtype=np.complex128), np.asarray(V), np.asarray(W)

@@ -33,16 +33,44 @@ _EXPLAINED = 1e-9
 """Relative rounding of a feedthrough that a fraction of a sample explains."""
 
 
-def state_units(A: FloatArray) -> FloatArray:
+def state_units(A: FloatArray, B: FloatArray | None = None) -> FloatArray:
     """Find units of the states, powers of two, in which the entries of A are of similar size [4]_.
 
     Those of a companion form grow with powers of its speeds: for lags of 1e6 s, exponentials and
     Schur forms of four of them have no correct digits otherwise. The diagonal is left out: it has
-    no units, and that of a sampled model, next to 1, is as large as all the rest.
+    no units, and that of a sampled model, next to 1, is as large as all the rest. With B, states
+    that A does not connect have similar units, too.
     """
+    if B is not None:
+        n, m = B.shape
+        return state_units(np.block([[A, B], [np.zeros((m, n + m))]]))[:n]
     coupled = A - np.diag(np.diag(A))
+    within = _within(A)
     with np.errstate(invalid="ignore"):  # SciPy makes positions of the units, too
-        return np.asarray(matrix_balance(coupled, permute=False, separate=True)[1][0], np.float64)
+        scale = matrix_balance(coupled * within, permute=False, separate=True)[1][0]
+    units = np.asarray(scale, np.float64)
+    # What one part does to another, as a plant to the controller behind it, has no counterpart to
+    # be similar to: in the units of the other the largest is as large as that part itself.
+    into = np.abs(coupled * (1 - within))
+    if not np.any(into):
+        return units
+    sizes = (within * np.abs(A * within * units / units[:, None]).max(axis=1)).max(axis=1)
+    sizes[sizes == 0] = sizes.max() or 1.0
+    for _ in sizes:
+        entering = (within * (into * units / units[:, None]).max(axis=1)).max(axis=1) / sizes
+        change = np.round(np.log2(np.where(entering > 0, entering, 1.0)))
+        if not np.any(change):
+            break
+        units *= np.exp2(change)
+    return units
+
+
+def _within(A: FloatArray) -> FloatArray:
+    """Mark with 1 the pairs of states that act on each other, through others or not."""
+    reach: FloatArray = np.eye(A.shape[0]) + (A != 0)
+    for _ in range(A.shape[0].bit_length()):
+        reach = (reach @ reach > 0).astype(float)
+    return reach * reach.T
 
 
 def zero_order_hold(A: FloatArray, B: FloatArray, dt: float) -> tuple[FloatArray, FloatArray]:
@@ -209,6 +237,8 @@ def continuous_ends(
         late = (late[0] + late[1], np.zeros(1))
     if not A.size:
         return core, tuple((late[0] * dt).tolist()), tuple((late[1] * dt).tolist())
+    units = state_units(A)
+    A, B, C = A * units / units[:, None], B / units[:, None], C * units
     F = principal_logarithm(A) / dt
     n = A.shape[0]
 
@@ -255,7 +285,8 @@ def continuous_ends(
         if f is not None:
             C[i], D[i] = np.linalg.solve(moved(f).T, C[i]), 0.0
             late[1][i] -= 1 - f
-    return (F, G, C, D), tuple((late[0] * dt).tolist()), tuple((late[1] * dt).tolist())
+    core = F * units[:, None] / units, G * units[:, None], C / units, D
+    return core, tuple((late[0] * dt).tolist()), tuple((late[1] * dt).tolist())
 
 
 def _roots_in_unit_interval(function: Callable[[float], float], scale: float) -> list[float]:
