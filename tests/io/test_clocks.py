@@ -195,6 +195,24 @@ def test_a_test_of_minutes_in_which_the_clock_is_set_back(tmp_path, first, order
     np.testing.assert_array_equal(cr.read_record(path, time_zone="Europe/Berlin").time, t[:360])
 
 
+@pytest.mark.parametrize("order", [1, -1])
+@pytest.mark.parametrize("dt", [10.0, 600.0, 3600.0])
+@pytest.mark.parametrize(
+    ("first", "hours"), [("00:10", 0.5), ("01:10", 0.5), ("01:40", 4), ("-04:20", 5), ("00:00", 1)]
+)
+def test_a_record_with_a_part_of_the_hour_that_comes_twice(tmp_path, first, hours, dt, order):
+    """It lies within the hour, begins in the second or ends in the first of both."""
+    path = tmp_path / "a.csv"
+    utc = pd.Timestamp("2025-10-26", tz="UTC") + pd.Timedelta(f"{first}:00")
+    t = logged(path, "Europe/Berlin", utc, "%d.%m.%Y %H:%M:%S", dt, order)
+    rows = path.read_text().splitlines()
+    count = max(4, int(hours * 3600 / dt)) if dt < 3600 else 9
+    path.write_text(
+        "\n".join([rows[0], *(rows[1:] if order > 0 else rows[:0:-1])[:count][::order]])
+    )
+    np.testing.assert_array_equal(cr.read_record(path, time_zone="Europe/Berlin").time, t[:count])
+
+
 @pytest.mark.parametrize("first", ["2026-03-08 06:10", "2026-11-01 05:30"])
 def test_a_night_of_the_change_tells_that_day_and_month_matter(tmp_path, first):
     """Both readings have equal distances: a gap of an hour in March made 3663 s of 63 s."""
@@ -357,3 +375,18 @@ def test_durations_are_read_as_pandas_writes_them(tmp_path, start):
     (tmp_path / "a.csv").write_text("\n".join([*text[:50], "0 days soon,1,2", *text[50:]]) + "\n")
     with pytest.raises(DataError, match=r"line 51: '0 days soon' is neither .* 0 days 00:00:00"):
         cr.read_record(tmp_path / "a.csv")
+
+
+@pytest.mark.parametrize("name", ["Date", "Datum"])
+def test_days_of_a_spreadsheet_may_be_called_a_date(tmp_path, name):
+    days = 45969.2 + np.arange(60) / 8640  # every 10 s
+    rows = [f"{at:.9f},{40 + (k > 10)},{k / 7:.3f}" for k, at in enumerate(days)]
+    path = tmp_path / "a.csv"
+    path.write_text("\n".join([f"{name},OP,PV", *rows]) + "\n")
+    with pytest.warns(DataWarning, match="taken for days since 1900"):
+        record = cr.read_record(path)
+    assert record.dt == pytest.approx(10.0, rel=1e-5)  # digits of 86 us over 10 min
+    # a day of digits for all rows is no clock
+    path.write_text("\n".join([f"{name},OP,PV", *[f"20251107,{k > 10:d},{k}" for k in range(60)]]))
+    with pytest.raises(OptionError, match="cannot tell which column is time"):
+        cr.read_record(path)

@@ -255,6 +255,9 @@ def dates_of(table: Table, clock: int | None, taken: Iterable[int] = ()) -> list
 def _guessed_clock(table: Table, taken: Sequence[int]) -> tuple[int | None, float | None]:
     """Time column by name, otherwise the sample time in the file, otherwise the first column."""
     clocks = clocks_of(table, taken) or dates_of(table, None, taken)
+    if not clocks:  # days of a spreadsheet
+        dates = named(table, NAMES["date"], taken)
+        clocks = [k for k in dates if np.all(np.diff(_values(table, k)) > 0)]
     if len(clocks) == 1:
         return clocks[0], None
     if len(clocks) > 1:

@@ -106,6 +106,8 @@ def in_utc(stamps: Stamps, zone: str) -> Stamps:
     tries: list[tuple[Any, Any]] = [(np.ones_like(once), "infer"), (once, "infer")]
     if back.size == 1:  # only a part of the hour is there twice
         tries.append((tries[0][0], np.arange(stamps.size) <= back[0]))
+    if not back.size:  # the record ends or begins in the hour
+        tries += [(tries[0][0], np.full(stamps.size, summer)) for summer in (True, False)]
     for new, summer in tries:
         try:
             local = pd.DatetimeIndex(ordered[new]).tz_localize(zone, ambiguous=summer)
@@ -113,6 +115,9 @@ def in_utc(stamps: Stamps, zone: str) -> Stamps:
             reason = error
             continue
         utc = np.asarray(local.tz_convert("UTC").tz_localize(None), dtype="datetime64[ns]")
+        guessed = not back.size and not isinstance(summer, str)
+        if guessed and np.any(np.diff(utc) > np.timedelta64(1, "h")):
+            continue
         return np.asarray(utc[np.cumsum(new) - 1][::turned])
     raise DataError(
         f"time_zone={zone!r} does not fit the stamps: {reason}; expected an hour that comes twice, "
