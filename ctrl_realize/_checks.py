@@ -222,8 +222,7 @@ def spelled_out(text: str) -> str:
 
 def system_name(name: str) -> str:
     """Replace dots, which python-control reserves for ``system.signal``."""
-    if not isinstance(name, str):
-        raise OptionError(f"name={name!r}; expected a text")
+    check_type(name, str, "name", "text", OptionError)
     return name.replace(".", "_")
 
 

@@ -37,14 +37,36 @@ MAIN = {
     "DelayTracker": lambda odd: cr.DelayTracker(odd, max_delay=5, forgetting_time=10.0),
     "read_record": lambda odd: cr.read_record(odd),
     "load_model": lambda odd: cr.load_model(odd),
+    "from_response": lambda odd: cr.Record.from_response(odd),
+    "verdict_of": lambda odd: cr.report.verdict_of(odd),
+    "write_campaign": lambda odd: cr.report.write_campaign("a.html", odd),
+    "write_comparison": lambda odd: cr.report.write_comparison("a.html", PLANT, FRF, odd),
+    "write_comparison, frf": lambda odd: cr.report.write_comparison("a.html", PLANT, odd, None),
+    "write_identification, controller": lambda odd: cr.report.write_identification(
+        "a.html", PLANT, RECORD, controller=odd
+    ),
+    "write_identification, comparison": lambda odd: cr.report.write_identification(
+        "a.html", PLANT, RECORD, comparison=odd
+    ),
+    "delayed_ss, name": lambda odd: cr.delayed_ss(PLANT.delay_free, 3, name=odd),
+    "delay, name": lambda odd: cr.delay(1.0, name=odd),
+    "DelaySystem, name": lambda odd: cr.DelaySystem(PLANT.delay_free, name=odd),
+    "pid, name": lambda odd: cr.design.pid(PLANT, name=odd),
+    "smith_predictor, name": lambda odd: cr.design.smith_predictor(PLANT, 0.1, name=odd),
+}
+HAVE_DEFAULTS = {  # or any text for a name
+    "unit_step, edge": [None],
+    "write_identification, controller": [None],
+    "write_identification, comparison": [None],
+    **{name: [None, "x"] for name in MAIN if name.endswith(", name")},
 }
 
 
 @pytest.mark.parametrize("name", MAIN)
 def test_what_is_no_record_response_or_system_is_refused(name):
     for odd in KINDS:
-        if odd is None and name == "unit_step, edge":
-            continue  # the default
+        if any(odd is default for default in HAVE_DEFAULTS.get(name, ())):
+            continue
         with pytest.raises(CtrlRealizeError):
             MAIN[name](odd)
 

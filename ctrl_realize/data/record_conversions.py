@@ -9,6 +9,7 @@ import control as ct
 import numpy as np
 from numpy.typing import ArrayLike
 
+from .._checks import check_type
 from ..errors import DataError, TimeAxisError
 from ..numerics.arrays import FloatArray
 from ..results import Drawable
@@ -289,6 +290,7 @@ class RecordConversions(Drawable):
         >>> cr.Record.from_response(response).dt
         0.1
         """
+        check_type(response, ct.TimeResponseData, "response", "one of python-control")
         if response.inputs is None:
             raise DataError("the response has no input; simulate with ct.forced_response")
         u, y = response.u, response.y

@@ -191,6 +191,7 @@ def write_campaign(
     ...     print(path.read_text().count("<svg "), "figures")
     5 figures
     """
+    check_type(campaign, Campaign, "campaign", "that of identify_campaign")
     system = campaign.system
     with times_in(shown_time_unit(system)):
         tables = [campaign_table(campaign), amplitude_table(campaign)]
@@ -260,6 +261,8 @@ def write_comparison(
     ...     print(path.read_text().count("<svg "), "figures")
     2 figures
     """
+    check_type(frf, ct.FrequencyResponseData, "frf", "a frequency response")
+    check_type(comparison, FRFComparison, "comparison", "that of compare_frf")
     return write_report(
         path,
         title=f"{system.name} and {frf.name}",

@@ -5,11 +5,13 @@ from __future__ import annotations
 import numpy as np
 
 from .. import plots
+from .._checks import check_type
 from .._wording import in_time, times_in
 from ..data.shown_units import in_shown_units
 from ..delayed import DelayedStateSpace
 from ..design.tuning.controller import PIDController
 from ..design.tuning.forms import PIDForm
+from ..errors import UnsuitableSystemError
 from ..plots.delays import estimate_of
 from .page import Column, Controller, Row, Table
 from .sketches import Sketch, sketch
@@ -80,6 +82,7 @@ def controller_of(
     """
     if pid is None:
         return None
+    check_type(pid, PIDController, "controller", "that of design.pid", UnsuitableSystemError)
     written = pid.as_form() if form is None else form
     rows = [Row((name, value)) for name, value in written._rows()]
     entered = Table(

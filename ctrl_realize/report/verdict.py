@@ -8,10 +8,12 @@ from typing import Literal
 
 import numpy as np
 
+from .._checks import check_type
 from .._facts import facts
 from .._flags import Flag, in_doubt, marked
 from .._wording import in_time, interval_in_time, number_within, time_within, times_in
 from ..delayed import DelayedStateSpace
+from ..errors import UnsuitableSystemError
 from ..frequency.comparison import FRFComparison
 from ..frequency.disagreement import CLOSE, FAR
 from ..identification.campaign.campaign import Campaign
@@ -63,6 +65,8 @@ def verdict_of(system: DelayedStateSpace, *, comparison: FRFComparison | None = 
     >>> print(verdict.level, "-", verdict.judgement)
     caution - Use with care: see the remarks below.
     """
+    expected = "a model with dead time, as returned by identify"
+    check_type(system, DelayedStateSpace, "system", expected, UnsuitableSystemError)
     flags = (*_flags_in(comparison), *_flags_of(system))
     return _verdict(system, flags, [*disagreement(comparison), *facts_of(system)])
 
@@ -121,7 +125,10 @@ def comparison_verdict(system: DelayedStateSpace, comparison: FRFComparison) -> 
 
 
 def _flags_in(comparison: FRFComparison | None) -> tuple[Flag, ...]:
-    return () if comparison is None else comparison.flags
+    if comparison is None:
+        return ()
+    check_type(comparison, FRFComparison, "comparison", "that of compare_frf")
+    return comparison.flags
 
 
 def headline_of(system: DelayedStateSpace) -> str:

@@ -111,10 +111,11 @@ class PIDController(ShownSystem, BesideDelays):
             )
         step = not_negative(dt, "dt", "sample time in s, 0 for continuous")
         self.kind = "P" + "I" * (self.ti < INF) + "D" * (self.td > 0)
+        own = self.kind if rule == "given" else f"{self.kind}_{rule}"
         super().__init__(
             *self._matrices(step),
             step,
-            name=system_name(name or (self.kind if rule == "given" else f"{self.kind}_{rule}")),
+            name=system_name(own if name is None else name),
             inputs=["e"],
             outputs=["u"],
             remove_useless_states=False,
