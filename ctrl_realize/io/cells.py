@@ -61,8 +61,9 @@ def split_line(line: str, delimiter: str) -> list[str]:
     if '"' not in line:
         cells = line.split() if delimiter == " " else line.split(delimiter)
         return [cell.strip() for cell in cells]
+    around = None if delimiter == " " else " \t\r\n".replace(delimiter, "")  # a tab may be a cell
     try:
-        (cells,) = csv.reader([line.strip()], delimiter=delimiter, skipinitialspace=True)
+        (cells,) = csv.reader([line.strip(around)], delimiter=delimiter, skipinitialspace=True)
     except (csv.Error, ValueError):
         # a stray quote or a cell longer than csv's limit: not a line of numbers
         return line.split(delimiter)

@@ -571,3 +571,19 @@ def test_bad_cells_are_named_by_their_line_and_only_where_they_are_used(tmp_path
     file.write_text("t,u,y\n0,0,1,5,2,5\n0,1,1,5,2,5\n0,2,1,5,2,5\n")
     with pytest.raises(FileFormatError, match=r"line 1 .* has 3 cells, the lines below have 6"):
         read_record(file)
+
+
+@pytest.mark.parametrize("delimiter", [",", ";", "\t"])
+@pytest.mark.parametrize("empty", ["first", "last"])
+@pytest.mark.parametrize("quote", ["", '"'])
+def test_lines_with_an_empty_cell_at_an_end_are_read(tmp_path, delimiter, empty, quote):
+    u, y = np.arange(60) > 9, np.arange(60) / 8
+    rows = [("time_s", "OP", "PV"), *zip(range(60), u.astype(int), y, strict=True)]
+    lines = [
+        delimiter.join([f"{quote}{a}{quote}", str(b), f"{quote}{c}{quote}"]) for a, b, c in rows
+    ]
+    lines = [delimiter + line if empty == "first" else line + delimiter for line in lines]
+    path = tmp_path / "a.csv"
+    path.write_text("\n".join(lines) + "\n")
+    record = cr.read_record(path)
+    np.testing.assert_array_equal([record.time, record.input, record.output], [np.arange(60), u, y])
