@@ -142,7 +142,7 @@ def _checked_unit(given: Mapping[str, Any], argument: str, known: Iterable[str])
     unit = given[argument]
     if unit == "auto":
         return None
-    plain = plain_unit(unit)
+    plain = plain_unit(str(unit))
     if plain not in known:
         names = ", ".join(repr(one or "abs") for one in known)
         raise OptionError(f"{argument}={unit!r} must be one of {names} or 'auto'")

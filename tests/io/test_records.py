@@ -587,3 +587,22 @@ def test_lines_with_an_empty_cell_at_an_end_are_read(tmp_path, delimiter, empty,
     path.write_text("\n".join(lines) + "\n")
     record = cr.read_record(path)
     np.testing.assert_array_equal([record.time, record.input, record.output], [np.arange(60), u, y])
+
+
+def test_numbers_of_columns_may_be_numpys_and_other_kinds_are_refused(tmp_path):
+    path = tmp_path / "a.csv"
+    path.write_text("a,b,c\n" + "".join(f"{k},{k > 9:d},{k / 8}\n" for k in range(60)))
+    columns = dict(zip(["time", "input", "output"], np.arange(3), strict=True))
+    assert_array_equal(read_record(path, **columns).output, np.arange(60) / 8)
+    for odd in (3.5, {}, object(), [{}], [1.5], b"b"):
+        with pytest.raises(OptionError, match="input="):
+            read_record(path, time=0, input=odd, output=2)
+
+
+@pytest.mark.parametrize("name", ["frequency_unit", "magnitude_unit", "phase_unit"])
+@pytest.mark.parametrize("odd", [True, 3, None, b"Hz", "furlong"])
+def test_a_unit_of_a_response_is_one_of_a_list(tmp_path, name, odd):
+    path = tmp_path / "a.csv"
+    path.write_text("f,m,p\n1,1,0\n2,0.5,-10\n")
+    with pytest.raises(OptionError, match=f"{name}=.* must be one of"):
+        cr.read_frf(path, frequency=0, magnitude=1, phase=2, **{name: odd})

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -39,8 +39,10 @@ def long_table(
     if isinstance(time, str):
         clocks = [k for k, one in enumerate(table.columns) if one.name == time]
     names = {column.name for column in table.columns}
-    several = [[one] if isinstance(one, str | int | None) else one for one in signals]
-    asked = {column for each in several for column in each}
+    plain = (
+        one if isinstance(one, Iterable) and not isinstance(one, str) else [one] for one in signals
+    )
+    asked = {column for each in plain for column in each if isinstance(column, str)}
     if not len(tags) == len(values) == len(clocks) == 1 or asked & names:
         return None
     cells = np.array([str(cell).strip() for cell in table.columns[tags[0]].cells])
