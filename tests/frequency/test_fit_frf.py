@@ -677,9 +677,9 @@ def test_points_at_one_frequency_and_names_that_are_no_text_are_refused():
         cr.fit_frf(cr.MeasuredFRF(np.ones(20), np.ones(20)))
     f = np.geomspace(0.1, 2, 12)
     lag = cr.MeasuredFRF(1 / (1 + 2j * np.pi * f), f)
-    with pytest.raises(cr.errors.OptionError, match="name=5; expected a text"):
+    with pytest.raises(cr.errors.OptionError, match="name is a int; expected text"):
         cr.fit_frf(lag, 1, name=5)
-    with pytest.raises(cr.errors.OptionError, match="name=1; expected a text"):
+    with pytest.raises(cr.errors.OptionError, match="name is a int; expected text"):
         cr.MeasuredFRF(lag.complex, f, inputs=[1])
     with pytest.raises(cr.errors.DataError, match="real numbers"):
         lag.between_hz("0.1", 1)

@@ -44,8 +44,10 @@ def state_units(A: FloatArray, B: FloatArray | None = None) -> FloatArray:
     if B is not None:
         n, m = B.shape
         return state_units(np.block([[A, B], [np.zeros((m, n + m))]]))[:n]
-    coupled = A - np.diag(np.diag(A))
-    within = _within(A)
+    coupled, reach = A - np.diag(np.diag(A)), np.eye(A.shape[0]) + (A != 0)
+    for _ in range(A.shape[0].bit_length()):
+        reach = (reach @ reach > 0).astype(np.float64)
+    within = reach * reach.T  # 1 for states of one part, which act on each other
     with np.errstate(invalid="ignore"):  # SciPy makes positions of the units, too
         scale = matrix_balance(coupled * within, permute=False, separate=True)[1][0]
     units = np.asarray(scale, np.float64)
@@ -63,14 +65,6 @@ def state_units(A: FloatArray, B: FloatArray | None = None) -> FloatArray:
             break
         units *= np.exp2(change)
     return units
-
-
-def _within(A: FloatArray) -> FloatArray:
-    """Mark with 1 the pairs of states that act on each other, through others or not."""
-    reach: FloatArray = np.eye(A.shape[0]) + (A != 0)
-    for _ in range(A.shape[0].bit_length()):
-        reach = (reach @ reach > 0).astype(float)
-    return reach * reach.T
 
 
 def zero_order_hold(A: FloatArray, B: FloatArray, dt: float) -> tuple[FloatArray, FloatArray]:
