@@ -79,6 +79,22 @@ def test_python_control_draws_from_the_exact_response():
     assert ours[:2] == pytest.approx((right.gain_margin, right.phase_margin), rel=1e-5)
 
 
+def test_margin_of_a_double_integrator_is_at_the_crossover_of_its_dead_time():
+    # PI on a tank: the phase, -180 degrees at frequency 0, crosses -180 at atan(w ti) = w tau
+    ti, tau = 1.0, 0.1
+    w = brentq(lambda w: np.arctan(w * ti) - w * tau, 5.0, 30.0)
+    found = ct.margin(1 * (ct.tf([ti, 1], [ti, 0, 0]) * cr.delay(tau)))
+    # the spline of python-control is accurate to 1e-6
+    assert found[0] == pytest.approx(w**2 * ti / np.hypot(1, w * ti), rel=1e-5)
+    assert found[2] == pytest.approx(w, rel=1e-5)
+
+
+def test_a_gain_margin_is_found_however_large_it_is():
+    w = brentq(lambda w: np.arctan(w) + 1e-3 * w - np.pi, 1.0, 1e4)
+    gain, _, at, _ = ct.margin(1 * (ct.tf([1], [1, 1]) * cr.delay(1e-3)))
+    assert (gain, at) == pytest.approx((np.hypot(1, w), w), rel=1e-5)
+
+
 # -- poles and stability --------------------------------------------------------------------------
 
 

@@ -201,3 +201,11 @@ def test_margin_counts_a_phase_of_180_degrees_at_an_end_of_the_axis():
         assert np.abs(np.abs(loop.poles()) - 1).min() < 1e-5
         checked += 1
     assert checked > 30
+
+
+def test_margin_takes_a_pole_that_is_1_but_for_rounding_for_an_integrator():
+    # as the bilinear transformation of python-control leaves that of many a PID
+    plant = cr.delayed_ss(ct.tf([1], [1, 1]), 20, dt=0.01)
+    exact, rounded = (ct.ss([[pole]], [[1.0]], [[0.02]], [[0.5]], 0.01) for pole in (1, 1 + 2**-52))
+    # the spline of python-control is accurate to 1e-6
+    assert ct.margin(plant * rounded) == pytest.approx(ct.margin(plant * exact), rel=1e-5)

@@ -26,6 +26,10 @@ DECIDES = 0.2
 response is left out."""
 
 
+BEYOND = 1e8
+"""Gain that only a pole at zero has, at the lower end of the axis: a phase of -180 degrees there is
+that of a double integrator, or of rounding in its poles, and no margin."""
+
 STRAIGHT = 10.0
 """Real over imaginary part from which on a response is taken for that at an end of the axis: that
 of an integrator is not, which is far above any margin there."""
@@ -61,7 +65,9 @@ class HostMargins(DeferredMatrices):
         """Frequencies so close that the response between them can be interpolated."""
         every = grid_about(*self.features(), float(self.dt or 0), self._gain_is_gone)
         omega, values = follow(self._at, every)
-        omega, values = follow(self._at, omega[: _last(values)], FINE)
+        first = int(np.argmax(np.abs(values) < BEYOND))
+        last = first + _last(values[first:])
+        omega, values = follow(self._at, omega[first:last], FINE)
         known = np.isfinite(values)
         return omega[known], values[known]
 
@@ -112,11 +118,12 @@ class HostMargins(DeferredMatrices):
     def _gain_is_gone(self, fastest: float) -> float:
         """Find a frequency above which the gain of a system is too low for any margin."""
         omega = fastest * np.geomspace(1e-3, 1e5, 4000)
-        size = np.abs(self._at(omega))
+        values = self._at(omega)
+        size = np.abs(values)
         level = 0.1 * DECIDES * min(1.0, float(np.median(size[:100])) or 1.0)
         (large,) = np.nonzero(~(size < level))
         # a gain that does not roll off is evaluated up to ten times the fastest pole
-        last = int(large[-1]) if large.size else 0
+        last = max(int(large[-1]) if large.size else 0, int(np.argmax(_across(values))))
         return float(omega[last + 1]) if last + 1 < omega.size else 10 * fastest
 
 
@@ -127,17 +134,27 @@ def _last(values: ComplexArray) -> int:
     python-control takes a minute for the turns of the phase beyond.
     """
     size = np.abs(values)
-    across = (values.imag[1:] < 0) != (values.imag[:-1] < 0)
-    across &= values.real[1:] + values.real[:-1] < 0
-    real = np.append(size[1:][across], size[[0, -1]][_is_negative(values[[0, -1]])])
+    real = np.append(size[1:][_across(values)], size[[0, -1]][_negative_ends(values)])
     level = DECIDES * min(1.0, float(real.max(initial=0.0)) or 1.0)
     (above,) = np.nonzero(~(size < level))
     return int(above[-1]) + 3 if above.size else values.size
 
 
-def _is_negative(values: ComplexArray) -> BoolArray:
-    """Whether values at an end are real, up to the distance of a grid from it, and negative."""
-    return np.asarray(values.real < -STRAIGHT * np.abs(values.imag))
+def _across(values: ComplexArray) -> BoolArray:
+    """Whether a response crosses the negative real axis after each of its points but the last."""
+    turned = (values.imag[1:] < 0) != (values.imag[:-1] < 0)
+    return np.asarray(turned & (values.real[1:] + values.real[:-1] < 0))
+
+
+def _negative_ends(values: ComplexArray) -> BoolArray:
+    """Whether both ends are real, up to the distance of a grid from them, and negative.
+
+    The gain of a double integrator, which is neither, rises by a tenth from point to point.
+    """
+    ends = values[[0, -1]]
+    negative = np.asarray(ends.real < -STRAIGHT * np.abs(ends.imag))
+    negative[0] &= abs(values[0]) < 1.01 * abs(values[1])
+    return negative
 
 
 def _with_mirrored_ends(
@@ -152,7 +169,7 @@ def _with_mirrored_ends(
         inside = omega[:-1]
         omega = np.append(inside, 2 * end - inside[-1])
         values = np.append(values[:-1], values[-2].conj())
-    if _is_negative(values[:1])[0]:
+    if _negative_ends(values)[0]:
         omega = np.append(-omega[0], omega)
         values = np.append(values[0].conj(), values)
     return omega, values
