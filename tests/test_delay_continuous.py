@@ -499,3 +499,44 @@ def test_stability_of_random_loops_is_that_of_their_rightmost_pole(direct):
         found.append(loop.is_stable())
         assert found[-1] is bool(loop.dominant_poles(1)[0].real < 0)
     assert 5 < sum(found) < 25
+
+
+@pytest.mark.parametrize("count", [3, 5])
+def test_step_info_of_equal_lags_goes_on_until_the_response_has_settled(count):
+    # 1 - exp(-t) (1 + t + ... ) of equal lags is within 2 % later than four times one of them
+    plant = ct.tf([1], np.poly(-np.ones(count))) * cr.delay(0.3)
+    t = brentq(lambda t: sum(t**n * np.exp(-t) / factorial(n) for n in range(count)) - 0.02, 4, 30)
+    # to the distance of the times, a sixtieth of a lag at most
+    for found, step in ((plant.step_info(), 0.04), (plant.to_discrete(0.01).step_info(), 0.011)):
+        assert 0 <= found["SettlingTime"] - (t + 0.3) <= step
+
+
+def test_step_responses_take_the_arguments_of_python_control():
+    both = ct.append(P1, P2)
+    whole = both.step_response(4.0, timepts_num=9)
+    assert_allclose(whole.time, np.linspace(0, 4, 9))
+    one = both.step_response(T=4.0, T_num=9, input=1, output=1)
+    assert_allclose(one.outputs, whole.outputs[1, 1], rtol=1e-7)
+    with cr.extend_control():
+        assert_allclose(ct.step_response(both, 4.0, T_num=9).outputs, whole.outputs)
+    with pytest.raises(TypeError, match=r"unrecognized.*: nonsense$"):
+        both.step_response(4.0, nonsense=1)
+
+
+@pytest.mark.parametrize("system", [cr.delayed_ss(ct.tf([1], [1, 1]), 3, dt=0.1), P1 * 1, P1])
+def test_the_input_of_a_response_may_be_a_function(system):
+    t = 0.1 * np.arange(50)
+    # of a straight line, which is the same between the times
+    assert_allclose(
+        system.forced_response(t, lambda t: 2 * t).outputs,
+        system.forced_response(t, 2 * t).outputs,
+        atol=1e-7,
+    )
+
+
+def test_inputs_are_transposed_with_the_outputs():
+    t, u = 0.1 * np.arange(30), np.stack([np.ones(30), np.arange(30.0)])
+    core = ct.ss([[0.9]], [[1.0, 0.5]], [[1.0], [2.0]], 0, 0.1)
+    for system in (cr.delayed_ss(core, [1, 4]), ct.append(P1, P2)):
+        found = system.forced_response(t, u.T, transpose=True)
+        assert_allclose(found.outputs, system.forced_response(t, u).outputs.T)

@@ -8,6 +8,8 @@ simulate with delay lines.
 from __future__ import annotations
 
 from abc import abstractmethod
+from collections.abc import Mapping
+from contextlib import suppress
 from typing import Any
 
 import control as ct
@@ -17,6 +19,7 @@ from numpy.typing import ArrayLike
 from .._checks import finite, not_negative
 from ..errors import DataError, UnsuitableSystemError
 from ..numerics.arrays import ComplexArray, FloatArray, IntArray
+from ..numerics.internal_delays.equation import Signal
 from ..numerics.internal_delays.form import DelayForm
 from ..numerics.state_space.responses import Schur, schur_form
 from .host_margins import HostMargins
@@ -30,6 +33,9 @@ FEWEST, MOST = 20, 5000
 
 LONGEST = 1_000_000
 """Samples of a step response whose rise and settling times are computed, at most."""
+
+DOUBLINGS = 6
+"""Lengths that are tried of a response that settles late."""
 
 ON_CIRCLE = 1e-8
 """Distance of a pole to the unit circle below which it counts as on it, as in python-control."""
@@ -153,10 +159,11 @@ class HostResponses(HostMargins):
             In discrete time of all states: those of the core, then the past samples, in the order
             of ``state_labels``; in continuous time of the core.
         **settings
-            ``squeeze`` and ``transpose``; in discrete time those of `control.forced_response` (if
-            the states are requested, python-control simulates with the matrices). In continuous
-            time also ``history``, the constant input of each delay before time 0
-            (default 0); and ``tolerance``, the largest error relative to the largest output (1e-8).
+            ``squeeze`` and ``transpose``, also of `inputs`; in discrete time those of
+            `control.forced_response` (if the states are requested, python-control simulates with
+            the matrices). In continuous time also ``history``, the constant input of each delay
+            before time 0 (default 0); and ``tolerance``, the largest error relative to the largest
+            output (1e-8).
 
         Returns
         -------
@@ -198,7 +205,8 @@ class HostResponses(HostMargins):
         Without `timepts` until the slowest pole has decayed; in discrete time to a thousandth, for
         5000 samples at most. In continuous time from zero initial state, at equal times that show
         the fastest of the dominant poles, and later at fewer ones where the slowest takes far
-        longer; ``tolerance`` is accepted as in `forced_response`.
+        longer; ``tolerance`` is accepted as in `forced_response`, and of the arguments of
+        `control.step_response` ``timepts_num``, ``input_indices`` and ``output_indices``.
         """
         return self._responded("step", timepts, 1.0, initial_state, settings)
 
@@ -208,8 +216,8 @@ class HostResponses(HostMargins):
         Parameters
         ----------
         timepts : array_like or float, optional
-            Times of the step response, or its end. Default, in discrete time: until the slowest
-            pole has decayed to a thousandth, dead time included.
+            Times of the step response, or its end. Default: until it has settled, and at least
+            until the slowest pole has decayed.
         **settings
             ``SettlingTimeThreshold`` and ``RiseTimeLimits`` of `control.step_info`, and ``T``, its
             former name of `timepts`.
@@ -243,6 +251,7 @@ class HostResponses(HostMargins):
                 f"{self.name!r} is not stable, so its step response has no final value; expected "
                 "a stable system. Look at sys.step_response(t)"
             )
+        searched = timepts is None and final != 0
         if timepts is None and self.dt:
             count = self._settling_samples(LONGEST)
             if count == LONGEST:
@@ -251,15 +260,22 @@ class HostResponses(HostMargins):
                     "the response in s, sys.step_info(end), or use a longer sample time"
                 )
             timepts = self._times(None, count)
-        response = self.step_response(timepts)
-        try:
-            with np.errstate(divide="ignore", invalid="ignore"):  # a final value of 0
-                return ct.step_info(response.outputs, response.time, yfinal=final, **settings)
-        except IndexError:
+        for _ in range(DOUBLINGS):
+            response, found = self.step_response(timepts), None
+            with suppress(IndexError), np.errstate(divide="ignore", invalid="ignore"):
+                # divides by a final value of 0; a response that has not risen has no index
+                found = ct.step_info(response.outputs, response.time, yfinal=final, **settings)
+            settled = found is not None and np.isfinite(found["SettlingTime"])
+            if settled or not searched or 2 * response.time.size > LONGEST:
+                break
+            # equal lags, or a zero, settle later than the slowest pole alone
+            timepts = 2 * response.time[-1]
+        if found is None:
             raise UnsuitableSystemError(
                 f"the step response of {self.name!r} has not risen to its final value {final:.4g} "
                 f"by {response.time[-1]:.6g} s; give a later end, sys.step_info(end)"
-            ) from None
+            )
+        return found
 
     def impulse_response(
         self, timepts: ArrayLike | float | None = None, **settings: Any
@@ -279,7 +295,9 @@ class HostResponses(HostMargins):
             given = {"forced": (inputs, state), "impulse": ()}.get(kind, (state,))
             return getattr(super(), f"{kind}_response")(timepts, *given, **settings)
         if kind == "forced":
-            inputs = finite(inputs, "inputs")
+            if callable(inputs):
+                inputs = called(inputs, self.ninputs)(self._times(timepts, 0))
+            inputs = laid_out(finite(inputs, "inputs"), settings)
             times = self._times(timepts, np.atleast_2d(inputs).shape[-1])
             rows = self._input_rows(inputs, times.size)
             outputs = self._simulated(rows, self._state(state))
@@ -374,6 +392,16 @@ class HostResponses(HostMargins):
             sysname=self.name,
             **more,
         )
+
+
+def called(given: Signal, count: int) -> Signal:
+    """Make the signal of a function, whose values may have another shape for one input."""
+    return lambda t: np.asarray(given(t), dtype=np.float64).reshape(count, t.size)
+
+
+def laid_out(inputs: Any, settings: Mapping[str, Any]) -> Any:
+    """Inputs with a row for each signal; a response that is transposed has columns."""
+    return np.transpose(inputs) if settings.get("transpose") else inputs
 
 
 def spread(given: ArrayLike, count: int, name: str) -> FloatArray:

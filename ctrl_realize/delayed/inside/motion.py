@@ -9,12 +9,12 @@ import control as ct
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..._checks import finite, positive
+from ..._checks import finite, integer, positive
 from ...errors import DataError, ModelWarning, UnsuitableSystemError, warn_caller
 from ...numerics.arrays import FloatArray
 from ...numerics.constants import SMALLEST
 from ...numerics.internal_delays.equation import Signal, TooManyStepsError, response_times, solve
-from ..host_responses import spread
+from ..host_responses import called, laid_out, spread
 from .poles import InsidePoles
 
 LEAST = 400
@@ -40,9 +40,9 @@ class Motion(InsidePoles):
         """Compute the response to any input, linear between the given times."""
         times = _checked_times(timepts, self.name)
         if callable(inputs):
-            signal, breaks = _called(inputs, self.ninputs), np.zeros(0)
+            signal, breaks = called(inputs, self.ninputs), np.zeros(0)
         else:
-            rows = self._input_rows(inputs, times.size)
+            rows = self._input_rows(laid_out(inputs, shown), times.size)
             signal = _between(times, rows)
             kinks = np.abs(np.diff(rows, 2)) > 1e-12 * np.abs(rows).max(initial=0.0)
             breaks = times[1:-1][kinks.any(axis=0)]
@@ -58,9 +58,12 @@ class Motion(InsidePoles):
         *,
         shown: Mapping[str, Any],
         tolerance: float = TOLERANCE,
+        timepts_num: int | None = None,
     ) -> ct.TimeResponseData:
         """Compute the responses to a unit step, or a unit impulse, on each input."""
         times = self._motion_times(timepts)
+        if timepts_num is not None and (timepts is None or np.size(timepts) == 1):
+            times = np.linspace(0, times[-1], integer(timepts_num, "timepts_num", 2))
         drive, pulse = np.eye(self.ninputs)[:, :, None] * np.ones(times.size), kind == "impulse"
         every = [
             self._solved(_between(times, rows), times, np.zeros(0), tolerance, slope=pulse)
@@ -117,11 +120,6 @@ class Motion(InsidePoles):
         slow = 6 / float(rates.min()) if rates.size else 0.0
         delay = float(sum(self.internal_delays))
         return min(max(slow + delay, 5 * delay), 100 * delay + slow) or 1.0
-
-
-def _called(given: Signal, count: int) -> Signal:
-    """Make the signal of a function, whose values may have another shape for one input."""
-    return lambda t: np.asarray(given(t), dtype=np.float64).reshape(count, t.size)
 
 
 def _between(times: FloatArray, rows: FloatArray) -> Signal:

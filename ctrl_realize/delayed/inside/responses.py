@@ -18,6 +18,14 @@ from ..host_responses import PLAIN, HostResponses
 from ..operators import DelayOperators
 from .motion import Motion
 
+HOST_NAMES = {
+    "T": "timepts",
+    "T_num": "timepts_num",
+    "input": "input_indices",
+    "output": "output_indices",
+}
+"""Short names of arguments, as python-control has them."""
+
 
 class InsideResponses(Motion, HostResponses, DelayOperators):
     """Responses whose cost does not depend on the delays."""
@@ -34,7 +42,15 @@ class InsideResponses(Motion, HostResponses, DelayOperators):
             raise OptionError("a step response starts from rest; use sys.forced_response")
         shown = {key: settings.pop(key) for key in PLAIN & settings.keys()}
         if kind in ("step", "impulse"):
-            return self._unit_motion(timepts, kind, shown=shown, **settings)
+            known = {HOST_NAMES.get(key, key): value for key, value in settings.items()}
+            if unknown := set(known) - {*HOST_NAMES.values(), "tolerance"}:
+                raise TypeError(f"unrecognized keyword(s): {', '.join(sorted(unknown))}")
+            chosen = [known.pop(f"{side}_indices", None) for side in ("output", "input")]
+            if chosen != [None, None]:
+                part = self[tuple(slice(None) if each is None else each for each in chosen)]
+            else:
+                part = self
+            return part._unit_motion(**{"timepts": timepts, **known}, kind=kind, shown=shown)
         times = self._motion_times(timepts) if kind == "initial" else timepts
         return self._forced_motion(times, inputs, state, shown=shown, **settings)
 
