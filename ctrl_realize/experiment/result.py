@@ -101,7 +101,8 @@ class ExperimentPlan(PlannedInput):
         Input of the best candidate with its level, held over each sample.
     want : {"dead_time", "gain", "phase", "Ms"}
     candidates : tuple of PlannedTest
-        Best first.
+        Best first: of those within 5 % of the least error the one that moves the output least,
+        then the others by their error.
     curve : ErrorCurve
     level : float
         Input at rest.

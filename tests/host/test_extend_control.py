@@ -53,6 +53,10 @@ def test_a_dead_time_is_written_as_in_a_textbook():
     assert not hasattr(ct, "exp")
 
 
+def test_the_dead_time_in_an_exponent_may_be_zero():
+    assert (LAG * cr.exp(-0.0 * S))(1j) == pytest.approx(LAG(1j), rel=1e-15)
+
+
 @pytest.mark.parametrize("wrong", [2.0, 1 / S, -S - 1, ct.tf([-1, 0], [1], 0.1), -(S**2)])
 def test_other_exponents_are_refused(wrong):
     with pytest.raises(cr.errors.UnsuitableSystemError, match=r"expected -tau \* s"):

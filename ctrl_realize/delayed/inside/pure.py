@@ -136,8 +136,8 @@ def exp(system: Any) -> Any:
     """
     if isinstance(system, ct.TransferFunction) and system.issiso() and not system.dt:
         num, den = (np.trim_zeros(p[0][0], "f") for p in (system.num, system.den))
-        if num.size == 2 and den.size == 1 and num[1] == 0:
-            return delay(-num[0] / den[0])
+        if num.size in (0, 2) and den.size == 1 and not num[1:].any():
+            return delay(-num[0] / den[0] if num.size else 0.0)
     raise UnsuitableSystemError(
         f"got exp of {system!r}; expected -tau * s with s = ct.tf('s') and a dead time tau in s, "
         "such as exp(-0.3 * s); in discrete time use delay(tau, dt)"
