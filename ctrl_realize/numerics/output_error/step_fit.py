@@ -85,7 +85,7 @@ from .margins import CloseDecision, close_to
 from .other_structures import Compared, Requested, other_structures
 from .process_models import fit_requested
 from .profiles import profile_of
-from .result import DelayInterval, OutputErrorEstimate, RobustKey, assembled
+from .result import AT_BOUND, DelayInterval, OutputErrorEstimate, RobustKey, assembled
 from .rounded import in_rounded_data
 from .selection import chains_of, flows_of
 from .step_data import StepData, settled_at, step_scales, stop_at, window
@@ -144,6 +144,11 @@ def fit_step_record(
         found = _free_choice(data, fits, fit, requested.whiten)
     else:
         found = _given_structures(data, fits, free, requested)
+        later = fits.scales.onset + fits.scales.rise
+        at_bound = AT_BOUND * found.latest < found.dead_time and found.latest < later
+        if requested.latest is None and at_bound and found.better is not None:
+            # That of an approximation includes lags, and may be after the visible onset.
+            return fit_step_record(given, replace(requested, latest=later))
     if found.static is not None:
         found = replace(found, rounding=_input_error(data) * abs(found.static.gain))
     if data.coarse:  # both levels of a step are rounded, however many samples they have
