@@ -193,6 +193,8 @@ def _named(given: Any, what: str, form: ProcessForm) -> list[tuple[str, Any]]:
                 f"{what} has {key!r}; the parameters of {form.name} are "
                 f"{', '.join(n for n in form.names if form.dead_time or n != 'dead_time')}"
             )
+        if name in found:
+            raise OptionError(f"{what} has {name} twice, here as {key!r}; expected one value")
         found[name] = value
     return list(found.items())
 

@@ -38,6 +38,7 @@ upper end where that is earlier, as in loud noise; samples; or parts of the tota
 which it does not matter."""
 _CLOSE, _ROUGH = 0.05, 0.25
 """Half width of the interval of a gain that is well known, and of one that is, in parts of it."""
+_ROUNDED = 1e-9  # half of an interval that rounding leaves of a gain that is fixed
 _ROBUST, _TOO_MUCH = 2.0, 4.0
 """Ms up to which a loop is robust (gain margin 2, phase margin 29 deg), and up to which it works
 at all (1.3 and 14 deg)."""
@@ -165,6 +166,7 @@ def _dead_time(fit: Any) -> Verdict:
 def _gain(fit: FractionalDelayFit) -> Verdict:
     gain, (low, high) = fit.gain, fit.gain_interval or (-np.inf, np.inf)
     half = max(high - gain, gain - low) / abs(gain) if gain else np.inf
+    half = half if half > _ROUNDED else 0.0
     some = half <= _ROUGH and (low > 0 or high < 0)
     level, why = _level(fit.flags, "gain", half <= _CLOSE, some)
     said = f"known to {plainly(100 * half, 2)} %"

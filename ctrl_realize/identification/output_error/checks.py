@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..._flags import Flag, flagged
-from ..._wording import chosen
+from ..._wording import chosen, interval_in_time
 from ...numerics.arrays import FloatArray, IntArray
 from ...numerics.constants import Z_95
 from ...numerics.rules import Rule
@@ -99,8 +99,10 @@ def checked(fit: OutputErrorFit, *, alone: bool = True) -> OutputErrorFit:
         if step is not None:
             flags += coloured_flags(fit, step, shown.output, shown.drive)
         if step is not None and not white:
-            low = max(min(low, step.dead_time - Z_95 * step.dead_time_error), 0.0)
-            high = max(high, step.dead_time + Z_95 * step.dead_time_error)
+            form, half = fit.estimate.process.form, Z_95 * step.dead_time_error
+            first, last = form.dead_time_ends if form else (0.0, np.inf)
+            low = min(low, max(step.dead_time - half, first))
+            high = max(high, min(step.dead_time + half, last))
         # Parts of one step are not several responses.
         if not (in_loop or fit.estimate.averaged) and not (stepped and _moves(shown.drive) < 2):
             changes, notes = against_one_model(shown, fit.dead_time / fit.data.dt)
@@ -110,7 +112,9 @@ def checked(fit: OutputErrorFit, *, alone: bool = True) -> OutputErrorFit:
     known = [flag for flag in flags if flag.code not in codes]
     # What disturbances leave open of a gain is more than what the end of the record does.
     told = "not_settled" if any(flag.code == "gain_not_resolved" for flag in known) else ""
-    before = [flag for flag in fit.flags if flag.code != told]
+    old, new = (f" {interval_in_time(*ends)}" for ends in (fit.interval, (low, high)))
+    kept = (flag for flag in fit.flags if flag.code != told)
+    before = [replace(flag, message=flag.message.replace(old, new)) for flag in kept]
     estimate = replace(fit.estimate, low=low, high=high)
     return replace(fit, estimate=estimate, flags=(*before, *known), choices=(*fit.choices, *notes))
 

@@ -326,6 +326,12 @@ def _requested(
     latest = max(filter(np.isfinite, bounds), default=None)
     if limit is not None:
         latest = limit * records[0].sample_time
+        fixed = [form.fixed.get("dead_time", 0.0) for form in asked.forms]
+        if max(fixed, default=0.0) > latest:
+            raise OptionError(
+                f"max_delay={max_delay} samples of {records[0].sample_time:g} s beside a dead time "
+                f"fixed at {max(fixed):g} s; expected a larger one, or none"
+            )
     return replace(asked, latest=latest, whiten=noise == "auto")
 
 

@@ -180,7 +180,8 @@ def profile_curve(
     """Dead times (G,) and excess (G,) of points, as in `dead_time_profile`."""
     if _jumps(candidate, scales):
         # The later the jump begins, the faster it is, up to the sample at which it is complete.
-        end = min((_jump_sample(candidate, scales) + 1) * scales.dt, scales.latest)
+        latest = float(parameter_bounds(candidate.structure, scales).high[0])
+        end = min((_jump_sample(candidate, scales) + 1) * scales.dt, latest)
         late = end - _LATE * scales.dt
         dead_times = np.array(sorted(points))
         costs = np.array([points[at].cost for at in dead_times])

@@ -193,9 +193,11 @@ def fit_form(
         Models without the prescriptions, from which the search starts.
     """
     family = form_family(form, scales)
-    starts = [family.coordinates({**_start(problem, form, c, scales), **form.start}) for c in like]
-    if "dead_time" not in form.start:
-        starts += [np.append(0.5 * x[0], x[1:]) for x in starts]
+    suggested = [_start(problem, form, c, scales) for c in like]
+    starts = [family.coordinates(one) for one in suggested]
+    starts += [np.append(0.5 * x[0], x[1:]) for x in starts]
+    if form.start:
+        starts += [family.coordinates({**one, **form.start}) for one in suggested]
     best = lowest(problem, family, np.array(starts), scales.dt)
     x = family.ordered(best.parameters)
     values = family.values(x)[0] | {"gain": family.gain(problem, x)}

@@ -53,6 +53,12 @@ class ProcessForm:
         return ("gain", "dead_time", *lags, *pair, *(("lead_1",) if self.lead else ()))
 
     @property
+    def dead_time_ends(self) -> tuple[float, float]:
+        """Range of the dead time in s."""
+        at = self.fixed.get("dead_time", None if self.dead_time else 0.0)
+        return self.bounds.get("dead_time", (0.0, np.inf)) if at is None else (at, at)
+
+    @property
     def free_lags(self) -> tuple[str, ...]:
         """Lags that are neither fixed nor bounded, and are told apart by their order alone."""
         given = {*self.fixed, *self.bounds}

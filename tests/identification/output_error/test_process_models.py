@@ -268,3 +268,67 @@ def test_the_interval_of_a_lead_beside_lags_holds_it_where_lags_are_found_equal(
     found = fit.parameter_table()
     for name, truth in {"lag_1": lag, "lag_2": second, "lead_1": lead}.items():
         assert found.loc[name, "low"] <= truth <= found.loc[name, "high"]
+
+
+def binary(lags, noise=0.05, seed=2):
+    """Rest, then a binary input into a gain of 2 and lags in s behind 4.3 s."""
+    rng = np.random.default_rng(seed)
+    u = np.repeat(rng.choice([-1.0, 1.0], 27), 15)[:400]
+    u[:30] = 0
+    den = np.array([1.0])
+    for lag in lags:
+        den = np.polymul(den, [lag, 1.0])
+    clean = cr.delayed_ss(ct.tf([2.0], den), dead_time=4.3, dt=1.0).simulate(u)
+    return cr.Record(np.arange(400.0), u, clean + noise * rng.standard_normal(400))
+
+
+@pytest.mark.parametrize("start", [{"Td": 60.0}, {"Tp2": 0.01}, {"Td": 60.0, "Tp1": 200.0}])
+def test_a_start_is_tried_beside_those_that_the_data_suggest(start):
+    """From 60 s alone the search ended at a gain of -11, and from a lag of 10 ms too early."""
+    data = binary([12.0, 6.0])
+    plain, given = (
+        cr.identify(data, structures=ProcessStructure("SOPDT", start=one)).fit
+        for one in ({}, start)
+    )
+    # both are at the same minimum, which is found to a part of 1e-6 of the errors
+    assert given.dead_time == pytest.approx(plain.dead_time, abs=1e-3 * plain.std_given_structure)
+    assert given.interval == pytest.approx(plain.interval, abs=2e-3)  # a step of its grid
+    assert codes(given) == codes(plain)
+
+
+@pytest.mark.parametrize(
+    ("name", "given", "ends"),
+    [
+        ("SOPDT", {"fixed": {"Td": 4.3, "Kp": 2.0}, "bounds": {"Tp1": (5, None)}}, (4.3, 4.3)),
+        ("FOPDT", {"bounds": {"Td": (0, 3)}}, (0, 3)),
+        ("P2", {}, (0, 0)),
+    ],
+)
+def test_the_interval_of_a_dead_time_stays_within_what_is_prescribed(name, given, ends):
+    """Neither a lag that is over within a sample nor coloured disturbances widen it beyond."""
+    fit = cr.identify(binary([12.0]), structures=ProcessStructure(name, **given)).fit
+    assert ends[0] <= fit.interval[0] <= fit.interval[1] <= ends[1]
+
+
+def test_a_gain_that_is_fixed_is_known_without_rounding():
+    fit = cr.identify(binary([12.0]), structures=ProcessStructure("P1D", fixed={"Kp": 2.0})).fit
+    assert "(known to 0 %)" in str(fit.verdicts[1])
+
+
+def test_flags_have_the_interval_of_the_dead_time_that_the_card_has():
+    """That of coloured disturbances, which is found after the other flags."""
+    wrong = ProcessStructure("SOPDT", fixed={"Tp1": 12.0, "Tp2": 12.0})
+    fit = cr.identify(binary([12.0], seed=0), structures=wrong).fit
+    said = next(str(flag) for flag in fit.flags if flag.code == "no_delay_resolved")
+    ends = re.match(r"dead time 0 to ([\d.]+) s:", said)
+    assert ends
+    # three digits of an end
+    assert float(ends[1]) == pytest.approx(fit.interval[1], rel=5e-3)
+
+
+def test_prescriptions_that_contradict_each_other_are_refused():
+    with pytest.raises(cr.errors.OptionError, match="twice"):
+        ProcessStructure("P1D", fixed={"Td": 3.0, "dead_time": 4.0})
+    later = ProcessStructure("P1D", fixed={"Td": 1.5})
+    with pytest.raises(cr.errors.OptionError, match="max_delay=10 samples"):
+        cr.identify(record(TWO_LAGS), structures=later, max_delay=10)
