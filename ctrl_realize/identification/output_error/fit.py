@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from functools import partial
 from typing import Literal
@@ -21,7 +22,7 @@ from ...numerics.blas_threads import single_threaded
 from ...numerics.output_error.any_input.data import BEYOND, MOST_SAMPLES
 from ...numerics.output_error.other_structures import Requested
 from ...numerics.output_error.result import OutputErrorEstimate
-from ...numerics.output_error.step_data import StepData
+from ...numerics.output_error.step_data import StepData, briefly_at_rest
 from ...numerics.output_error.step_fit import fit_step_record
 from ...numerics.rules import Rule
 from ...numerics.validation.own_response import OwnResponse
@@ -429,6 +430,14 @@ def _fit_one(
     if data is None:
         return any_input((record,), requested)
     data, fit = fit_step_record(data, requested)
+    form = fit.process.form
+    if form and form.integrator and not fit.adequate and briefly_at_rest(data):
+        # In operation an integrator is on its way, which no steps from rest explain. Of other
+        # plants drift and free response would hide backlash.
+        with suppress(DataError):
+            moving = any_input((record,), requested)
+            if moving.estimate.adequate:
+                return moving
     unknown = int(np.ceil(BEYOND * fit.high / data.dt))
     if data.relaxing and first < unknown < data.edges[0][0] // 2:
         # The input may have moved just before the record: the response to that is not yet free.

@@ -97,6 +97,8 @@ def with_profiled_lags(
             at = partial(excess, place)
             ends = _end(at, x, x[place], low, -step), _end(at, x, x[place], high, step)
             low, high = (size * end if p.name == lead else float(np.exp(end)) for end in ends)
+            if p.name in form.bounds:
+                low, high = np.clip((low, high), *form.bounds[p.name]).tolist()
             p = p._replace(std=(high - low) / (2 * Z_95), ends=(low, high))
         profiled.append(p)
     return tuple(profiled)

@@ -332,3 +332,26 @@ def test_prescriptions_that_contradict_each_other_are_refused():
     later = ProcessStructure("P1D", fixed={"Td": 1.5})
     with pytest.raises(cr.errors.OptionError, match="max_delay=10 samples"):
         cr.identify(record(TWO_LAGS), structures=later, max_delay=10)
+
+
+def test_the_interval_of_a_lead_stays_within_its_bounds():
+    """That of a lead of two lags alone goes on to 1 s."""
+    negative = ProcessStructure("P2DZ", bounds={"Tz": (-5, 0)})
+    lead = cr.identify(binary([12.0, 6.0]), structures=negative).fit.parameter_table().loc["lead_1"]
+    assert -5 <= lead["low"] <= lead["value"] <= lead["high"] <= 0
+    assert lead["std_given_structure"] > 0
+
+
+def test_an_integrator_in_operation_is_found_where_few_moves_of_the_input_look_like_steps():
+    """As an experiment of steps from rest it has neither a slope nor a motion of its own."""
+    rng = np.random.default_rng(1028)
+    hold = int(rng.integers(8, 25))
+    u = np.repeat(rng.choice([-1.0, 1.0], 340 // hold + 1), hold)[:340]
+    lag, dead_time, rate = rng.uniform(5, 15), rng.uniform(0.5, 9), 0.1 * rng.uniform(0.5, 2)
+    clean = cr.delayed_ss(ct.tf([rate], [lag, 1, 0]), dead_time=dead_time, dt=1.0).simulate(u)
+    y = clean + 0.03 * np.std(clean) * rng.standard_normal(340)
+    fit = cr.identify(cr.Record(np.arange(280.0), u[60:], y[60:]), structures="P1DI").fit
+    truth = {"gain": rate, "dead_time": dead_time, "lag_1": lag}
+    for name, row in fit.parameter_table().iterrows():
+        assert abs(row["value"] - truth[name]) < 4 * row["std_given_structure"]
+    assert fit.at_noise_level
