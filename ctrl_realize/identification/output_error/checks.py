@@ -112,9 +112,10 @@ def checked(fit: OutputErrorFit, *, alone: bool = True) -> OutputErrorFit:
     known = [flag for flag in flags if flag.code not in codes]
     # What disturbances leave open of a gain is more than what the end of the record does.
     told = "not_settled" if any(flag.code == "gain_not_resolved" for flag in known) else ""
-    old, new = (f" {interval_in_time(*ends)}" for ends in (fit.interval, (low, high)))
-    kept = (flag for flag in fit.flags if flag.code != told)
-    before = [replace(flag, message=flag.message.replace(old, new)) for flag in kept]
+    before = [flag for flag in fit.flags if flag.code != told]
+    if (low, high) != fit.interval:  # which they may name
+        old, new = (f" {interval_in_time(*ends)}" for ends in (fit.interval, (low, high)))
+        before = [replace(flag, message=flag.message.replace(old, new)) for flag in before]
     estimate = replace(fit.estimate, low=low, high=high)
     return replace(fit, estimate=estimate, flags=(*before, *known), choices=(*fit.choices, *notes))
 
