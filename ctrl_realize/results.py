@@ -393,7 +393,7 @@ class ModelFit(Result):
         >>> fit = cr.fit_output_error(record, structures=[(1, 1)]).fit
         >>> table = fit.parameter_table(time_unit="ms")
         >>> print(f"{table.loc['lag_1', 'value']:.1f} {table.loc['lag_1', 'unit']}")
-        89.8 ms
+        72.5 ms
         """
         unit = self.time_unit if time_unit is None else checked_time_unit(time_unit)
         return parameter_table([one.in_time_unit(unit) for one in self.parameters])

@@ -146,7 +146,8 @@ def fit_step_record(
         found = _given_structures(data, fits, free, requested)
         later = fits.scales.onset + fits.scales.rise
         at_bound = AT_BOUND * found.latest < found.dead_time and found.latest < later
-        if requested.latest is None and at_bound and found.better is not None:
+        alone = len(data.edges) == 1  # what several responses differ in would be followed as well
+        if alone and requested.latest is None and at_bound and found.better is not None:
             # That of an approximation includes lags, and may be after the visible onset.
             return fit_step_record(given, replace(requested, latest=later))
     if found.static is not None:
