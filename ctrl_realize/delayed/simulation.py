@@ -75,16 +75,15 @@ def _units(outputs: FloatArray) -> FloatArray:
 
 
 def _unknown_starts(model: DelayedStateSpace, N: int) -> list[FloatArray]:
-    """Responses (p N, columns) to the initial state, and to the past input in the delay lines."""
+    """Responses (p N, columns) to the initial state, to past input, and to its level at rest."""
     core = model.delay_free
     n, p, m = core.nstates, core.noutputs, core.ninputs
     free = markov(core.A, np.eye(n), core.C, np.zeros((p, n)), N + 1)[:, :, 1:]
     parts = [_through_outputs(free, model)] if n else []
     held = [(j, *e) for j in range(m) for e in [*_pieces(min(model.input_delays[j], N)), (0, N)]]
-    if held:
-        steps = step_response(*matrices_of(core), N)
-        pulses = [later(steps[:, [j]], a) - later(steps[:, [j]], b) for j, a, b in held]
-        parts.append(_through_outputs(np.concatenate(pulses, axis=1), model))
+    steps = step_response(*matrices_of(core), N)
+    pulses = [later(steps[:, [j]], a) - later(steps[:, [j]], b) for j, a, b in held]
+    parts.append(_through_outputs(np.concatenate(pulses, axis=1), model))
     for i in range(p):
         for first, last in _pieces(min(model.output_delays[i], N)):
             level = np.zeros((p, N))

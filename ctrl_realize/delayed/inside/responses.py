@@ -18,7 +18,7 @@ from ..host_responses import PLAIN, HostResponses
 from ..operators import DelayOperators
 from .motion import Motion
 
-HOST_NAMES = {
+_HOST_NAMES = {
     "T": "timepts",
     "T_num": "timepts_num",
     "input": "input_indices",
@@ -42,8 +42,8 @@ class InsideResponses(Motion, HostResponses, DelayOperators):
             raise OptionError("a step response starts from rest; use sys.forced_response")
         shown = {key: settings.pop(key) for key in PLAIN & settings.keys()}
         if kind in ("step", "impulse"):
-            known = {HOST_NAMES.get(key, key): value for key, value in settings.items()}
-            if unknown := set(known) - {*HOST_NAMES.values(), "tolerance"}:
+            known = {_HOST_NAMES.get(key, key): value for key, value in settings.items()}
+            if unknown := set(known) - {*_HOST_NAMES.values(), "tolerance"}:
                 raise TypeError(f"unrecognized keyword(s): {', '.join(sorted(unknown))}")
             chosen = [known.pop(f"{side}_indices", None) for side in ("output", "input")]
             if chosen != [None, None]:

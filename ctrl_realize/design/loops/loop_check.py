@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -25,7 +24,7 @@ from ...results import ModelFit, Result
 from ..siso import interval_of_dead_time
 from .delay_robustness import over_interval
 from .delay_robustness_result import DelayRobustness
-from .factors import Factor, factor
+from .factors import factor
 from .loop import Loop, open_loop
 from .margin_result import Margins
 from .margins import distance_if_stable, loop_margins
@@ -204,7 +203,8 @@ def _corners(
 def _of_models(loop: Loop, models: PlausibleModels, integrators: int) -> tuple[Corner, ...]:
     """Ms with other models of the plant, in the place of the first factor of a loop."""
     found = []
-    for one, plant in zip(models.models, _factors(models, loop.dt), strict=True):
+    for one, system in zip(models.models, models.systems, strict=True):
+        plant = factor(system, loop.dt)
         ms = _ms(distance_if_stable(replace(loop, factors=(plant, *loop.factors[1:]))))
         if integrators:  # the slope per second, as that of the model
             moving = one.poles[np.argsort(np.abs(one.poles))[integrators:]]
@@ -214,12 +214,6 @@ def _of_models(loop: Loop, models: PlausibleModels, integrators: int) -> tuple[C
         found.append(Corner(one.dead_time, gain if np.isfinite(gain) else None, ms))
     worst = max(found, key=lambda corner: corner.ms)
     return tuple(corner for corner in found if corner is not worst)
-
-
-@lru_cache(maxsize=1)
-def _factors(models: PlausibleModels, dt: float) -> list[Factor]:
-    """Models as factors of a loop, for one controller after the other: half of a check."""
-    return [factor(system, dt) for system in models.systems]
 
 
 def _ms(modulus_margin: float) -> float:
