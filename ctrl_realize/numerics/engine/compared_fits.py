@@ -71,6 +71,7 @@ def converged(
     samples: float,
     *,
     last: bool = True,
+    floor: float = 0.0,
 ) -> dict[Structure, Candidate]:
     """Follow structures within reach of the best criterion to their minima.
 
@@ -85,6 +86,8 @@ def converged(
     last : bool, optional
         Whether the data are final. Otherwise it suffices to be near the minimum, and the best ends
         of every structure are kept.
+    floor : float, optional
+        Of the standard deviation of a residual: far below the noise it is rounding.
 
     Notes
     -----
@@ -96,7 +99,7 @@ def converged(
         value = criteria(found, variance, samples)
         if len(found) > _ALL and value[structure] > min(value.values()) + REACH:
             continue
-        found[structure] = _near_minimum(problem, structure, scales, found)
+        found[structure] = _near_minimum(problem, structure, scales, found, floor)
     if not last:
         return found
     return found | {
@@ -150,8 +153,9 @@ def _in_order(problem: Problem, candidate: Candidate, bounds: Bounds) -> Candida
 
 
 def _near_minimum(
-    problem: Problem, structure: Structure, scales: Scales, found: dict[Structure, Candidate]
-) -> Candidate:
+    problem: Problem, structure: Structure, scales: Scales, found: dict[Structure, Candidate],
+    floor: float,
+) -> Candidate:  # fmt: skip
     old = found[structure]
     bounds = parameter_bounds(structure, scales)
     starts = [old.parameters] if old.ends is None else [old.parameters, *old.ends]
@@ -169,7 +173,7 @@ def _near_minimum(
             near = cost[promising] <= old.cost * (1 + _PROMISING / problem.data.size)
             more = more[promising[near]]
         starts = [old.parameters, *more]
-    ends, costs = descend(problem, structure, np.array(starts), bounds, scales.dt)
+    ends, costs = descend(problem, structure, np.array(starts), bounds, scales.dt, floor=floor)
     order = np.argsort(costs)
     close = order[costs[order] <= costs[order[0]] * (1 + CLOSE / problem.data.size)]
     others = apart(ends[close])[:_OTHERS]

@@ -50,6 +50,7 @@ def descend(
     *,
     dead_time_fixed: bool = False,
     level: float | None = None,
+    floor: float = 0.0,
 ) -> tuple[FloatArray, FloatArray]:
     """Follow every start until it is near its minimum; `newton.settle` does the rest.
 
@@ -68,6 +69,8 @@ def descend(
         Keep the first column as it is (profile likelihood).
     level : float, optional
         A cost; it is only tested whether a minimum lies below it.
+    floor : float, optional
+        Standard deviation of a residual below which its decrease tells nothing.
 
     Returns
     -------
@@ -132,7 +135,7 @@ def descend(
         growth[down] *= 2.0
         crossed[active] = turn
         pinned[active[kink]], at_kink[active[kink]] = True, cost[active[kink]]
-        enough = _NEAR / problem.data.size * cost[active]
+        enough = _NEAR * np.maximum(cost[active] / problem.data.size, floor**2)
         if level is not None:
             enough = np.maximum(enough, _NO_WAY * np.abs(cost[active] - level))
         elif not dead_time_fixed:

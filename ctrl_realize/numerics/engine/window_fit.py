@@ -244,10 +244,10 @@ def fit_window(
     rivals: dict[Structure, float] = {}
     for iteration in range(passes + 1):
         rest = _residual(window, problem, candidates, (sigma, quantum), huber)
-        setting = rest.variance, rest.independent
+        of_residual = {"variance": rest.variance, "samples": rest.independent, "floor": rest.floor}
         del rest  # to save the memory of a long record
         candidates = converged(
-            problem, candidates, scales, *setting, last=iteration > 0 or not huber
+            problem, candidates, scales, **of_residual, last=iteration > 0 or not huber
         )
         rest = _residual(window, problem, candidates, (sigma, quantum), huber)
         if iteration == 0 and rest.best.ends is not None:
@@ -279,14 +279,16 @@ class _Residual:
     """Residual of the best of some candidates on a window: the noise, if the fit is good.
 
     `values` (N,) are the data that Huber's loss asks for; `level` is the standard deviation of the
-    residual, `correlation` its correlation time, `independent` the number of samples that count;
-    `rivals` tells how much worse other structures are, and for the best by how much it is better.
+    residual, at least `floor`, `correlation` its correlation time, `independent` the number of
+    samples that count; `rivals` tells how much worse other structures are, and for the best by how
+    much it is better.
     """
 
     best: Candidate
     values: FloatArray
     has_outliers: bool
     level: float
+    floor: float
     correlation: float
     independent: float
     rivals: dict[Structure, float]
@@ -333,7 +335,7 @@ def _residual(
     kept -= error
     kept += window.output
     return _Residual(
-        best, kept, outliers, level, correlation, after.size / correlation, rivals, variance
+        best, kept, outliers, level, floor, correlation, after.size / correlation, rivals, variance
     )
 
 
