@@ -19,6 +19,7 @@ from ...delayed import DelayedStateSpace
 from ...errors import DataError, OptionError
 from ...numerics.arrays import FloatArray
 from ...numerics.blas_threads import single_threaded
+from ...numerics.engine.problem import Structure
 from ...numerics.output_error.any_input.data import BEYOND, MOST_SAMPLES
 from ...numerics.output_error.other_structures import Requested
 from ...numerics.output_error.result import OutputErrorEstimate
@@ -383,9 +384,13 @@ def _fit_linear(
         flags += filled
     several = kept
     if len(several) == 1:
-        fit_one = partial(_fit_one, requested=requested, any_input=any_input)
-        if requested.huber:
-            fit_one = partial(fit_without_spikes, fit=fit_one)
+
+        def fit_one(record: Record, *quick: Structure) -> OutputErrorFit:
+            few = requested.structures or quick
+            alone = replace(requested, structures=few, compared=False, whiten=False)
+            fit = partial(_fit_one, requested=alone if quick else requested, any_input=any_input)
+            return fit_without_spikes(record, fit) if requested.huber else fit(record)
+
         fit_whole = partial(fit_within_limits, fit=fit_one, may_clip=may_clip)
         if may_clip and not requested.loop:
             fit_whole = partial(fit_means_of_holds, fit=fit_whole)
@@ -400,7 +405,12 @@ def _fit_linear(
     way = _fit_mean if stepped else any_input
     if own_gains:
         start = relative_gains(aligned_steps(several)) if stepped else None
-        result = fit_own_gains(several, partial(way, several, requested), start)
+        quick = replace(requested, compared=False, whiten=False)
+
+        def fit(ratios: FloatArray, whole: bool) -> OutputErrorFit:
+            return way(several, requested if whole else quick, ratios)
+
+        result = fit_own_gains(several, fit, start)
     else:
         result = way(several, requested)
     return replace(result, flags=result.flags + flags + at_limits + same_record_flags(several))

@@ -45,7 +45,7 @@ _COMMON = ("gains_differ", "no_common_gain")
 
 def fit_own_gains(
     records: tuple[Record, ...],
-    fit: Callable[[FloatArray], OutputErrorFit],
+    fit: Callable[[FloatArray, bool], OutputErrorFit],
     start: FloatArray | None,
 ) -> OutputErrorFit:
     """Fit model and gain ratios in turn.
@@ -54,13 +54,14 @@ def fit_own_gains(
     ----------
     records : tuple of Record
     fit : callable
-        Fit of all records for given ratios (R,).
+        Fit of all records for given ratios (R,), in whole or for the next ratios alone: noise with
+        wrong ones is coloured, and seems to hide loads.
     start : ndarray, shape (R,), or None
         Ratios that hold for any dynamics, so that no turns are needed; None: there are none.
     """
-    ratios = np.ones(len(records)) if start is None else start
-    for _ in range(_TURNS):
-        result = fit(ratios)
+    ratios, whole = np.ones(len(records)) if start is None else start, start is not None
+    for turn in range(_TURNS):
+        result = fit(ratios, whole or turn == _TURNS - 1)
         assert result.repeatability is not None
         found: Repeatability = result.repeatability
         used = found.kept
@@ -72,7 +73,9 @@ def fit_own_gains(
         if start is None:
             turned = np.where(answers, moved, turned)
         if np.all(np.abs(turned / ratios - 1) <= np.maximum(_SETTLED * errors, _ROUNDING)):
-            break
+            if whole:
+                break
+            whole = True
         ratios = turned
     gains = _gains(records, result, found, moved)
     repeats = replace(

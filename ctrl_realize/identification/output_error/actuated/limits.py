@@ -37,7 +37,7 @@ _EXPLAINED = 2.0
 """Residual of means over their noise, up to which a model explains them: 0.7 to 1.4 for 26 held
 outputs, simulated and measured."""
 
-Fit = Callable[[Record], OutputErrorFit]
+Fit = Callable[..., OutputErrorFit]
 
 
 def without_cut_noise(record: Record) -> tuple[Record, tuple[Flag, ...]]:
@@ -192,7 +192,8 @@ def _at_limit(limit: float, samples: BoolArray, *, left_out: bool) -> Flag:
 def fit_within_limits(record: Record, fit: Fit, *, may_clip: bool = True) -> OutputErrorFit:
     """Fit a record without the samples at its limits, if there are any.
 
-    With `may_clip`, also those of a limit before the noise are looked for.
+    With `may_clip`, also those of a limit before the noise are looked for. A `fit` of a record and
+    a structure is a quick one, of that alone.
     """
     kept, flags = without_cut_noise(record)
     try:
@@ -252,22 +253,24 @@ def _without_plateaus(record: Record, linear: OutputErrorFit, fit: Fit) -> Outpu
     told = evidence >= STRONG
     if not (told or doubted) or np.count_nonzero(record.seen & ~held) < FEWEST_SAMPLES:
         return linear
-    rows = _rows(record, linear)
-    try:
-        found = fit(_without(record, held))
-        beyond = _simulated(found)
-        further = passed(output, beyond, held) & ~held
-        if np.count_nonzero(further) > _MORE * np.count_nonzero(held):
-            held |= further
-            found = fit(_without(record, held))
-            beyond = _simulated(found)
-    except (DataError, UnsuitableSystemError):
-        return linear
-    load = linear.estimate.load
+    rows, load = _rows(record, linear), linear.estimate.load
     loaded = load is not None and not load.early
-    if not (told and clips(output[rows], linear.fitted, beyond[rows], held[rows], loaded=loaded)):
-        estimate = replace(linear.estimate, beyond=found.estimate) if doubted else linear.estimate
-        return replace(linear, estimate=estimate)
+    # Whether a limit explains more is asked first where nothing else is told: time.
+    for given in [()] if doubted else [(linear.estimate.structure,), ()]:
+        try:
+            found = fit(_without(record, held), *given)
+            beyond = _simulated(found)
+            further = passed(output, beyond, held) & ~held
+            if np.count_nonzero(further) > _MORE * np.count_nonzero(held):
+                held |= further
+                found = fit(_without(record, held), *given)
+                beyond = _simulated(found)
+        except (DataError, UnsuitableSystemError):
+            return linear
+        at_rows = output[rows], linear.fitted, beyond[rows], held[rows]
+        if not (told and clips(*at_rows, loaded=loaded)):
+            beside = found.estimate if doubted else None
+            return replace(linear, estimate=replace(linear.estimate, beyond=beside))
     count, levels = np.count_nonzero(held), _levels(output, held)
     flag = flagged("output_at_limit.plateau", count=count, limits=levels)
     return replace(found, flags=(*found.flags, flag))
