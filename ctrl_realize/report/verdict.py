@@ -147,6 +147,9 @@ def headline_of(system: DelayedStateSpace) -> str:
     with times_in("s"):  # as sample times are set
         step = in_time(system.dt, 6)
     sentence = f"{kind} {said} ({samples} samples of {step}){within}."
+    if np.ndim(system.dead_time):  # one of a fit of all channels does not exist
+        delays = "; ".join(", ".join(f"{one:g}" for one in row) for row in np.array(system.delay))
+        sentence = f"Delays of {delays} samples of {step}, a row of inputs for each output."
     if formula_of(system) and _sign_is_told(system):
         return sentence
     gain = gain_of(system)

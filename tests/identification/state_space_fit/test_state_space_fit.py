@@ -89,6 +89,15 @@ def test_units_of_the_outputs_change_nothing_else(model, units):
     assert_allclose(same, model.markov(40), rtol=0, atol=1e-4)  # where the fits end
 
 
+def test_the_headline_of_a_report_has_the_delay_of_every_pair(model):
+    """It had the largest, 12 samples, as the dead time of all of them."""
+    headline = cr.report.verdict_of(model).headline
+    delays = [inputs + outputs for outputs in (0, 7) for inputs in (2, 5)]  # of `PLANT`
+    said = re.match(r"Delays of ([\d,; ]+) samples of 100 ms, ", headline).group(1)
+    assert [int(one) for one in re.findall(r"\d+", said)] == delays
+    assert "Dead time" not in headline
+
+
 def test_several_records_and_missing_outputs_are_used():
     first, second = record(2, 300), record(3, 300)
     y = second.output + 40.0
