@@ -413,3 +413,15 @@ def test_margins_of_lags_in_parallel_are_those_of_the_lags_in_series(dt):
         found[-1].extend(cr.design.unwrapped_phase(plant, omega))
     # residues of 1e9, of lags 1 % apart, leave seven digits of the gain, 0.1 at the last frequency
     np.testing.assert_allclose(found[0], found[1], rtol=1e-9 if dt else 1e-5)
+
+
+def test_sample_times_that_differ_by_rounding_are_one():
+    """They were refused as `dt = 0.1 s and dt = 0.1 s`; sums and products of systems take them."""
+    plant, late = (
+        cr.delayed_ss(ct.tf([1.0], [1.0, 1.0]), dead_time=0.5, dt=dt) for dt in (0.1, 0.1 + 1e-13)
+    )
+    pi = cr.design.PIDController(0.8, 1.0, dt=0.1)
+    # a sample time that is longer by 1e-12 of itself moves no margin by more than its rounding
+    assert cr.design.margins(late, pi).ms == pytest.approx(
+        cr.design.margins(plant, pi).ms, rel=1e-9
+    )

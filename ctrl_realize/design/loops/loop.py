@@ -172,7 +172,7 @@ def open_loop(plant: Any, controller: Any = None, dead_time: float = 0.0) -> Loo
     """
     systems = [plant] if controller is None else [plant, controller]
     bases = {base for base in map(_time_base, systems) if base is not None}
-    if len(bases) > 1:
+    if bases and max(bases) - min(bases) > 1e-6 * max(bases):  # as in sums and products of systems
         words = " and ".join(f"dt = {dt:g} s" if dt else "continuous" for dt in sorted(bases))
         raise UnsuitableSystemError(
             f"plant and controller have different time bases: {words}; "
