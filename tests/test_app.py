@@ -432,6 +432,8 @@ def test_what_is_written_is_what_its_name_says(fitted, what, text):
         ({"do": "select"}, "index=None; expected a whole number in 0...0"),
         ({"do": "remove", "index": -1}, "index=-1; expected a whole number in 0...0"),
         ({"do": "open", "name": "x.csv", "content": "%"}, "x.csv"),
+        ({"do": "open", "name": "x.csv", "content": 5}, "base64"),
+        ({"do": "open", "name": "x.csv", "content": None}, "x.csv"),
         ({"do": "write", "what": "everything"}, "everything"),
         ({"do": "dance"}, "choose one of .*'undo'"), ([1], "do='None'"), (None, "do='None'"),
         (put("loop", rule="best"), "rule='best'"), (put("loop", limits=[3, 1]), r"limits=\(3, 1\)"),

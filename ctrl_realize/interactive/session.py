@@ -201,7 +201,7 @@ class Session:
 
     def _open(self, command: Mapping[str, Any]) -> None:
         name = str(command.get("name") or "file")
-        content = base64.b64decode(command.get("content", ""))
+        content = base64.b64decode(str(command.get("content") or ""))
         if saving.is_work(content):
             state, files = saving.opened(content.decode("utf-8"))
             self.files |= files
