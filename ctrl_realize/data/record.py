@@ -184,7 +184,7 @@ class Record(RecordConversions):
             f"<Record{name}: {on_axis}, "
             f"{_count(self.ninputs, 'input')}, {_count(self.noutputs, 'output')}"
             + (", set point" if self.reference is not None else "")
-            + (f", {gaps} missing values>" if gaps else ">")
+            + (f", {_count(gaps, 'missing value')}>" if gaps else ">")
         )
 
     def report(self) -> str:

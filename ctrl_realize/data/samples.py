@@ -85,12 +85,14 @@ class Samples:
                 )
         fault = axis_fault(self.time)
         lost = [np.isnan(np.atleast_2d(one)) for one in (self.input, self.output)]
+        back = np.any(np.diff(self.time) < 0)
         if fault is not None and (
             fault.kind not in ("gap", "not_uniform", "repeated")
             or np.mean(np.diff(self.time) == 0) > COARSE
-            or np.any(np.diff(self.time) < 0)
+            or back
         ):
-            return self, "refuse"
+            # The fault of the clock is told before missing values, which another call would keep.
+            return self, "keep" if back and any(one.any() for one in lost) else "refuse"
         if fault is None and not any(one.any() for one in lost):
             return self, "refuse" if self.input_time is None else "keep"
         said = "" if fault is None else _in_words(self.time)
@@ -110,7 +112,8 @@ class Samples:
                 rows = np.flatnonzero(no_input | lost[1].any(axis=0))
                 if rows.size:
                     first = self.place(int(rows[0]))
-                    said = f"{rows.size} samples have missing values, the first in {first}" + (
+                    have = "sample has" if rows.size == 1 else "samples have"
+                    said = f"{rows.size} {have} missing values, the first in {first}" + (
                         f", and {said}" if said else ""
                     )
                 said += samples._late()

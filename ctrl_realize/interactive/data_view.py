@@ -38,7 +38,8 @@ def _facts(record: Record) -> str:
     if record.irregular:
         usual = in_time(record.sample_time, 4)
         return f"{np.count_nonzero(record.seen)} samples about {usual} apart, {length} long"
-    gaps = f", {record.n_missing} missing values" if record.n_missing else ""
+    gaps = f", {record.n_missing} missing value" if record.n_missing else ""
+    gaps += "s" if record.n_missing > 1 else ""
     return f"{record.n_samples} samples of {in_time(record.dt, 4)}, {length} long{gaps}"
 
 

@@ -11,7 +11,7 @@ from numpy.testing import assert_allclose
 import ctrl_realize as cr
 from ctrl_realize import report
 from ctrl_realize.cli import main
-from ctrl_realize.errors import DataError, DataWarning, OptionError
+from ctrl_realize.errors import DataError, DataWarning, OptionError, TimeAxisError
 from ctrl_realize.numerics.signals.counters import counter_period
 from tests.io.plant_files import response, steps
 
@@ -390,3 +390,21 @@ def test_days_of_a_spreadsheet_may_be_called_a_date(tmp_path, name):
     path.write_text("\n".join([f"{name},OP,PV", *[f"20251107,{k > 10:d},{k}" for k in range(60)]]))
     with pytest.raises(OptionError, match="cannot tell which column is time"):
         cr.read_record(path)
+
+
+def test_a_clock_that_is_set_behind_a_gap_is_told_before_missing_values(tmp_path):
+    """It was `missing="keep"` that was proposed, which the clock refuses as well."""
+    path = tmp_path / "a.csv"
+    utc = pd.Timestamp("2025-10-25 22:10", tz="UTC")
+    t = logged(path, "Europe/Berlin", utc, "%d.%m.%Y %H:%M:%S", 60.0)
+    rows = path.read_text().splitlines()
+    rows[10] = rows[10].rsplit(";", 1)[0] + ";Bad"
+    path.write_text("\n".join(rows[:30] + rows[36:]) + "\n")  # six are missing
+    with pytest.raises(TimeAxisError, match="time_zone= is its zone"):
+        cr.read_record(path)
+    with pytest.warns(DataWarning, match="1 sample has missing values"):
+        record = cr.read_record(path, time_zone="Europe/Berlin")
+    assert record.time[-1] == t[-1]
+    assert record.n_missing == 7
+    assert "7 missing values>" in repr(record)
+    assert "1 missing value>" in repr(record[:700.0])
