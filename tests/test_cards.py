@@ -1,5 +1,6 @@
 """Cards say in words what is no number, whatever the case."""
 
+import copy
 import pickle
 import re
 
@@ -109,3 +110,9 @@ def test_no_card_shows_nan_or_inf(case):
     result = CASES[case]()
     words = re.sub(r"<[^>]*>", " ", result._repr_html_())
     assert not re.search(r"\b(nan|inf)\b", words, re.IGNORECASE), words
+
+
+def test_a_copy_of_what_a_fit_estimated_can_be_shown():
+    """Its line asked the copy for a function that it does not have: AttributeError."""
+    estimate = cr.identify(STEP, structures="FOPDT").fit.estimate
+    assert type(pickle.loads(pickle.dumps(estimate))).__name__ in repr(copy.deepcopy(estimate))

@@ -61,7 +61,7 @@ class PlausibleModel(NamedTuple):
     numerator: FloatArray
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class PlausibleDraw:
     """Structures that are not ruled out, of which models are drawn once somebody asks.
 

@@ -114,7 +114,7 @@ class StructureFit:
         return self.structure.relative_degree
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class OtherStructures:
     """What structures say that were not requested; their `delta_bic` is relative to the requested.
 
@@ -212,7 +212,7 @@ class DistributedLags(NamedTuple):
 _PLAIN_LAGS = DistributedLags()
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class ProcessEstimate:
     """The model as a process model.
 
