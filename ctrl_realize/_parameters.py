@@ -169,6 +169,8 @@ def with_error(value: float, error: float) -> str:
     ('0.7997 +-0.0013', '179.0 +-0.4', '3.2')
     >>> with_error(2400.0, 31.0), with_error(5.0, 0.0)
     ('2400 +-31', '5')
+    >>> with_error(2.424, 450.0)  # not 2, which its interval need not hold
+    '2.42 +-450'
     """
     if not np.isfinite(error) or error <= 0 or error < 1e-9 * abs(value):
         return f"{value:.4g}"
@@ -178,7 +180,8 @@ def with_error(value: float, error: float) -> str:
     if digits > 9 or abs(value) >= 1e6:
         return f"{value:.4g} +-{error:.1g}"
     decimals = max(digits, 0)
-    return f"{value:.{decimals}f} +-{error:.{decimals}f}"
+    unsure = error >= 10 and abs(value) < min(error, 999)  # its own digits tell it from its bound
+    return (f"{value:.3g}" if unsure else f"{value:.{decimals}f}") + f" +-{error:.{decimals}f}"
 
 
 def formula(parameters: Sequence[Parameter], integrators: int = 0, time_unit: str = "s") -> str:
