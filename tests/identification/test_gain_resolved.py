@@ -248,6 +248,17 @@ def test_structures_that_differ_in_gain_are_named_under_a_coloured_residual():
     assert "structures that the data cannot rule out have gains of" in told
 
 
+def test_gains_of_structures_that_the_interval_does_not_hold_are_said_to_be_beyond_it():
+    """Beside a gain of `at least 24.7` stood gains of -7.1 to 24.7, without a word."""
+    coloured = cr.identify(losing_its_gain(), structures=[(1, 1), (2, 1)], noise="white")
+    for fit in (cr.identify(sagging(1)).fit, coloured.fit):
+        told = next(str(flag) for flag in fit.flags if flag.code == "gain_not_resolved")
+        low, high = map(float, re.search(r"gains of (\S+) to (\S+) ", told).groups())
+        # to the three digits that are written
+        beyond = low < fit.gain_interval[0] - 1e-3 * abs(low) or high > 1.001 * fit.gain_interval[1]
+        assert ("(more than its interval holds)" in told) == beyond
+
+
 @pytest.mark.parametrize("moves", [[30.0], [30.0, 70.0, 110.0, 190.0]])
 def test_a_washout_has_no_total_delay(moves):
     # s / (20 s + 1): the gain is zero, and the delay at zero frequency a ratio with it

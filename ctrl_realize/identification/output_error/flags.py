@@ -229,11 +229,16 @@ def _unresolved_gain(fit: OutputErrorEstimate, length: float, ends: str) -> Iter
     gains = np.array([gain, *(line.gain for line in kept)])
     totals = np.array([total, *(line.total_delay for line in kept)])
     rates = np.array([np.abs(poles).min() for poles in (fit.poles, *(line.poles for line in kept))])
+    least, most = fit.gain_ends
     if rates[0] * length < INTEGRATOR and rates.max() * length < NEARLY_STRAIGHT:
         gains, totals = gains * rates, totals - 1 / rates  # those of a slope
+        least, most = -np.inf, np.inf
     if not fit.robust and (_apart(gains) or _apart(totals)):
         low, high, between = gains.min(), gains.max(), interval_in_time(totals.min(), totals.max())
-        yield flagged("gain_not_resolved", low=low, high=high, totals=between, ends=ends)
+        beyond = "" if least <= low and high <= most else " (more than its interval holds)"
+        yield flagged(
+            "gain_not_resolved", low=low, high=high, beyond=beyond, totals=between, ends=ends
+        )
 
 
 def _apart(values: FloatArray) -> bool:
