@@ -145,8 +145,10 @@ def fit_sketches(system: DelayedStateSpace, step: StepResponse | None) -> list[S
         sketches.append(sketch("step", plots.step_plot, step, system))
     if isinstance(fit, StateSpaceFit) and fit.checks:
         plot, size = plots.state_space_fit_plot, (6.2, 5.4)
+        drifts = any(flag.code == "drift" for flag in fit.flags)
+        drift = ", both without the drift of the remarks" if drifts else ""
         for i, label in enumerate(fit.records[0].output_labels):
-            words, key = {"label": label}, f"output_{i}"
+            words, key = {"label": label, "drift": drift}, f"output_{i}"
             sketches.append(sketch("output", plot, fit, output=i, size=size, words=words, key=key))
     if isinstance(fit, DelayScan):
         sketches.append(sketch("delay", plots.delay_plot, fit))

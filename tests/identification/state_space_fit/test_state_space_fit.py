@@ -98,6 +98,16 @@ def test_the_headline_of_a_report_has_the_delay_of_every_pair(model):
     assert "Dead time" not in headline
 
 
+@pytest.mark.parametrize("rate", [0.0, 0.3])
+def test_a_report_says_that_the_measured_line_has_no_drift(tmp_path, rate):
+    """The line was called measured, and was off by the drift that was taken from it."""
+    still = record()
+    moved = cr.Record(still.time, still.input, still.output + rate * still.time)
+    path = cr.report.write_identification(tmp_path / "a.html", cr.fit_state_space(moved, 3), moved)
+    told = "Measured and simulated, both without the drift of the remarks." in path.read_text()
+    assert told == (rate > 0)
+
+
 def test_several_records_and_missing_outputs_are_used():
     first, second = record(2, 300), record(3, 300)
     y = second.output + 40.0
