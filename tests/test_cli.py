@@ -154,6 +154,16 @@ def test_a_record_is_told_from_a_saved_model_by_what_it_holds(tmp_path, capsys):
     assert said[0] == said[1]
 
 
+def test_tune_says_that_a_rule_has_no_derivative_for_a_plant_with_one_lag(tmp_path, capsys):
+    """`--kind PID` printed the numbers of a PI, without a word."""
+    cr.save_model(tmp_path / "plant.json", cr.delayed_ss(ct.tf([2], [3, 1]), dead_time=1, dt=0.1))
+    for more, kind in ([], "PI"), (["--rule", "amigo"], "PID"):
+        assert main(["tune", str(tmp_path / "plant.json"), "--kind", "PID", *more]) == 0
+        said = capsys.readouterr()
+        assert f"PID controller {kind}_" in said.out
+        assert ("--kind PID gave a PI: " in said.err) == (kind == "PI")
+
+
 def test_tune_takes_any_saved_plant_and_no_loop(tmp_path, capsys):
     plant = cr.delayed_ss(ct.tf([2], [3, 1]), dead_time=1.25, dt=0.1)
     cr.save_model(tmp_path / "plant.json", plant)

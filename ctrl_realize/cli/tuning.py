@@ -45,6 +45,11 @@ class Tuning:
         say(f"\n{controller.report()}\n\n{form.report()}\n\nIt would be unstable if")
         for reason in unsafe_if(system, controller):
             say(f"  - {reason}")
+        if (kind := self.tuned.get("kind", controller.kind)) != controller.kind:
+            complain(
+                f"warning: --kind {kind} gave a {controller.kind}: the rule has a derivative for a "
+                "second lag only, and this model has none; --rule amigo has one for any model"
+            )
         for one in () if system.fit is None else system.fit.verdicts:
             if one.question == "tuning" and one.level != "good":
                 complain(f"warning: verdict on {one}")
