@@ -23,7 +23,8 @@ _SMOOTHED_POINTS = 3  # a single bad point is not a band
 
 def joint_flags(fit: JointFit, latest: float | None) -> tuple[Flag, ...]:
     """List the flags of the joint model, and that of a contradiction first."""
-    of_model = model_flags(fit.estimate, fit.data.dt, fit.data.length, latest)
+    length, gain_ends = fit.data.length, fit.gain_interval
+    of_model = model_flags(fit.estimate, fit.data.dt, length, latest, gain_ends)
     return (*_contradiction(fit), *of_model)
 
 

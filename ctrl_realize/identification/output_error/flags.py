@@ -92,13 +92,18 @@ def sampled_flags(
 
 
 def model_flags(
-    fit: OutputErrorEstimate, dt: float, length: float, latest: float | None
+    fit: OutputErrorEstimate,
+    dt: float,
+    length: float,
+    latest: float | None,
+    gain_ends: tuple[float, float] | None = None,
 ) -> Iterator[Flag]:
     """List the flags that follow from the model itself.
 
-    `length` is that of the record in s, `latest` the dead time up to which was to be sought.
+    `length` is that of the record in s, `latest` the dead time up to which was to be sought,
+    `gain_ends` the interval of the gain where it is not that of the model alone.
     """
-    extrapolated = list(_extrapolated(fit, length))
+    extrapolated = list(_extrapolated(fit, length, gain_ends or fit.gain_ends))
     form, process = fit.process.form, structure_words(fit)
     if fit.better is not None:
         yield flagged(
@@ -178,7 +183,9 @@ def _dispersed_flow(fit: OutputErrorEstimate) -> Iterator[Flag]:
     )
 
 
-def _extrapolated(fit: OutputErrorEstimate, length: float) -> Iterator[Flag]:
+def _extrapolated(
+    fit: OutputErrorEstimate, length: float, gain_ends: tuple[float, float]
+) -> Iterator[Flag]:
     """Report that a record of `length` s does not show the gain, or not all of the response."""
     seen, ends, unseen = max(length - fit.dead_time, 0.0), "", fit.poles[:0]
     if np.abs(fit.poles).min() * length < INTEGRATOR:
@@ -193,7 +200,7 @@ def _extrapolated(fit: OutputErrorEstimate, length: float) -> Iterator[Flag]:
     if ends and not unresolved:
         periods = 2 * np.pi / np.maximum(np.abs(unseen.imag), SMALLEST)
         more = float(np.max(np.minimum(_SETTLED / -unseen.real, periods))) - seen
-        said = gain_in_words(float(gain[0] * fit.numerator[0]), fit.gain_ends)
+        said = gain_in_words(float(gain[0] * fit.numerator[0]), gain_ends)
         yield flagged("not_settled", ends=ends, gain=said, more=in_time(more, 2))
 
 

@@ -295,3 +295,12 @@ def test_the_frequency_response_of_a_measured_arm_contradicts_its_steps(shared_d
     assert fit.agreement.contradicts
     hz = fit.frf_fit.frequency_hz
     assert np.mean(fit.agreement.outside[hz > 15]) > 0.3 > np.mean(fit.agreement.outside[hz < 15])
+
+
+def test_a_gain_that_both_contradict_has_one_interval_in_the_report():
+    """It was 0.327 (0.276 to 0.448), and (0.319 to 0.335) in the flag."""
+    fit = fit_joint(step()[:2.1], response(gain=1.3 * GAIN), structures=ONE_LAG).fit
+    told = next(str(flag) for flag in fit.flags if flag.code == "not_settled")
+    assert fit.agreement.contradicts
+    rows = [re.split(r" {2,}", line.strip()) for line in fit.report().splitlines()]
+    assert f"final gain {dict(row for row in rows if len(row) == 2)['gain']}. " in told
