@@ -246,8 +246,7 @@ def _free_columns(decay: Any, poles: ComplexArray) -> FloatArray:
         free[:, :, i + 1] = ((first - second) / gap[:, None]).real
     if over.any():
         early, late = over[:, n % 2 :: 2], over[:, n % 2 + 1 :: 2]
-        late |= early
-        early[:] = False
+        early[:], late[:] = early & late, early | late
         np.copyto(free, 0.0, where=over[:, None])
     return free
 

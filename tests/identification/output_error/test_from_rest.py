@@ -94,3 +94,21 @@ def test_a_motion_from_before_the_record_is_seen_though_the_input_rests():
     assert "fitted from rest" not in " ".join(fit.choices)
     assert holds(fit.gain_interval, 2)
     assert fit.dead_time == pytest.approx(9.4, abs=0.5)  # half a sample
+
+
+@pytest.mark.parametrize("unit", [1e3, -1e-9])
+def test_the_interval_of_an_integrator_at_rest_does_not_depend_on_units(unit):
+    # the free response of the integrator, of 1e-321, was fitted: 0.43 to 1.41 s became 0.57 to 1.29
+    rng = np.random.default_rng(3)
+    time = 0.1 * np.arange(300)
+
+    def response(t):
+        since = np.clip(t - 0.9, 0, None)
+        return 0.5 * (since + 0.8 * np.expm1(-since / 0.8))
+
+    y = response(time - 5.0) - response(time - 8.7) + 0.05 * rng.standard_normal(time.size)
+    pulse = ((time > 4.95) & (time < 8.65)).astype(float)
+    here, there = (cr.identify(cr.Record(time, u, y)).fit for u in (pulse, unit * pulse))
+    assert "fitted from rest" in " ".join(here.choices)
+    # ends are rounded outwards, to a hundredth of the width
+    assert there.interval == pytest.approx(here.interval, abs=0.02 * np.ptp(here.interval))
