@@ -23,7 +23,7 @@ from ..engine.eliminate import eliminate, evaluate
 from ..engine.modal import respond
 from ..engine.plausible_models import PlausibleDraw, PlausibleModel
 from ..engine.poles import lag_sum
-from ..engine.problem import Structure
+from ..engine.problem import Problem, Structure
 from ..engine.profile import Points, profile_limits
 from ..engine.static_gain import StaticGain, averaged_ends, gain_ends
 from ..engine.structures import Candidate, Scales, needless_parameters
@@ -397,13 +397,27 @@ def followed_by(fits: WindowFit, chosen: Candidate, numerator: FloatArray) -> Fo
     window, problem = fits.window, fits.problem
     closest = min(fits.candidates.values(), key=lambda candidate: candidate.cost)
     alone = respond(window.drive, problem.known, numerator, chosen.theta)
-    alone += np.mean(window.output - alone)
+    alone += levels(problem, window.output - alone)
     # One after the other: a long record takes much memory.
-    simulated = float(fit_percent(window.output, alone))
+    simulated = followed_percent(problem, window.output, alone)
     del alone
-    complete = float(fit_percent(window.output, window.predict(problem, chosen)))
-    most = float(fit_percent(window.output, window.predict(problem, closest)))
+    complete = followed_percent(problem, window.output, window.predict(problem, chosen))
+    most = followed_percent(problem, window.output, window.predict(problem, closest))
     return Followed(complete, simulated, closest.structure.plain, most)
+
+
+def levels(problem: Problem, values: FloatArray) -> FloatArray:
+    """Mean of each record of a problem, at all of its values (N,)."""
+    rows = [] if problem.segments is None else problem.segments.rows
+    if len(rows) < 2:
+        return np.full(values.size, values.mean())
+    return np.concatenate([np.full(values[part].size, values[part].mean()) for part in rows])
+
+
+def followed_percent(problem: Problem, output: FloatArray, model: FloatArray) -> float:
+    """`fit_percent` of several records together: the levels of each are no part of a response."""
+    level = levels(problem, output)
+    return float(fit_percent(output - level, model - level))
 
 
 def assembled(

@@ -391,6 +391,16 @@ def test_a_record_that_begins_at_rest_is_simulated_from_its_first_input():
         assert "simulated from rest" not in fit.report()
 
 
+def test_the_levels_of_several_records_are_no_part_of_what_is_followed():
+    # a hundred responses apart, 94 % were 99.99 %
+    first, second = (operation("prbs", seed, 300, [4.0, 2.0, 2.0], sigma=0.1)[0] for seed in (1, 2))
+    moved = cr.Record(second.time, second.input, second.output + 1000.0)
+    here, there = (cr.identify([first, one], structures="SOPDT").fit for one in (second, moved))
+    # a level of 1000 takes three of sixteen digits, and a search ends where it has converged
+    assert there.fit_percent == pytest.approx(here.fit_percent, abs=1e-5)
+    assert there.simulated_percent == pytest.approx(here.simulated_percent, abs=1e-5)
+
+
 def test_noise_as_input_is_simulated_from_its_mean():
     record, _ = operation("noise", 4, 600, [4.0, 2.0, 2.0])
     fit = cr.identify(record).fit

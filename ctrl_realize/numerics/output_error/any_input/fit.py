@@ -36,14 +36,13 @@ from ...engine.structures import Candidate, search
 from ...engine.window import window_of_rows
 from ...engine.window_fit import WindowFit, extended, with_known_noise
 from ...rules import Rule
-from ...signals.correlation import fit_percent
 from ...signals.noise import correlation_time, winsorised_sigma
 from ...validation.own_response import OwnResponse, matched, response_slopes
 from ..interval import likelihood_fit
 from ..margins import close_to
 from ..other_structures import Compared, Requested, other_structures
 from ..process_models import fit_requested
-from ..result import OutputErrorEstimate, followed_by
+from ..result import OutputErrorEstimate, followed_by, followed_percent, levels
 from ..selection import chains_of
 from .condensed import MOST_LAGS, Condensed, condensed
 from .data import BEYOND, MOST_SAMPLES, Load, SampledData, cut
@@ -234,7 +233,7 @@ def _of_measured(
     fitted = modelled(part.data, parameters, fit.numerator)
     measured = replace(part.fit, window=window, problem=window.problem)
     followed = followed_by(measured, Candidate(fit.structure, parameters, 0.0), fit.numerator)
-    complete = float(fit_percent(window.output[None], fitted[None])[0])
+    complete = followed_percent(window.problem, window.output, fitted)
     left = winsorised_sigma(window.output - fitted, 0.0)
     return replace(
         fit,
@@ -253,9 +252,8 @@ def _at_rest(data: SampledData, fit: OutputErrorEstimate) -> OutputErrorEstimate
     problem = replace(data.without_loads, inputs=rest).problem
     parameters = np.append(fit.dead_time, parameters_from_poles(fit.poles))
     left = problem.data - respond(problem.drive, data.known, fit.numerator, parameters)
-    for part in np.split(left, data.edges[1:-1]):
-        part -= part.mean()
-    simulated = max(fit.followed.simulated, float(fit_percent(problem.data, problem.data - left)))
+    alone = problem.data - left + levels(problem, left)
+    simulated = max(fit.followed.simulated, followed_percent(problem, problem.data, alone))
     return replace(fit, followed=fit.followed._replace(simulated=simulated))
 
 
