@@ -41,8 +41,10 @@ def split_delays(delays: IntArray, known: NDArray[np.bool_]) -> list[tuple[IntAr
     p, m = delays.shape
     rows, columns = np.nonzero(known)
     limits = np.hstack([np.eye(p)[rows], np.eye(m)[columns]])
-    # Number of entries that each delay serves, with a small penalty on the samples it takes.
-    gain = np.concatenate([known.sum(axis=1), known.sum(axis=0)]) - 0.5 / (p + m)
+    # Number of entries that each delay serves, with a small penalty on the samples it takes: of
+    # equal splits the order of the channels would choose, so those of outputs cost more.
+    cost = np.repeat([0.6, 0.5], [p, m]) / (p + m)
+    gain = np.concatenate([known.sum(axis=1), known.sum(axis=0)]) - cost
     top = float(delays[known].max(initial=0))
     found = linprog(-gain, A_ub=limits, b_ub=delays[known], bounds=(0.0, top), method="highs")
     shares = np.rint(np.asarray(found.x)).astype(np.int64)
