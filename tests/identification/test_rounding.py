@@ -4,6 +4,7 @@ One unit in the last place of every sample is what another processor, or another
 does to the same record.
 """
 
+import control as ct
 import numpy as np
 import pytest
 
@@ -65,6 +66,22 @@ def two_modes_that_do_not_begin_at_rest(seed):
     u = np.repeat(rng.choice([-1.0, 1.0], 120), 5)
     y = np.ravel(plant.simulate(u)) + 0.02 * rng.standard_normal(u.size)
     return cr.Record(0.01 * np.arange(400), u[200:], y[200:])
+
+
+def test_the_interval_of_the_total_delay_has_the_unit_of_time():
+    # beside a zero, steps for derivatives were a part of the largest coefficient, whatever its
+    # unit: the interval was 1.4 times as wide
+    rng = np.random.default_rng(1)
+    time = 0.1 * np.arange(400)
+    u = np.select([time < 6.55, time < 19.95, time < 29.95], [0.0, 1.0, -0.5], 0.4)
+    plant = cr.delayed_ss(-3 * ct.tf([1], [1.5, 1]) * ct.tf([1], [0.6, 1]), dead_time=1.25, dt=0.1)
+    y = plant.simulate(u) + 0.05 * rng.standard_normal(400)
+    here, there = (cr.identify(cr.Record(unit * time, u, y)).fit for unit in (1.0, 1e9))
+    low, high = here.total_delay_interval
+    # of ends that are found to a thousandth of the width
+    assert there.total_delay_interval == pytest.approx(
+        (1e9 * low, 1e9 * high), abs=1e6 * (high - low)
+    )
 
 
 def test_states_are_chosen_alike():

@@ -347,13 +347,16 @@ def _clear(candidate: Candidate) -> FloatArray:
 
 def parameter_steps(candidate: Candidate, numerator: FloatArray, length: float) -> FloatArray:
     """Steps of the parameters for derivatives by differences, on the diagonal of a matrix."""
-    # A response of nothing has a numerator of zeros, from which any step is as good.
-    largest = float(np.abs(numerator).max()) or 1.0
+    # Coefficients have the units of powers of a time, here the longest lag. A response of nothing
+    # has a numerator of zeros, from which any step is as good.
+    slowest = max(float(np.abs(candidate.poles).min(initial=np.inf)), 1 / length)
+    times = slowest ** -np.arange(float(numerator.size))
+    largest = float(np.abs(numerator / times).max()) or 1.0
     steps = np.concatenate(
         [
             [_STEP * min(1 / float(np.abs(candidate.poles).max(initial=1 / length)), length)],
             np.full(candidate.theta.size - 1, _STEP),
-            _STEP * np.maximum(np.abs(numerator), _STEP * largest),
+            _STEP * np.maximum(np.abs(numerator), _STEP * largest * times),
         ]
     )
     return np.diag(steps)
