@@ -113,8 +113,14 @@ class WindowFit:
 
         A structure with a pole slower than the record, or an integrator, whose gain is not
         significant is replaced by the best one without that is not ruled out: a slow drift is not a
-        response.
+        response. The initial values of a pair that turns are parameters: of little damping, it
+        follows a sine of any frequency in the noise.
         """
+        more = (self.penalty - 1) * (self.problem.local_count(1) - self.problem.local_count(0))
+        criterion = {
+            s: value + more * np.count_nonzero(self.candidates[s].poles.imag)
+            for s, value in criterion.items()
+        }
         first = choose(criterion)
         limit = criterion[first] + VERY_STRONG
         left = {s: value for s, value in criterion.items() if value <= limit}
