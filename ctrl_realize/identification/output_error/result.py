@@ -309,9 +309,10 @@ class OutputErrorFit(FractionalDelayFit):
         """``100 (1 - |y - fitted| / |y - mean y|)``: 100 is perfect, 0 a mean.
 
         A drift, hum, load or free response that was estimated together with the model is included.
-        Of several records without a step, y is in units of the noise of each, about its own mean.
+        Of several records that are not averaged, y is in units of the noise of each, about its own
+        mean.
         """
-        if self.data.span is not None:
+        if self.data.span is not None or self.actuator is not None:
             return self.estimate.followed.complete
         return float(fit_percent(self.measured, self.fitted))
 

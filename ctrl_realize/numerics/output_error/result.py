@@ -10,20 +10,20 @@ References
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from typing import Literal, NamedTuple, TypeAlias
 
 import numpy as np
 
-from ..arrays import ComplexArray, FloatArray
+from ..arrays import ComplexArray, FloatArray, IntArray
 from ..blas_threads import one_blas_thread
 from ..engine.eliminate import eliminate, evaluate
 from ..engine.modal import respond
 from ..engine.plausible_models import PlausibleDraw, PlausibleModel
 from ..engine.poles import lag_sum
-from ..engine.problem import Problem, Structure
+from ..engine.problem import Structure
 from ..engine.profile import Points, profile_limits
 from ..engine.static_gain import StaticGain, averaged_ends, gain_ends
 from ..engine.structures import Candidate, Scales, needless_parameters
@@ -396,27 +396,29 @@ def followed_by(fits: WindowFit, chosen: Candidate, numerator: FloatArray) -> Fo
     """Compare a model alone, and the structure with the smallest residual, with the output."""
     window, problem = fits.window, fits.problem
     closest = min(fits.candidates.values(), key=lambda candidate: candidate.cost)
+    parts = problem.segments
+    edges: Sequence[int] | IntArray = [] if parts is None else parts.edges[1:-1]
     alone = respond(window.drive, problem.known, numerator, chosen.theta)
-    alone += levels(problem, window.output - alone)
+    alone += levels(edges, window.output - alone)
     # One after the other: a long record takes much memory.
-    simulated = followed_percent(problem, window.output, alone)
+    simulated = followed_percent(edges, window.output, alone)
     del alone
-    complete = followed_percent(problem, window.output, window.predict(problem, chosen))
-    most = followed_percent(problem, window.output, window.predict(problem, closest))
+    complete = followed_percent(edges, window.output, window.predict(problem, chosen))
+    most = followed_percent(edges, window.output, window.predict(problem, closest))
     return Followed(complete, simulated, closest.structure.plain, most)
 
 
-def levels(problem: Problem, values: FloatArray) -> FloatArray:
-    """Mean of each record of a problem, at all of its values (N,)."""
-    rows = [] if problem.segments is None else problem.segments.rows
-    if len(rows) < 2:
-        return np.full(values.size, values.mean())
-    return np.concatenate([np.full(values[part].size, values[part].mean()) for part in rows])
+def levels(edges: Sequence[int] | IntArray, values: FloatArray) -> FloatArray:
+    """Mean of each record at all of its values (N,); all but the first begin at `edges`."""
+    parts = np.split(values, edges)
+    return np.repeat([part.mean() for part in parts], [part.size for part in parts])
 
 
-def followed_percent(problem: Problem, output: FloatArray, model: FloatArray) -> float:
+def followed_percent(
+    edges: Sequence[int] | IntArray, output: FloatArray, model: FloatArray
+) -> float:
     """`fit_percent` of several records together: the levels of each are no part of a response."""
-    level = levels(problem, output)
+    level = levels(edges, output)
     return float(fit_percent(output - level, model - level))
 
 

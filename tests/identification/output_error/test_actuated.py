@@ -61,6 +61,21 @@ def test_a_single_large_step_tells_a_slew_rate_and_the_dead_time_behind_it():
     assert follows["actuator"] > 97 > follows["linear"]
 
 
+def test_the_levels_of_several_records_are_no_part_of_what_is_followed():
+    first, second = (
+        through(SlewRateLimit(12.0), staircase(size, hold=60), seed, noise=0.1)
+        for size, seed in ((40.0, 1), (-25.0, 2))
+    )
+    moved = cr.Record(second.time, second.input, second.output + 1000.0)
+    here, there = (
+        cr.fit_output_error([first, one], actuator="slew_rate", structures=[(2, 2)]).fit
+        for one in (second, moved)
+    )
+    assert here.actuator is not None
+    # a level of 1000 takes three of sixteen digits, and a search ends where it has converged
+    assert there.fit_percent == pytest.approx(here.fit_percent, abs=1e-5)
+
+
 def test_at_every_dead_time_other_lags_are_the_best_and_an_interval_follows_them_all_the_way():
     # noise of 2 % hides the pair of R3: from one end of the interval to the other it must change
     # by more than a few steps of a search

@@ -28,10 +28,10 @@ from ....numerics.output_error.result import (
     ProcessEstimate,
     Residual,
     StructureFit,
+    followed_percent,
 )
 from ....numerics.output_error.step_data import bare_data, own_regressors
 from ....numerics.output_error.step_fit import ADEQUATE
-from ....numerics.signals.correlation import fit_percent
 from ....numerics.signals.noise import mad_sigma
 from ...step.steps import found_edges
 from ..flags import missed, model_flags
@@ -197,7 +197,8 @@ def _estimate(result: OutputErrorFit, scales: Scales, found: ActuatedFit) -> Out
     low, high = found.ends[0]
     dead_time = best.dead_time
     low, high = min(low, dead_time), max(high, dead_time)
-    complete = float(fit_percent(measured, fitted))
+    edges = np.cumsum([part.rows.size for part in found.records.parts])[:-1]
+    complete = followed_percent(edges, measured, fitted)
     if np.isfinite(result.onset) and len(result.records) == 1:
         free = max(measured.size - family.free - 2, 1)
         normalized_rms = float(np.linalg.norm(found.residual) / np.sqrt(free)) / result.data.sigma

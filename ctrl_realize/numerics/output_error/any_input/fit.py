@@ -233,7 +233,7 @@ def _of_measured(
     fitted = modelled(part.data, parameters, fit.numerator)
     measured = replace(part.fit, window=window, problem=window.problem)
     followed = followed_by(measured, Candidate(fit.structure, parameters, 0.0), fit.numerator)
-    complete = followed_percent(window.problem, window.output, fitted)
+    complete = followed_percent(part.data.edges[1:-1], window.output, fitted)
     left = winsorised_sigma(window.output - fitted, 0.0)
     return replace(
         fit,
@@ -252,8 +252,9 @@ def _at_rest(data: SampledData, fit: OutputErrorEstimate) -> OutputErrorEstimate
     problem = replace(data.without_loads, inputs=rest).problem
     parameters = np.append(fit.dead_time, parameters_from_poles(fit.poles))
     left = problem.data - respond(problem.drive, data.known, fit.numerator, parameters)
-    alone = problem.data - left + levels(problem, left)
-    simulated = max(fit.followed.simulated, followed_percent(problem, problem.data, alone))
+    edges = data.edges[1:-1]
+    alone = problem.data - left + levels(edges, left)
+    simulated = max(fit.followed.simulated, followed_percent(edges, problem.data, alone))
     return replace(fit, followed=fit.followed._replace(simulated=simulated))
 
 
