@@ -99,3 +99,14 @@ def test_slow_noise_is_no_decay(pole):
     ]
     # one of a thousand, were its correlation known; none in 400 was seen when this was written
     assert sum(seen) <= 1
+
+
+def test_an_offset_of_a_coarse_output_does_not_move_its_onset():
+    # levels lie on the thresholds, which are halves of the step of the sensor as well
+    k = np.arange(300)
+    for seed in range(90, 100):
+        rng = np.random.default_rng(seed)
+        y = 2 * -np.expm1(-np.maximum(k - 68, 0) / 40) + 0.03 * rng.standard_normal(300)
+        y = 0.1 * np.round((y + rng.random()) / 0.1)
+        found = [first_motion(y + off, 60, 0.03, 0.1, 0.0).onset for off in (0, -273.15, 100, 16)]
+        assert_allclose(found, found[0], rtol=0, atol=1e-9)
