@@ -273,7 +273,7 @@ class OutputErrorFit(FractionalDelayFit):
 
     @property
     def residual(self) -> float:
-        """Standard deviation of the residual."""
+        """Standard deviation of the residual, with its degrees of freedom and outliers cut."""
         return self.estimate.residual.std
 
     @property
