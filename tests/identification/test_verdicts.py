@@ -101,6 +101,32 @@ def test_models_that_fit_as_well_decide_on_tuning():
     assert "Ms 1." in tuning.sentence
 
 
+@pytest.mark.parametrize(
+    ("gain", "lag", "dead_time", "dt", "seed"), [(2, 20, 6, 1, 5), (10, 60, 3.3, 2, 13)]
+)
+def test_a_sine_in_the_noise_is_no_pair_that_a_controller_has_to_fear(
+    gain, lag, dead_time, dt, seed
+):
+    # a pair that follows it left an Ms of 3.3 and 3.7 open
+    plant = cr.design.ProcessModel(gain, lag, dead_time).system(dt)
+    system = cr.identify(one_step(plant, lag, seed))
+    assert levels(system.fit)["tuning"] == "good"
+    assert cr.design.margins(plant, cr.design.pid(system)).ms < 2
+
+
+def test_a_sine_in_the_noise_is_no_pair_of_the_plant():
+    # at 1.1 rad/s, with a damping of 0.018
+    plant = cr.design.ProcessModel(10, 60, 3.3).system(2)
+    assert cr.identify(one_step(plant, 60, 7)).fit.structure == (1, 1)
+
+
+def one_step(plant, lag, seed):
+    """Record of six lags after the step, with noise of 1.25 % of the response."""
+    u = 4.0 * (np.arange(40 + int(6 * lag / plant.dt)) >= 40)
+    noise = 0.05 * float(plant.dcgain()) * np.random.default_rng(seed).standard_normal(u.size)
+    return cr.Record(plant.dt * np.arange(u.size), u, plant.simulate(u) + noise)
+
+
 def test_the_band_of_an_integrating_plant_has_axes_of_its_record():
     rng = np.random.default_rng(2)
     t = 0.1 * np.arange(600)

@@ -14,6 +14,8 @@ References
 .. [4] G. Schwarz, Estimating the dimension of a model, Ann. Statist. 6 (1978) 461-464,
    doi:10.1214/aos/1176344136.
 .. [5] Student, The probable error of a mean, Biometrika 6 (1908) 1-25, doi:10.2307/2331554.
+.. [6] P. M. Djuric, A model selection rule for sinusoids in white Gaussian noise, IEEE Trans.
+   Signal Process. 44 (1996) 1744-1751.
 """
 
 from __future__ import annotations
@@ -113,14 +115,9 @@ class WindowFit:
 
         A structure with a pole slower than the record, or an integrator, whose gain is not
         significant is replaced by the best one without that is not ruled out: a slow drift is not a
-        response. The initial values of a pair that turns are parameters: of little damping, it
-        follows a sine of any frequency in the noise.
+        response.
         """
-        more = (self.penalty - 1) * (self.problem.local_count(1) - self.problem.local_count(0))
-        criterion = {
-            s: value + more * np.count_nonzero(self.candidates[s].poles.imag)
-            for s, value in criterion.items()
-        }
+        criterion = {s: value + self.frequency_charge(s) for s, value in criterion.items()}
         first = choose(criterion)
         limit = criterion[first] + VERY_STRONG
         left = {s: value for s, value in criterion.items() if value <= limit}
@@ -131,6 +128,19 @@ class WindowFit:
                 return self.candidates[kept]
             del left[structure]
         return self.candidates[first]
+
+    def frequency_charge(self, structure: Structure) -> float:
+        """Charge for the frequencies of pairs beyond that for a parameter.
+
+        One of little damping follows a sine in the noise, of whichever frequency has the largest.
+        The error of a frequency, over it, falls with the oscillations that are seen and the root of
+        their samples, and not with the root of all: three penalties for a sine [6]_.
+        """
+        poles = self.candidates[structure].poles
+        pairs = poles[poles.imag > 0]
+        rates = np.maximum(-pairs.real, SMALLEST)
+        charges = 2 * np.log(np.abs(pairs)) - 3 * np.log(rates) - np.log(self.scales.dt)
+        return float(np.sum(np.clip(charges - self.penalty, 0.0, 2 * self.penalty)))
 
     def of(self, candidates: dict[Structure, Candidate], **changes: Any) -> WindowFit:
         """Replace the candidates, and what else has changed; the criterion is theirs."""

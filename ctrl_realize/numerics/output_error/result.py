@@ -449,7 +449,9 @@ def assembled(
         process = ProcessEstimate(partial(fitted_parameters, *setting))
     interval = interval.rounded(chosen.dead_time, fits.scales)
     static = static or fits.static(chosen)
-    charged = {s: fits.criterion[s] + needless_parameters(s) for s in profiles}
+    charged = {
+        s: fits.criterion[s] + needless_parameters(s) + fits.frequency_charge(s) for s in profiles
+    }
     least = charged.get(chosen.structure, np.inf)
     evidence = {
         s: float(np.exp(-max(value - least, 0.0) / 2)) ** _TEMPERED for s, value in charged.items()
