@@ -144,7 +144,7 @@ def first_motion(
         times are then in these units, and every duration is one of existing samples.
     """
     n = output.size
-    quantum *= 1 + 1e-6  # of which levels are halves: at a threshold rounding would decide
+    quantum *= 1 + 1e-6  # levels lie on its halves, and on thresholds: rounding would decide
     if edge >= 8:
         level = output - drift * _clipped_index(n, edge, rows) if drift else output
         rest = float(np.median(level[max(edge - 200, 0) : edge]))
