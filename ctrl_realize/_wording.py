@@ -294,6 +294,15 @@ def in_percent(fits: Iterable[float]) -> str:
     return ", ".join(f"{fit:.2f} %" if np.isfinite(fit) else constant for fit in fits)
 
 
+def count_of(number: int, noun: str) -> str:
+    """Write a number of things.
+
+    >>> count_of(1, "missing value"), count_of(2, "input")
+    ('1 missing value', '2 inputs')
+    """
+    return f"{number} {noun}" + ("" if number == 1 else "s")
+
+
 def named(kind: str, name: str) -> str:
     """Refer to an object by its name, if it has one.
 

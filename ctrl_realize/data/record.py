@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from .._checks import check_finite, finite, numbers, one_of, positive, real, spelled_out
 from .._shown import Card
-from .._wording import ASSUMED, in_time, shown_unit, times_in
+from .._wording import ASSUMED, count_of, in_time, shown_unit, times_in
 from ..errors import DataError, OptionError, TimeAxisError
 from ..numerics.arrays import BoolArray, read_only
 from ..numerics.signals.time_axis import axis_fault
@@ -182,9 +182,9 @@ class Record(RecordConversions):
         gaps = 0 if self.irregular else self.n_missing
         return (
             f"<Record{name}: {on_axis}, "
-            f"{_count(self.ninputs, 'input')}, {_count(self.noutputs, 'output')}"
+            f"{count_of(self.ninputs, 'input')}, {count_of(self.noutputs, 'output')}"
             + (", set point" if self.reference is not None else "")
-            + (f", {_count(gaps, 'missing value')}>" if gaps else ">")
+            + (f", {count_of(gaps, 'missing value')}>" if gaps else ">")
         )
 
     def report(self) -> str:
@@ -342,7 +342,3 @@ class Record(RecordConversions):
             output=np.concatenate([levels[1], self.output], axis=-1),
             reference=None if aim is None else np.concatenate([aim[..., :1], aim], axis=-1),
         )
-
-
-def _count(number: int, noun: str) -> str:
-    return f"{number} {noun}" + ("" if number == 1 else "s")

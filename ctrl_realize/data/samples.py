@@ -85,15 +85,15 @@ class Samples:
                 )
         fault = axis_fault(self.time)
         lost = [np.isnan(np.atleast_2d(one)) for one in (self.input, self.output)]
-        back = np.any(np.diff(self.time) < 0)
+        gaps, back = any(one.any() for one in lost), bool(np.any(np.diff(self.time) < 0))
         if fault is not None and (
             fault.kind not in ("gap", "not_uniform", "repeated")
             or np.mean(np.diff(self.time) == 0) > COARSE
             or back
         ):
             # The fault of the clock is told before missing values, which another call would keep.
-            return self, "keep" if back and any(one.any() for one in lost) else "refuse"
-        if fault is None and not any(one.any() for one in lost):
+            return self, "keep" if back and gaps else "refuse"
+        if fault is None and not gaps:
             return self, "refuse" if self.input_time is None else "keep"
         said = "" if fault is None else _in_words(self.time)
         samples = self

@@ -7,7 +7,7 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from .._wording import in_time
+from .._wording import count_of, in_time
 from ..data import Record
 from .drawing import JSON, axis, handle, layer, line, panel, time_axis
 from .records import edge_of, shifted
@@ -38,8 +38,7 @@ def _facts(record: Record) -> str:
     if record.irregular:
         usual = in_time(record.sample_time, 4)
         return f"{np.count_nonzero(record.seen)} samples about {usual} apart, {length} long"
-    gaps = f", {record.n_missing} missing value" if record.n_missing else ""
-    gaps += "s" if record.n_missing > 1 else ""
+    gaps = f", {count_of(record.n_missing, 'missing value')}" if record.n_missing else ""
     return f"{record.n_samples} samples of {in_time(record.dt, 4)}, {length} long{gaps}"
 
 

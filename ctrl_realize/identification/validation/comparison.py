@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import control as ct
 import numpy as np
 
-from ..._wording import in_percent
+from ..._wording import count_of, in_percent
 from ...data import Record
 from ...data.given import as_record
 from ...delayed import DelayedStateSpace
@@ -93,7 +93,7 @@ class ModelComparison(Result):
         return table.sort_values("fit_percent", ascending=False, kind="stable")
 
     def _title(self) -> str:
-        count = f"{len(self.names)} model" + "s" * (len(self.names) > 1)
+        count = count_of(len(self.names), "model")
         return f"Comparison of {count} on {self.record.name or 'a record'}"
 
     def _rows(self) -> list[tuple[str, str]]:
