@@ -25,7 +25,6 @@ from ...numerics.engine.poles import lag_sum
 from ...numerics.engine.static_gain import INTEGRATOR
 from ...numerics.output_error.result import OutputErrorEstimate, StructureFit
 from ...numerics.output_error.step_data import StepData
-from ...numerics.signals.correlation import fit_percent
 from ...results import Flag, FractionalDelayFit, IntervalKind
 from ..plausible import PlausibleModels
 from ..process_parameters import jump, not_seen_in_words, told, with_intervals
@@ -312,9 +311,7 @@ class OutputErrorFit(FractionalDelayFit):
         Of several records that are not averaged, y is in units of the noise of each, about its own
         mean.
         """
-        if self.data.span is not None or self.actuator is not None:
-            return self.estimate.followed.complete
-        return float(fit_percent(self.measured, self.fitted))
+        return self.estimate.followed.complete
 
     @property
     def simulated_percent(self) -> float:
