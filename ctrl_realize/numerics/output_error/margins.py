@@ -38,12 +38,15 @@ def close_to(key: DecisionKey, value: float, threshold: float) -> tuple[CloseDec
 def close_choices(fits: WindowFit, level: float, chosen: Structure) -> tuple[CloseDecision, ...]:
     """List structures whose criterion nearly equals `level`, that of the chosen one.
 
-    Also those that could have determined the noise level, on which everything depends.
+    Frequencies of pairs are charged, as in the choice. Also those that could have determined the
+    noise level, on which everything depends.
     """
+    level += fits.frequency_charge(chosen)
     near = [
         s
         for s, value in fits.criterion.items()
-        if abs(value + needless_parameters(s) - level) <= CLOSE * VERY_STRONG
+        if abs(value + needless_parameters(s) + fits.frequency_charge(s) - level)
+        <= CLOSE * VERY_STRONG
     ]
     near += [s for s, excess in fits.rivals.items() if excess <= CLOSE * VERY_STRONG]
     return tuple(CloseDecision("structure", s) for s in dict.fromkeys(near) if s != chosen)
