@@ -101,15 +101,10 @@ def test_models_that_fit_as_well_decide_on_tuning():
     assert "Ms 1." in tuning.sentence
 
 
-@pytest.mark.parametrize(
-    ("gain", "lag", "dead_time", "dt", "seed"), [(2, 20, 6, 1, 5), (10, 60, 3.3, 2, 13)]
-)
-def test_a_sine_in_the_noise_is_no_pair_that_a_controller_has_to_fear(
-    gain, lag, dead_time, dt, seed
-):
-    # a pair that follows it left an Ms of 3.3 and 3.7 open
-    plant = cr.design.ProcessModel(gain, lag, dead_time).system(dt)
-    system = cr.identify(one_step(plant, lag, seed))
+def test_a_sine_in_the_noise_is_no_pair_that_a_controller_has_to_fear():
+    # a pair that follows it left an Ms of 3 and more open
+    plant = cr.design.ProcessModel(2, 20, 6).system(1)
+    system = cr.identify(one_step(plant, 20, 5))
     assert levels(system.fit)["tuning"] == "good"
     assert cr.design.margins(plant, cr.design.pid(system)).ms < 2
 
