@@ -92,6 +92,33 @@ def test_an_output_that_is_held_beneath_noise_leaves_the_dead_time_inside(seed, 
     assert fit.gain_interval[0] <= 1 <= fit.gain_interval[1]
 
 
+@pytest.mark.parametrize(("seed", "digits"), [(0, None), (3, 3)])
+def test_lines_of_a_swinging_door_leave_the_dead_time_inside_its_interval(seed, digits):
+    case = sensors.swinging_door(np.random.default_rng([seed, 45]))
+    output = case.records.output if digits is None else np.round(case.records.output, digits)
+    fit = cr.identify(case.records.__replace__(output=output)).fit
+    told = [one.message for one in fit.flags if one.code == "held_output"]
+    assert len(told) == 1
+    assert "straight lines" in told[0]
+    assert fit.interval[0] <= case.dead_time <= fit.interval[1]
+    assert fit.verdicts[0].level == "with care"
+
+
+def test_few_values_of_an_output_that_is_stored_when_it_changes_are_late():
+    t = np.arange(300.0)
+    wanted = np.clip(t - 62, 0, None)
+    curve = 1 - (25 * np.exp(-wanted / 25) - 15 * np.exp(-wanted / 15)) / 10  # from 62 s on
+    output = sensors.stored(curve, 0.07)
+    assert np.count_nonzero(np.diff(output)) < 20
+    fit = cr.identify(cr.Record(t, np.where(t < 40, 0.0, 1.0), output)).fit
+    (told,) = (one.message for one in fit.flags if one.code == "held_output")
+    assert fit.interval[0] <= 22 <= fit.interval[1]
+    # Not the longest hold of all, at the end, but of those a fifth as fast as the shortest.
+    apart = np.diff(np.flatnonzero(np.diff(output)))
+    hold = float(told.split("up to ")[1].split()[0])
+    assert hold <= 5 * apart.min() < apart.max()
+
+
 def test_the_noise_of_a_regulated_loop_is_no_output_that_is_held():
     # PI behind 12 samples; nothing moves but the noise, from sample to sample
     rng = np.random.default_rng(9)

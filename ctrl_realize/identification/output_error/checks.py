@@ -28,7 +28,7 @@ from .loop_flags import (
 )
 from .repeat_flags import time_apart
 from .result import OutputErrorFit
-from .sensor_flags import hold_time, sensor_flags
+from .sensor_flags import hold_time, sensor_flags, stored_time
 
 # The following thresholds for flags are a matter of presentation.
 _GAINS_APART = 0.1  # least relative difference between groups of samples for a flag
@@ -80,8 +80,12 @@ def checked(fit: OutputErrorFit, *, alone: bool = True) -> OutputErrorFit:
     if len(fit.records) == 1:
         shown = _shown(fit)
         flags += sensor_flags(fit, shown.output, shown.fitted)
-        held = hold_time(shown.output, shown.fitted, fit.data.dt * shown.spacing)
-        if held is not None and "coarse_quantisation" not in codes and Rule.HELD_OUTPUT.on:
+        spacing = fit.data.dt * shown.spacing
+        coarse = "coarse_quantisation" in codes
+        held = None if coarse else hold_time(shown.output, shown.fitted, spacing)
+        if held is None and ("held_output" in codes or not fit.at_noise_level):
+            held = stored_time(shown.output, shown.drive, spacing)
+        if held is not None and Rule.HELD_OUTPUT.on:
             low = max(low - held[0], 0.0)
             flags.append(held[1])
         white = bool(fit.estimate.residual.noise_lags)

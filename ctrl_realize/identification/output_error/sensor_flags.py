@@ -12,7 +12,14 @@ from ...numerics.arrays import FloatArray
 from ...numerics.constants import SMALLEST
 from ...numerics.signals.jumps import swapped
 from ...numerics.signals.noise import BEYOND, far_value, winsorised_sigma
-from ...numerics.validation.held_output import held_share, longest_hold, stuck_samples
+from ...numerics.validation.held_output import (
+    held_share,
+    holds_in_motion,
+    longest_hold,
+    straight_lines,
+    stuck_samples,
+    updates,
+)
 from ...numerics.validation.limits import at_limit
 from .result import OutputErrorFit
 
@@ -82,6 +89,23 @@ def hold_time(output: FloatArray, fitted: FloatArray, dt: float) -> tuple[float,
         return None
     hold = dt * longest_hold(output, fitted)
     return hold, flagged("held_output", share=100 * share, hold=in_time(hold))
+
+
+def stored_time(output: FloatArray, drive: FloatArray, dt: float) -> tuple[float, Flag] | None:
+    """Test whether an output is stored when it has changed enough; return the hold time in s.
+
+    Of straight lines that of a rest ends later than the response begins, by less than the next one
+    is long: of a parabola, by half of it.
+    """
+    corners = straight_lines(output, drive)
+    if corners.size:
+        hold = dt * float(holds_in_motion(output, corners)[0])
+        return hold, flagged("held_output.lines", count=corners.size - 1, hold=in_time(hold))
+    new = updates(output, drive[None])
+    if new.all():
+        return None
+    hold = dt * float(holds_in_motion(output, np.flatnonzero(new)).max())
+    return hold, flagged("held_output.few", count=np.count_nonzero(new), hold=in_time(hold))
 
 
 def _onset_in_gap(fit: OutputErrorFit) -> Iterator[Flag]:

@@ -1,12 +1,14 @@
 """Outputs that are constant while the plant moves: held or interpolated between samples, or stuck.
 
 Our own rule: noise of one quantisation step [1]_ rarely repeats a value, a held output does so most
-of the time.
+of the time. Of a trend that a historian compresses [2]_ straight lines are left.
 
 References
 ----------
 .. [1] B. Widrow and I. Kollar, Quantization Noise, Cambridge University Press 2008,
    doi:10.1017/CBO9780511754661.
+.. [2] E. H. Bristol, Data compression for display and storage, US patent 4 669 097, 1987 (the
+   swinging door).
 """
 
 from __future__ import annotations
@@ -43,6 +45,10 @@ _LONGEST = 100
 _CERTAIN, _FLAT = 5.0, 2.5
 """Standard errors by which an output follows its model less than one that is not held, at least,
 and by which it may do so within its holds. Ablation: holds beneath noise."""
+_SHARP = 2.5
+"""How far a curve through the corners of straight lines leaves them, over what rounding may. Lines
+about smooth curves that are rounded have 1.2 at most (0.9 in 166 measured signals), rounded
+swinging doors 5.6 and more."""
 _ALIKE, _MOST = 0.15, 0.9
 """Steps of 0.0445 that are recorded with two digits are 0.04 and 0.05 (the tacho of a motor): they
 differ by 12 % of their mean; of the steps of a held curve 30 % would be that near to a multiple."""
@@ -172,6 +178,49 @@ def longest_hold(output: FloatArray, fitted: FloatArray) -> int:
     """Longest time in samples for which an output is constant while the model moves."""
     starts, ends = runs(_held(output, fitted)[0])
     return int((ends - starts).max(initial=0))
+
+
+def straight_lines(output: FloatArray, drive: FloatArray) -> IntArray:
+    """Samples (K,) at which an output (N,) turns between straight lines; none if it does not.
+
+    Lines are made as long as all samples within are near them. An input (N,) that moves gives the
+    response of an integrator, or of an actuator at its largest rate, two corners.
+    """
+    way = np.diff(output)
+    turns = np.abs(np.diff(way))
+    width = max(map(quantisation_step, (turns, output)))
+    width = max(width, rounding_error(output))
+    turns = turns[way[1:] != 0]
+    if not turns.size or np.median(turns) > 2 * width:
+        return np.zeros(0, dtype=np.int64)
+    corners, ahead = [0], 2
+    while (first := corners[-1]) < output.size - 1:
+        part = output[first + 1 : first + 1 + ahead]
+        count = np.arange(1, part.size + 1)
+        slope, slack = (part - output[first]) / count, width / count
+        steepest = np.minimum.accumulate(slope + slack)
+        flattest = np.maximum.accumulate(slope - slack)
+        near = np.flatnonzero((flattest <= slope) & (slope <= steepest))
+        if near[-1] + 1 == ahead:
+            ahead *= 2
+        else:
+            corners.append(first + 1 + int(near[-1]))
+            ahead = 2 * int(near[-1] + 1)
+    at = np.array(corners)
+    length = np.diff(at)
+    slopes, shorter = np.diff(output[at]) / length, np.minimum(length[1:], length[:-1])
+    # The middle of a chord is an eighth of its length times its change of slope off a parabola.
+    off = (np.abs(np.diff(slopes)) * shorter / 8)[shorter > 2]  # samples
+    if off.size <= 2 * np.count_nonzero(np.diff(drive)) or np.median(off) < _SHARP * width:
+        return at[:0]
+    return at
+
+
+def holds_in_motion(output: FloatArray, corners: IntArray) -> IntArray:
+    """Samples between corners (K,) or updates of an output (N,) between which it moves fast."""
+    apart = np.diff(corners)
+    slopes = np.abs(np.diff(output[corners])) / apart
+    return np.asarray(apart[slopes >= _FAST * slopes.max()])
 
 
 def _held(output: FloatArray, fitted: FloatArray) -> tuple[BoolArray, BoolArray]:

@@ -8,6 +8,7 @@ from ctrl_realize.numerics.validation.held_output import (
     held_share,
     hold_in_noise,
     longest_hold,
+    straight_lines,
     stuck_samples,
     updates,
 )
@@ -131,6 +132,26 @@ def test_held_output_beside_a_curve_that_it_follows_is_no_gain():
     curve, new = (TIME / 100.0) ** 2, TIME % 10 == 0
     held = curve[np.maximum.accumulate(np.where(new, TIME, 0))]
     assert np.array_equal(updates(held, curve[None]), new)
+
+
+@pytest.mark.parametrize("scale", [1e-6, 1.0, 1e6])
+@pytest.mark.parametrize("digits", [None, 4])
+def test_corners_of_straight_lines_are_found_in_any_unit(digits, scale):
+    corners = np.array([0, 108, 121, 140, 166, 205, 299])  # as of a historian, 1 % off at most
+    lines = np.interp(TIME, corners, RISE[corners])
+    output = scale * (lines if digits is None else np.round(lines, digits))
+    assert np.array_equal(straight_lines(output, STEP[0]), corners)
+
+
+def test_noise_curves_and_what_follows_its_input_are_no_straight_lines():
+    rng = np.random.default_rng(5)
+    binary = np.repeat(rng.choice([-1.0, 1.0], 30), 10)
+    ramps, steps = np.cumsum(binary), np.diff(binary, prepend=0.0).cumsum()
+    smooth = lfilter([0.05], [1, -0.95], rng.standard_normal(300))
+    coarse = np.round(RISE / 0.03) * 0.03
+    for output in (RISE + 0.01 * smooth, RISE, np.round(RISE, 3), coarse, np.zeros(300)):
+        assert not straight_lines(output, STEP[0]).size
+    assert not straight_lines(ramps, steps).size
 
 
 @pytest.mark.parametrize(("period", "first"), [(2, 1), (5, 0), (12, 7), (30, 11)])

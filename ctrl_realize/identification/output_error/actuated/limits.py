@@ -20,7 +20,7 @@ from ....numerics.arrays import BoolArray, FloatArray, IntArray, without_gaps
 from ....numerics.constants import STRONG
 from ....numerics.rules import Rule
 from ....numerics.signals.noise import BEYOND, FAR, far_value, spikes
-from ....numerics.validation.held_output import hold_in_noise, updates
+from ....numerics.validation.held_output import hold_in_noise, holds_in_motion, updates
 from ....numerics.validation.limits import at_limit, clips, ends, passed, plateaus
 from ..arguments import FEWEST_SAMPLES, step_data_of
 from ..loop_flags import feedback_flags
@@ -127,10 +127,12 @@ def at_updates(record: Record) -> tuple[Record, tuple[Flag, ...]]:
     new = updates(output, np.atleast_2d(record.input))
     if not np.any(record.seen & ~new) or not Rule.REPEATS.on:
         return record, ()
-    apart, count = np.diff(np.flatnonzero(new)), np.count_nonzero(record.seen & new)
-    longest = in_time(int(apart.max()) * record.dt)
+    stored = np.flatnonzero(new & record.seen)
+    apart, count = np.diff(np.flatnonzero(new)), stored.size
     if count < FEWEST_SAMPLES:
-        return record, (flagged("held_output.few", count=count, hold=longest),)
+        hold = in_time(holds_in_motion(output, stored).max() * record.dt)
+        return record, (flagged("held_output.few", count=count, hold=hold),)
+    longest = in_time(int(apart.max()) * record.dt)
     if np.ptp(apart) == 0:
         lines = np.nanmedian(np.abs(np.diff(output))) > 0  # most samples differ from the last
         flag = flagged(
