@@ -71,27 +71,15 @@ class PIDComparison(Result):
         """One row for each controller; times in s, phase margin in degrees."""
         import pandas as pd
 
-        return pd.DataFrame(
-            [
-                {
-                    "rule": c.rule,
-                    "kind": c.kind,
-                    "kp": c.kp,
-                    "ti": c.ti,
-                    "td": c.td,
-                    "stable": m.stable,
-                    "gain_margin": m.gain_margin,
-                    "phase_margin": m.phase_margin,
-                    "ms": m.ms,
-                    "delay_margin": m.delay_margin,
-                    "iae_setpoint": p.setpoint_error,
-                    "iae_load": p.load_error,
-                    "overshoot": p.overshoot,
-                    "settling_time": p.settling_time,
-                }
-                for c, m, p in zip(self.controllers, self.margins, self.performance, strict=True)
-            ]
-        )
+        parts: list[tuple[tuple[Any, ...], tuple[str, ...]]] = [
+            (self.controllers, ("rule", "kind", "kp", "ti", "td")),
+            (self.margins, ("stable", "gain_margin", "phase_margin", "ms", "delay_margin")),
+            (self.performance, ("setpoint_error", "load_error", "overshoot", "settling_time")),
+        ]
+        columns = {name: [getattr(one, name) for one in each]
+                   for each, names in parts for name in names}  # fmt: skip
+        errors = {"setpoint_error": "iae_setpoint", "load_error": "iae_load"}
+        return pd.DataFrame(columns).rename(columns=errors)
 
     def best(self, max_sensitivity: float = 2.0) -> PIDController:
         """Controller with the smallest load error among the stable ones with Ms within the limit.
