@@ -93,11 +93,8 @@ def phase_slope(omega: FloatArray, phase: FloatArray, share: float) -> tuple[flo
     """
     count = max(int(np.count_nonzero(omega >= omega[-1] - share * np.ptp(omega))), 3)
     x, y = omega[-count:], phase[-count:]
-    x0 = x - x.mean()
-    slope = float(x0 @ y / (x0 @ x0))
-    rest = y - y.mean() - slope * x0
-    variance = float(rest @ rest) / max(count - 2, 1) / float(x0 @ x0)
-    return -slope, float(np.sqrt(variance))
+    (slope, _), covariance = np.polyfit(x, y, 1, cov=True)
+    return -float(slope), float(np.sqrt(covariance[0, 0]))
 
 
 _SMOOTHINGS = (1, 8, 64)

@@ -244,16 +244,10 @@ def _about_line(part: FloatArray) -> FloatArray:
 
 
 def _root(curve: np.polynomial.Polynomial, level: float) -> float:
-    """Where a polynomial crosses a level, by Newton's method from zero."""
-    place, slope = 0.0, curve.deriv()
-    for _ in range(20):
-        steepness = float(slope(place))
-        if steepness == 0:
-            return float("nan")
-        place -= (float(curve(place)) - level) / steepness
-        if abs(place) > 1e6:
-            return float("nan")
-    return place
+    """Where a polynomial crosses a level, nearest to zero; NaN if it does not."""
+    roots = (curve - level).roots()
+    real = roots[roots.imag == 0].real
+    return float(min(real, key=abs, default=np.nan))
 
 
 def _smoothing(shape: FloatArray, noise: Noise) -> int:
