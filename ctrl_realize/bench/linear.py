@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from functools import reduce
+
+import control as ct
 import numpy as np
 from scipy.linalg import expm, solve
 from scipy.signal import buttap
@@ -43,19 +46,14 @@ def integrator(rate: float) -> Core:
 
 def chain(parts: list[Core], gain: float = 1.0) -> Core:
     """Connect strictly proper systems in series, the first one at the input."""
-    A, B, C, D = parts[0]
-    for A2, B2, C2, _ in parts[1:]:
-        zero = np.zeros((A.shape[0], A2.shape[0]))
-        A = np.block([[A, zero], [B2 @ C, A2]])
-        B = np.vstack([B, np.zeros((A2.shape[0], 1))])
-        C = np.hstack([np.zeros((1, C.shape[1])), C2])
+    systems = [ct.ss(*part) for part in parts]
+    A, B, C, D = ct.ssdata(reduce(lambda before, behind: behind * before, systems))
     return A, B, gain * C, D
 
 
 def dc_gain(core: Core) -> float:
     """Return the gain at frequency zero."""
-    A, B, C, D = core
-    return float((D - C @ solve(A, B))[0, 0])
+    return float(ct.ss(*core).dcgain())
 
 
 def response_to_held_input(core: Core, held: FloatArray, dt: float, dead_time: float) -> FloatArray:

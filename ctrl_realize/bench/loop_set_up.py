@@ -10,6 +10,8 @@ from .._checks import band, not_negative, one_of, positive, real
 from ..actuators import Actuator
 from ..actuators.base import actuators_of
 from ..errors import OptionError
+from ..numerics.engine.plausible_models import PlausibleModel
+from ..numerics.loops.reference import simc_pi
 from .control_loop import Process, ValveLoop
 
 _TYPICAL: dict[Process, tuple[float, float, float]] = {
@@ -106,7 +108,10 @@ def valve_loop(
         positive(oscillation[0], "oscillation", "amplitude in %")
         positive(oscillation[1], "oscillation", "period in s")
     if controller is None:
-        proportional, integral_time = _simc(gain, lag, wait + dt / 2)
+        # by SIMC, with the closed-loop time constant of the dead time
+        poles = np.array([0.0 if np.isinf(lag) else -1 / lag], dtype=np.complex128)
+        model = PlausibleModel(wait, poles, gain * (np.abs(poles) if poles.any() else np.ones(1)))
+        proportional, integral_time = simc_pi(model, dt)
     else:
         proportional, integral_time = band(controller, "controller", "gain, integral time in s")
         positive(integral_time, "controller", "integral time in s")
@@ -121,11 +126,3 @@ def valve_loop(
         noise=float(noise),
         dt=float(dt),
     )
-
-
-def _simc(gain: float, lag: float, dead_time: float) -> tuple[float, float]:
-    """Tune a PI controller by the SIMC rule with the closed-loop time constant of the dead time."""
-    closed = 2 * dead_time
-    if np.isinf(lag):
-        return 1 / (gain * closed), 4 * closed
-    return lag / (gain * closed), min(lag, 4 * closed)

@@ -97,12 +97,10 @@ class PlantTruth(Result):
 
     def response(self, omega: FloatArray) -> ComplexArray:
         """Evaluate the frequency response at `omega` in rad/s, dead time included."""
-        A, B, C, _ = self.matrices
         points = 1j * numbers(omega, "omega")
         if self.integrating_rate is not None and np.any(points == 0):
             raise OptionError("the plant is integrating: its response at omega=0 is infinite")
-        systems = points.reshape(-1, 1, 1) * np.eye(A.shape[0]) - A
-        values = (C @ np.linalg.solve(systems, B.astype(complex)))[:, 0, 0]
+        values = self.core(points.ravel(), squeeze=False)[0, 0]
         return np.asarray(values.reshape(points.shape) * np.exp(-points * self.dead_time))
 
     def frf(self, frequency_hz: FloatArray) -> MeasuredFRF:
