@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from typing import TypeAlias
 
 import numpy as np
+from scipy.sparse.csgraph import connected_components
 
 from ..arrays import FloatArray, IntArray
 from .form import DelayForm, without_zero_delays
@@ -205,13 +206,8 @@ def _alike(signals: IntArray, delays: Sequence[float]) -> bool:
 
 def _reaches(form: DelayForm, column: int, row: int) -> bool:
     """Whether an input of the core can be seen at an output, by the structure of its entries."""
-    if form.D[row, column] != 0:
-        return True
-    links = form.A != 0
-    reached = form.B[:, column] != 0
-    for _ in range(form.states):
-        further = reached | (links @ reached)
-        if np.array_equal(further, reached):
-            break
-        reached = further
-    return bool(np.any(form.C[row, reached] != 0))
+    entries = [[form.A, form.B[:, [column]]], [form.C[[row]], form.D[[row], [column]][None]]]
+    # the output closed to the input: what leads from one to the other is then in a loop
+    links = np.block(entries) != 0
+    _, label = connected_components(links, directed=True, connection="strong")
+    return bool(links[-1, -1] or np.count_nonzero(label == label[-1]) > 1)

@@ -247,8 +247,5 @@ def ends(output: FloatArray, held: BoolArray) -> list[tuple[BoolArray, int, floa
 
 def _joined(index: IntArray, gap: int) -> list[tuple[int, int]]:
     """First and last of indices that are not more than `gap` apart."""
-    if not index.size:
-        return []
-    breaks = np.flatnonzero(np.diff(index) > gap)
-    firsts, lasts = np.append(0, breaks + 1), np.append(breaks, index.size - 1)
-    return [(int(index[i]), int(index[k])) for i, k in zip(firsts, lasts, strict=True)]
+    parts = np.split(index, np.flatnonzero(np.diff(index) > gap) + 1)
+    return [(int(part[0]), int(part[-1])) for part in parts if part.size]
