@@ -205,10 +205,16 @@ def _speed(
             f"{record!r}: no step with a complete response; the position must move and settle, or "
             "give dead_time and time_constant"
         )
-    t63 = max(one.values["t63"] for one in known)
-    late = max(one.values["dead_time"] for one in known)
-    slow = [one.values[name] for one in known for name in ("t98", "settling_time")]
-    t98 = max([one for one in slow if np.isfinite(one)], default=late + 4 * (t63 - late))
+    # Noise may hide the first motion, and the time at which a response has settled.
+    late, t63, t98 = (
+        max(
+            (v for one in known for key in keys if np.isfinite(v := one.values[key])),
+            default=np.nan,
+        )
+        for keys in (("dead_time",), ("t63",), ("t98", "settling_time"))
+    )
+    if np.isnan(t98):
+        t98 = 4 * t63 if np.isnan(late) else late + 4 * (t63 - late)
     return late, t63, max(t98, t63)
 
 

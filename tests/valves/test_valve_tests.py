@@ -453,6 +453,15 @@ def test_a_plan_is_written_and_its_measured_record_tells_every_metric(tmp_path):
     assert "strokes, slow ramp" in str(flag)
 
 
+@pytest.mark.parametrize("seed", range(6))
+def test_a_first_step_whose_first_motion_is_hidden_by_noise_gives_a_plan(seed):
+    command = command_of([50, 55], [4.0, 6.0])
+    plan = valves.valve_test_plan(record_of(command, command, 0.4, seed), stroke_time=5.0)
+    # The hold is 2.5 times T98, of which noise of 8 % of the step leaves an upper bound.
+    t98 = DEAD_TIME - LAG * np.log(0.02)
+    assert t98 < plan.hold / 2.5 < 2 * t98
+
+
 def test_a_plan_knows_the_command_that_a_record_has_with_noise():
     """With 0.06 % of noise on the command resolution was 0.248 to 0.259 % for 0.6 % in 8 of 19."""
     plan = valves.valve_test_plan(
