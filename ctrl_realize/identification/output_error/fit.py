@@ -110,9 +110,10 @@ def fit_output_error(
     max_delay : float, optional
         Largest dead time in samples. Default: the visible onset of the output, which the dead time
         cannot exceed, but for the apparent one of `structures` that approximate the plant (of one
-        step, then 63 % of the response), and for that of an output that moved when the record
-        began; for inputs other than steps a quarter of the longest record, and half of it where
-        they begin at rest, or where that explains nothing or is reached.
+        step, then 63 % of the response; so in slow noise, where the best one is at the onset), and
+        for that of an output that moved when the record began; for inputs other than steps a
+        quarter of the longest record, and half of it where they begin at rest, or where that
+        explains nothing or is reached.
     known : control.TransferFunction or control.StateSpace, optional
         Known continuous dynamics between plant and record (sensor, anti-aliasing filter,
         converter). They are part of the fit, but not of the returned model.

@@ -47,6 +47,8 @@ class Requested:
         Process models to which the choice is limited; `structures` are theirs.
     latest, earliest : float, optional
         Largest and smallest dead time, in s.
+    beyond : bool
+        The dead time may be later than the visible onset.
     known : KnownFactor
         Dynamics in cascade that are not part of the plant.
     fastest : float, optional
@@ -69,6 +71,7 @@ class Requested:
     forms: tuple[ProcessForm, ...] = ()
     latest: float | None = None
     earliest: float = 0.0
+    beyond: bool = False
     fastest: float | None = None
     known: KnownFactor = field(default_factory=KnownFactor)
     huber: bool = True

@@ -33,7 +33,9 @@ The rule:
    onset, and reaches as far on both sides as the time that the model takes to move by what it
    misses of the output.
 5. No dead time is later than the visible onset of the output, or than 63 % of the response where
-   the output may have been moving before, and was seen at rest for less time than that.
+   the output may have been moving before, and was seen at rest for less time than that. In slow
+   noise, a swing of which may pass for the onset, the search is extended to 63 % of the response
+   where its best dead time is at that bound.
 6. Of a slow pole that leaves the gain undetermined, the fastest value that is not ruled out is
    taken, so that the model extrapolates little.
 
@@ -142,14 +144,17 @@ def fit_step_record(
         return data, replace(found, load=load)
     if structures is None and requested.fastest is None:
         found = _free_choice(data, fits, fit, requested.whiten)
+        # In slow noise a swing of it may be taken for the visible onset.
+        beyond = found.residual.whitened or found.residual.correlation > 1
     else:
         found = _given_structures(data, fits, free, requested)
-        later = fits.scales.onset + fits.scales.rise
-        at_bound = AT_BOUND * found.latest < found.dead_time and found.latest < later
-        alone = len(data.edges) == 1  # what several responses differ in would be followed as well
-        if alone and requested.latest is None and at_bound and found.better is not None:
-            # That of an approximation includes lags, and may be after the visible onset.
-            return fit_step_record(given, replace(requested, latest=later))
+        # That of an approximation includes lags, and may be after the visible onset.
+        beyond = found.better is not None
+    later = min(fits.scales.onset + fits.scales.rise, requested.latest or np.inf)
+    at_bound = AT_BOUND * found.latest < found.dead_time and found.latest < later
+    alone = len(data.edges) == 1  # what several responses differ in would be followed as well
+    if alone and at_bound and beyond:
+        return fit_step_record(given, replace(requested, latest=later, beyond=True))
     if found.static is not None:
         found = replace(found, rounding=_input_error(data) * abs(found.static.gain))
     if data.coarse:  # both levels of a step are rounded, however many samples they have
@@ -342,10 +347,11 @@ def _fit_until(
 ) -> WindowFit:
     # A structure that is given may be an approximation.
     given = requested.structures is not None and structures is not ALL_STRUCTURES
+    apparent = given or requested.beyond
     return fit_window(
         window(data, stop, requested.known),
         structures,
-        step_scales(data, stop, requested.latest, requested.earliest, given),
+        step_scales(data, stop, requested.latest, requested.earliest, apparent),
         (data.sigma, data.quantum),
         requested.huber and Rule.HUBER.on,
     )
