@@ -125,9 +125,13 @@ class Campaign(Result):
 
     @property
     def best(self) -> CampaignRow:
-        """The row with the best fit; the records are scaled to a unit step first."""
+        """The row with the best fit; the records are scaled to a unit step first.
+
+        Of those with less than half of the median gain none is the best: there is little to fit.
+        """
         _ = self.dt
-        return min(self.good, key=lambda row: row.residual)
+        least = 0.5 * np.median([abs(row.gain) for row in self.good])
+        return min((r for r in self.good if not abs(r.gain) < least), key=lambda row: row.residual)
 
     @cached_property
     def system(self) -> DelayedStateSpace:

@@ -65,6 +65,17 @@ def test_the_final_model_is_the_best_record_at_the_common_delay(campaign):
     assert_array_equal(system.A, again.A)
 
 
+def test_the_final_model_is_not_that_of_a_record_without_a_response(records, campaign):
+    """A little noise and nothing else has the smallest residual."""
+    alive = records[-1]
+    still = 1e-4 * np.random.default_rng(3).standard_normal(alive.n_samples)
+    dead = cr.Record(alive.time, alive.input, still, name="cable off")
+    mixed = cr.identify_campaign([*records, dead], method="paper")
+    assert "cable off" in [row.name for row in mixed.good]
+    # Gains of single records in 0.1 % of noise, realized at delays a few samples apart.
+    assert_allclose(mixed.system.dcgain(), campaign.system.dcgain(), rtol=0.01)
+
+
 def test_records_of_different_sample_times_have_a_report_but_no_mean_delay():
     """Table by amplitude averaged samples of 10 and 20 ms to 8.99, and the report raised."""
     rng = np.random.default_rng(0)
