@@ -63,6 +63,8 @@ def fit_frf(
     max_dead_time : float, optional
         Upper bound of the search in s; default from the slope of the measured phase. At most a
         thousand periods of the eighth frequency.
+        Lines at a distance df, as of a multisine, tell the dead time up to multiples of 1/df, and
+        the slope of the phase up to half of that: give a bound where it may be longer.
     weighting : {"auto", "std", "relative", "uniform"}
         "std": the FRF's standard deviation. "relative": an error proportional to the response,
         weighted by the coherence if there is one. "uniform": the same error everywhere. "auto":
