@@ -245,10 +245,9 @@ def _magnitude(table: Table, index: int, unit: str | None) -> FloatArray:
         if values.max() > 400:
             raise DataError(f"{table.at(index)} goes up to {values.max():g} dB")
         return np.asarray(10 ** (values / 20), dtype=np.float64)
-    if values.min() < 0:
-        raise OptionError(
-            f"{table.at(index)} has negative values; is it in dB? give magnitude_unit='dB'"
-        )
+    if values.min() < 0 or unit.startswith("db"):  # dBV, dB V/V, dB re 1 mm/N
+        seen = "has negative values" if values.min() < 0 else f"is in {unit!r}"
+        raise OptionError(f"{table.at(index)} {seen}; is it in dB? give magnitude_unit='dB'")
     return values
 
 

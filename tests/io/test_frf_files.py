@@ -86,6 +86,9 @@ def test_columns_and_units_are_chosen(tmp_path):
         ),
         (written("f_mhz,re,im", F, F, F), {}, OptionError, "in 'mhz'; give frequency_unit='mHz'"),
         (written("f,gain,phase_deg", F, -F, F), {}, OptionError, "negative values; is it in dB"),
+        # 20 dB above 1 were read as a gain of 20
+        (written("f,gain [dB V/V],phase_deg", F, 20 + F, PHASE), {}, OptionError, "is it in dB"),
+        (written("f,gain [dBV],phase_deg", F, 20 + F, PHASE), {}, OptionError, "is in 'dbv'"),
         (written("f,gain_dB,phase_deg", F, 1e3 * F, PHASE), {}, DataError, "10000 dB"),
         (written("f,gain,phase [turns]", F, F, F), {}, OptionError, "in 'turns'; give phase_unit"),
         (written("f [rpm],re,im", F, F, F), {}, OptionError, "in 'rpm'; give frequency_unit"),
