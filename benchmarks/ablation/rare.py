@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from scipy.signal import lfilter
 
@@ -151,6 +153,18 @@ def noise_as_slow_as_the_rest(rng: Rng) -> Case:
     plant, u = drawn(rng), step(400, int(rng.integers(40, 121)))
     y = stepped(rng, plant, u)
     return plant.case(record(u, y + 0.02 * np.ptp(y) * coloured(rng, u.size, 0.9)))
+
+
+def swing_after_the_step(rng: Rng) -> Case:
+    """AR(1) noise of 1 % of the step that, within the dead time, swings twelve times as far as it
+    does in the 20 samples of rest.
+    """
+    plant = replace(drawn(rng), dead_time=float(rng.uniform(0.3, 0.6)))
+    u, noise = step(400, 20), np.zeros(400)
+    while np.abs(noise[20:50]).max() <= 12 * np.std(noise[:20]):
+        noise = coloured(rng, u.size, 0.9)
+    y = stepped(rng, plant, u)
+    return plant.case(record(u, y + 0.01 * np.ptp(y) * noise))
 
 
 def steps_of_a_converter(rng: Rng) -> Case:
@@ -409,5 +423,6 @@ MADE_FOR = {
     Rule.LOOP_ROUNDED: rounded_loop,
     Rule.PAST: coarse_controller,
     Rule.SLOW_TURN: answered.relay_with_load,
+    Rule.NOISE_ONSET: swing_after_the_step,
 }
 """Rules, and the world that each was made for."""

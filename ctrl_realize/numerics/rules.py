@@ -94,6 +94,7 @@ class Rule(Enum):
     PAST = "past outputs tell a controller"
     BRIEF_REST = "rest shorter than the response"
     SLOW_TURN = "first turn in slow noise"
+    NOISE_ONSET = "onset that is noise"
     LOOP_ROUNDED = "controller behind rounding"
     RECORD_NOISE = "records weighted by their noise"
 

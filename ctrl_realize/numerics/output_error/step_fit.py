@@ -142,7 +142,8 @@ def fit_step_record(
         if load.own_gain and found.drawn is not None:
             found = replace(found, drawn=replace(found.drawn, late=late))
         return data, replace(found, load=load)
-    if structures is None and requested.fastest is None:
+    chosen = structures is None and requested.fastest is None
+    if chosen:
         found = _free_choice(data, fits, fit, requested.whiten)
         # In slow noise a swing of it may be taken for the visible onset.
         beyond = found.residual.whitened or found.residual.correlation > 1
@@ -153,7 +154,7 @@ def fit_step_record(
     later = min(fits.scales.onset + fits.scales.rise, requested.latest or np.inf)
     at_bound = AT_BOUND * found.latest < found.dead_time and found.latest < later
     alone = len(data.edges) == 1  # what several responses differ in would be followed as well
-    if alone and at_bound and beyond:
+    if alone and at_bound and beyond and (not chosen or Rule.NOISE_ONSET.on):
         return fit_step_record(given, replace(requested, latest=later, beyond=True))
     if found.static is not None:
         found = replace(found, rounding=_input_error(data) * abs(found.static.gain))
