@@ -231,6 +231,15 @@ def test_json_is_written_into_a_new_folder_and_not_in_place_of_one(folder, tmp_p
     assert "is a folder; expected a file to write" in said.err
 
 
+@pytest.mark.parametrize("words", [("nix.csv",), ("step_0.csv", "--frf", "{folder}/nix.csv")])
+def test_a_missing_file_is_a_refusal_for_a_program_as_well(folder, capsys, words):
+    file, *more = (word.format(folder=folder) for word in words)
+    assert main(["identify", str(folder / file), *more, "--json", "-"]) == 2
+    told = json.loads(capsys.readouterr().out)
+    assert (told["status"], told["error"]["kind"]) == ("refused", "MissingFileError")
+    assert "nix.csv" in told["error"]["text"]
+
+
 @pytest.mark.usefixtures("without_figures")
 def test_the_report_of_identify_has_the_controller_if_it_is_wanted(folder, tmp_path, capsys):
     out = tmp_path / "out"

@@ -51,7 +51,8 @@ def command(module: str, function: str) -> Callable[[Callable[..., None]], Calla
             named = [value for name, value in values.items() if name != "folder"]
             several = [value if isinstance(value, list) else [value] for value in named]
             paths = [path for each in several for path in each if isinstance(path, Path)]
-            check_files(paths)
+            if values.get("json") is None:  # that says itself what it refuses
+                check_files(paths)
             words = _words(values, hints)
             with loading():
                 from .manifest import Run
