@@ -28,6 +28,7 @@ FORMAT = "ctrl_realize model"
 _HEAD = 200  # bytes, in which the format of a file stands
 SCHEMA = 1
 MAX_MODEL_BYTES = 64 * 2**20
+_NO_MODEL = "not a model file; expected one that save_model or identify wrote"
 Model: TypeAlias = DelayedStateSpace | DelaySystem
 """What a file may contain."""
 _PACKAGES = ("ctrl-realize", "control", "numpy", "scipy")
@@ -123,7 +124,7 @@ def load_model(path: str | os.PathLike[str]) -> Model:
     try:
         text = file.read_bytes().decode("utf-8")
     except ValueError as error:
-        raise FileFormatError(f"{file}: not a model file: {error}") from error
+        raise FileFormatError(f"{file}: {_NO_MODEL}") from error
     try:
         return model_from_text(text)
     except FileFormatError as error:
@@ -172,7 +173,7 @@ def model_to_text(
 def model_from_text(text: str) -> Model:
     """Make a model from the text that `save_model` has written; see `load_model`."""
     if not text.lstrip().startswith("{"):
-        raise FileFormatError("not a model file; expected one that save_model or identify wrote")
+        raise FileFormatError(_NO_MODEL)
     try:
         content = parsed(text)
     except (ValueError, RecursionError) as error:

@@ -196,7 +196,7 @@ def test_content_that_makes_no_sense_is_refused_even_with_a_right_checksum(file,
         ("[]", "not a model file"),
         ("null", "not a model file"),
         ("time,u,y\n0,1,2\n", "not a model file; expected one that save_model or identify wrote$"),
-        ("\x80\x04\x95", "not a model file"),
+        ("\x80\x04\x95", "not a model file; expected one that save_model or identify wrote$"),
     ],
 )
 def test_other_files_are_refused(tmp_path, text, match):
