@@ -62,6 +62,20 @@ def test_held_samples_and_coloured_residuals_widen_the_interval_to_the_truth():
     assert low <= case.dead_time
 
 
+def test_a_held_output_shortens_no_dead_time_by_more_than_itself():
+    # "up to 10 s shorter" was told of 5.4 s
+    rng = np.random.default_rng(0)
+    t = np.arange(300.0)
+    u = np.where(rng.random(10)[(t // 30).astype(int)] < 0.5, 0.0, 1.0)
+    y = cr.delayed_ss(ct.tf([1.0], [20.0, 1.0]), dead_time=3.9, dt=1.0).simulate(u)
+    y += 0.01 * rng.standard_normal(300)
+    last = np.maximum.accumulate(np.where(rng.random(300) < 1 / 3, np.arange(300), 0))
+    fit = cr.fit_output_error(cr.Record(t, u, y[last]), structures="FOPDT").fit
+    (told,) = (one.message for one in fit.flags if one.code == "held_output")
+    assert "the dead time may be as short as 0 s" in told
+    assert fit.interval[0] == 0 < 3.9 < fit.interval[1]
+
+
 def test_samples_on_lines_between_the_samples_of_an_output_are_left_out():
     # with them the dead time of 10.3 samples was 0 to 7.4
     t = np.arange(260.0)

@@ -28,7 +28,7 @@ from .loop_flags import (
 )
 from .repeat_flags import time_apart
 from .result import OutputErrorFit
-from .sensor_flags import hold_time, sensor_flags, stored_time
+from .sensor_flags import held_output, sensor_flags, stored_output
 
 # The following thresholds for flags are a matter of presentation.
 _GAINS_APART = 0.1  # least relative difference between groups of samples for a flag
@@ -82,11 +82,11 @@ def checked(fit: OutputErrorFit, *, alone: bool = True) -> OutputErrorFit:
         flags += sensor_flags(fit, shown.output, shown.fitted)
         spacing = fit.data.dt * shown.spacing
         coarse = "coarse_quantisation" in codes
-        held = None if coarse else hold_time(shown.output, shown.fitted, spacing)
+        held = None if coarse else held_output(shown.output, shown.fitted, spacing, low)
         if held is None and ("held_output" in codes or not fit.at_noise_level):
-            held = stored_time(shown.output, shown.drive, spacing)
+            held = stored_output(shown.output, shown.drive, spacing, low)
         if held is not None and Rule.HELD_OUTPUT.on:
-            low = max(low - held[0], 0.0)
+            low = held[0]
             flags.append(held[1])
         white = bool(fit.estimate.residual.noise_lags)
         # Neither do they hold for means over blocks of samples, nor beside loads.

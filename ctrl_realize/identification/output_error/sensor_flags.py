@@ -82,30 +82,38 @@ def missing_code(output: FloatArray) -> Flag | None:
     return flagged("outliers.code", count=far.size, first=far[0], value=value, limit=BEYOND)
 
 
-def hold_time(output: FloatArray, fitted: FloatArray, dt: float) -> tuple[float, Flag] | None:
-    """Test whether an output is held between samples, and return the hold time in s."""
+def held_output(
+    output: FloatArray, fitted: FloatArray, dt: float, low: float
+) -> tuple[float, Flag] | None:
+    """Test whether an output is held, and return what the least dead time `low` in s becomes."""
     share = held_share(output, fitted)
     if share <= _HELD:
         return None
     hold = dt * longest_hold(output, fitted)
-    return hold, flagged("held_output", share=100 * share, hold=in_time(hold))
+    low = max(low - hold, 0.0)
+    least = in_time(low)
+    return low, flagged("held_output", share=100 * share, hold=in_time(hold), least=least)
 
 
-def stored_time(output: FloatArray, drive: FloatArray, dt: float) -> tuple[float, Flag] | None:
-    """Test whether an output is stored when it has changed enough; return the hold time in s.
+def stored_output(
+    output: FloatArray, drive: FloatArray, dt: float, low: float
+) -> tuple[float, Flag] | None:
+    """Test whether an output is stored when it has changed enough; return as `held_output`.
 
     Of straight lines that of a rest ends later than the response begins, by less than the next one
     is long: of a parabola, by half of it.
     """
     corners = straight_lines(output, drive)
     if corners.size:
-        hold = dt * float(holds_in_motion(output, corners)[0])
-        return hold, flagged("held_output.lines", count=corners.size - 1, hold=in_time(hold))
+        low = max(low - dt * float(holds_in_motion(output, corners)[0]), 0.0)
+        count, least = corners.size - 1, in_time(low)
+        return low, flagged("held_output.lines", count=count, least=least)
     new = updates(output, drive[None])
     if new.all():
         return None
     hold = dt * float(holds_in_motion(output, np.flatnonzero(new)).max())
-    return hold, flagged("held_output.few", count=np.count_nonzero(new), hold=in_time(hold))
+    told = flagged("held_output.few", count=np.count_nonzero(new), hold=in_time(hold))
+    return max(low - hold, 0.0), told
 
 
 def _onset_in_gap(fit: OutputErrorFit) -> Iterator[Flag]:

@@ -173,8 +173,9 @@ def fit_means_of_holds(record: Record, fit: Fit) -> OutputErrorFit:
     means = np.where((index - first) % period == 0, mean[which], np.nan)
     time, updates_seen = period * record.dt, np.count_nonzero(np.isfinite(means))
     if updates_seen < FEWEST_SAMPLES:
-        flag = flagged("held_output.noise", count=updates_seen, hold=in_time(time))
         low = max(found.interval[0] - time, 0.0)
+        count, hold, least = updates_seen, in_time(time), in_time(low)
+        flag = flagged("held_output.noise", count=count, hold=hold, least=least)
         return replace(found, estimate=replace(found.estimate, low=low), flags=(*found.flags, flag))
     again = fit(kept.__replace__(output=means, missing="keep"))
     if again.residual**2 > _EXPLAINED**2 * variance / period:
