@@ -374,3 +374,20 @@ def test_an_integrator_in_a_loop_has_a_slope_and_no_gain_of_any_size(case):
     assert fit.interval[0] <= case[0] <= fit.interval[1]
     assert fit.gain_interval[0] <= case[2] <= fit.gain_interval[1]
     assert {"integrating", "gain_not_resolved"} & codes(fit) == {"integrating"}
+
+
+def test_a_pulse_of_the_set_point_is_no_error_code_of_the_input():
+    """Noise hid the response to it: it was left out, and a dead time of 0 to 8 s came of 3 s."""
+    noise, lag = np.random.default_rng(0).standard_normal(600), np.exp(-1 / 20)
+    wanted, y, u = np.zeros((3, 600))
+    wanted[100], state, integral = 20.0, 0.0, 0.0
+    for k in range(600):
+        y[k] = state + noise[k]
+        integral += 1.5 * (wanted[k] - y[k]) / 20
+        u[k] = 1.5 * (wanted[k] - y[k]) + integral
+        state = lag * state + (1 - lag) * (u[k - 3] if k >= 3 else 0.0)
+    record = cr.Record(np.arange(600.0), u, y, reference=wanted)
+    fit = cr.fit_output_error(record, structures="FOPDT").fit
+    assert "outliers" not in {flag.code for flag in fit.flags}
+    low, high = fit.interval
+    assert low <= 3 <= high <= 6

@@ -73,14 +73,17 @@ def without_codes(record: Record) -> tuple[Record, tuple[Flag, ...]]:
 def with_held_input(record: Record) -> tuple[Record, tuple[Flag, ...]]:
     """Hold the input where it has such a value, and tell it.
 
-    A few ranges are enough for single samples; what lasts is a pulse of a test.
+    A few ranges are enough for single samples; what lasts is a pulse of a test, and where the set
+    point moves it is the controller's answer.
     """
     limit = _PULSE
     codes, said = _codes(record, record.input, limit)
     if np.any(np.diff(codes) == 1):
         limit = BEYOND
         codes, said = _codes(record, record.input, limit)
-    if not codes.size:
+    wanted = np.full(2, np.nan) if record.reference is None else np.ravel(record.reference)
+    moved = 1 + np.flatnonzero(np.abs(np.diff(wanted)) > 0)
+    if not codes.size or np.isin(codes, moved).any():
         return record, ()
     index = np.arange(record.n_samples)
     kept = np.delete(index, codes)
