@@ -294,6 +294,15 @@ def test_rise_and_settling_time_of_a_lag_are_those_of_the_closed_form(lag, delay
     assert found["SteadyStateValue"] == pytest.approx(2, rel=1e-9)
 
 
+@pytest.mark.parametrize("delay", [10.0, 1000.0, 10000.0])
+def test_rise_and_settling_time_of_a_continuous_lag_behind_a_long_dead_time(delay):
+    # at the times of a plot, 200 s apart behind 10000 s, it rose in 0 s
+    found = (ct.ss(-0.2, 1, 0.2, 0) * cr.delay(delay)).step_info()
+    # as above; 5000 times begin up to an interval of the plot early, 1 % of the rise at most
+    assert found["RiseTime"] == pytest.approx(5 * np.log(9), rel=0.01)
+    assert found["SettlingTime"] == pytest.approx(delay + 5 * np.log(50), abs=0.1)
+
+
 def test_a_fast_rise_before_a_slow_end_is_seen():
     # 1 - b exp(-t) - a exp(-t / 1000): all equal intervals to its end were 15 s each
     a = 0.01 / 0.999

@@ -252,6 +252,7 @@ class HostResponses(HostMargins):
                 "a stable system. Look at sys.step_response(t)"
             )
         searched = timepts is None and final != 0
+        chosen = np.ndim(timepts) == 0 and not self.dt and final != 0
         if timepts is None and self.dt:
             count = self._settling_samples(LONGEST)
             if count == LONGEST:
@@ -275,6 +276,12 @@ class HostResponses(HostMargins):
                 f"the step response of {self.name!r} has not risen to its final value {final:.4g} "
                 f"by {response.time[-1]:.6g} s; give a later end, sys.step_info(end)"
             )
+        if chosen:  # behind a long dead time those of a plot are too far apart
+            before = response.time[max(np.flatnonzero(response.outputs)[0] - 1, 0)]
+            end = np.fmin(found["SettlingTime"], response.time[-1])
+            times = np.union1d(response.time, np.linspace(before, end, MOST))
+            outputs = self.step_response(times).outputs
+            found = ct.step_info(outputs, times, yfinal=final, **settings)
         return found
 
     def impulse_response(
