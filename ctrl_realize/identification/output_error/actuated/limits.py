@@ -177,8 +177,8 @@ def fit_means_of_holds(record: Record, fit: Fit) -> OutputErrorFit:
     time, updates_seen = period * record.dt, np.count_nonzero(np.isfinite(means))
     if updates_seen < FEWEST_SAMPLES:
         low = max(found.interval[0] - time, 0.0)
-        count, hold, least = updates_seen, in_time(time), in_time(low)
-        flag = flagged("held_output.noise", count=count, hold=hold, least=least)
+        hold, least = in_time(time), in_time(low)
+        flag = flagged("held_output.noise", count=updates_seen, hold=hold, least=least)
         return replace(found, estimate=replace(found.estimate, low=low), flags=(*found.flags, flag))
     again = fit(kept.__replace__(output=means, missing="keep"))
     if again.residual**2 > _EXPLAINED**2 * variance / period:
