@@ -443,3 +443,13 @@ def test_the_response_of_parallel_paths_does_not_depend_on_units(lag, gain):
     loop = ct.feedback(plant / gain * filtered, filtered)
     through = plant(z) / gain * filtered(z)
     assert_allclose(loop(z), through / (1 + through * filtered(z)), rtol=1e-10)
+
+
+def test_feedback_by_a_list_is_that_of_its_matrix_and_a_ragged_one_is_refused():
+    plant = cr.delayed_ss(ct.tf([1], [5, 1]), 10, dt=0.1)
+    for system in (plant, ct.ss(-0.2, 1, 0.2, 0) * cr.delay(1.0)):
+        at = np.exp(0.3j * 0.1) if system.dt else 0.3j
+        loop = system.feedback([[0.5]])  # P / (1 + P / 2)
+        assert loop(at) == pytest.approx(system(at) / (1 + 0.5 * system(at)), rel=1e-12)
+        with pytest.raises(DataError, match="rows have different lengths"):
+            system.feedback([[1, 2], [3]])

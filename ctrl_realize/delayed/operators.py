@@ -11,6 +11,7 @@ from typing import Any, ClassVar
 import control as ct
 import numpy as np
 
+from .._checks import finite
 from ..errors import OptionError, UnsuitableSystemError
 from ..numerics.internal_delays import form as forms
 from ..numerics.internal_delays.form import DelayForm
@@ -168,7 +169,9 @@ class DelayOperators(DeferredMatrices):
             The feedthroughs of both form an algebraic loop without a solution, or the time bases
             differ.
         """
-        if not is_linear(other) and isinstance(other, (ct.NonlinearIOSystem, list, tuple)):
+        if isinstance(other, (list, tuple)):
+            other = np.atleast_2d(finite(other, "other"))
+        if not is_linear(other) and isinstance(other, ct.NonlinearIOSystem):
             return super().feedback(other, sign)
         if isinstance(other, Numbers) and np.isrealobj(other):
             other = float(other) * np.eye(self.ninputs, self.noutputs)
