@@ -174,3 +174,8 @@ def test_the_ultimate_gain_has_its_closed_form_in_every_unit_of_time():
         found = design.ultimate(model)
         assert found.gain * dead_time == pytest.approx(np.pi / 2, rel=1e-9)
         assert found.period == pytest.approx(4 * dead_time, rel=1e-9)
+
+
+def test_an_integrator_alone_is_refused_by_what_its_loop_lacks():
+    with pytest.raises(UnsuitableSystemError, match=r"no lag and no dead time.*cr\.delay\(1\)"):
+        cr.design.ultimate(ct.tf([1.0], [1, 0]))

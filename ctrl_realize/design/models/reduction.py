@@ -161,7 +161,10 @@ def both_forms(
         speeds = speeds[speeds > 1e-10 * speeds.max(initial=0.0)]  # an integrator is none
         span = float(np.sum(1 / speeds)) + total
         if span == 0:
-            raise UnsuitableSystemError(f"{core.name!r} has no lag and no dead time to reduce")
+            raise UnsuitableSystemError(
+                f"{core.name!r} has no lag and no dead time, which set the times of its loop; "
+                "expected one at least, such as plant * cr.delay(1)"
+            )
         step = min(span / 1000, longest)
         if total and np.any(core.D):
             # A feedthrough causes a jump; with whole samples it stays in place.
