@@ -249,6 +249,13 @@ def test_a_loop_before_its_first_echo_is_the_plant():
     assert_allclose(impulse, k * np.exp(-(t[t > tau] - tau)), atol=1e-7)
 
 
+def test_a_gain_behind_a_dead_time_has_no_impulse_response_but_impulses():
+    # rounding of 3e-11 was left of it, and a warning that it had not converged
+    pure = 2 * cr.delay(3.3)
+    for t in (np.linspace(0, 5, 50), None):
+        assert not pure.impulse_response(t).outputs.any()
+
+
 @pytest.mark.parametrize("unit", [1e-9, 1e6])
 def test_the_unit_of_time_does_not_matter_to_a_response(unit):
     # five lags in companion form; the echoes make steps of unequal lengths
