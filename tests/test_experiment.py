@@ -488,3 +488,8 @@ def test_what_an_input_did_before_is_as_unknown_to_a_plan_as_to_a_fit():
         known[one.kind] = 0.02 * np.sqrt(np.linalg.inv(slopes.T @ slopes)[2, 2])
         assert one.std == pytest.approx(known[one.kind], rel=1e-3), one.kind
     assert len(known) > 3
+
+
+def test_noise_whose_variance_is_no_number_is_refused():
+    with pytest.raises(cr.errors.OptionError, match=r"noise=1e\+300.*that is a number"):
+        cr.experiment.plan(LEVEL, time=60, amplitude=1, rate=2, noise=1e300)

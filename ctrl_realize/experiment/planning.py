@@ -239,9 +239,10 @@ def _noise(
         raise OptionError("noise=None; expected the standard deviation of the output's noise")
     sigma = not_negative(noise or 0.0, "noise", "standard deviation")
     turn = real(pole, "noise_pole", "pole per sample")
-    if abs(turn) >= 1 or sigma**2 + rounding == 0:
+    if abs(turn) >= 1 or not 0 < sigma * sigma + rounding < np.inf:
         raise OptionError(
-            f"noise={sigma:g}, noise_pole={turn:g}; expected noise, and a pole between -1 and 1"
+            f"noise={sigma:g}, noise_pole={turn:g}; expected noise with a variance above 0 that is "
+            "a number, and a pole between -1 and 1"
         )
     # With white rounding AR(1) noise is none: a longer autoregression, by Yule and Walker.
     covariance = sigma**2 * turn ** np.arange(1.0 + bool(turn) * (_LONG if rounding else 1))
