@@ -57,8 +57,14 @@ def known_factor(known: Any) -> KnownFactor:
             f"known has {known.ninputs} inputs, {known.noutputs} outputs and dt={known.dt}; "
             "expected a continuous system with one of each (a sensor or a filter)"
         )
-    system = known if isinstance(known, ct.TransferFunction) else ct.ss2tf(known)
-    num, den = np.trim_zeros(system.num[0][0], "f"), system.den[0][0]
+    try:
+        system = known if isinstance(known, ct.TransferFunction) else ct.ss2tf(known)
+        num, den = np.trim_zeros(system.num[0][0], "f"), system.den[0][0]
+    except UnsuitableSystemError as error:
+        raise UnsuitableSystemError(
+            f"known is {known!r}; expected {expected} without dead time, which is estimated "
+            "together with that of the plant"
+        ) from error
     if num.size == 0:
         raise UnsuitableSystemError("known is zero")
     if num.size > den.size:

@@ -297,3 +297,9 @@ def test_where_no_structure_is_right_five_poles_are_the_model_if_three_miss_twic
     assert fit.order == 5
     # up to three poles follow 97.8 % of it
     assert fit.fit_percent > 98.5
+
+
+def test_known_dynamics_with_a_dead_time_are_refused_by_that():
+    for known in (cr.delay(2.0), ct.ss(-1, 1, 1, 0) * cr.delay(2.0)):
+        with pytest.raises(cr.errors.UnsuitableSystemError, match=r"known is .*without dead"):
+            cr.fit_output_error(cr.Record(np.arange(9.0), np.ones(9), np.ones(9)), known=known)
