@@ -177,7 +177,7 @@ def with_error(value: float, error: float) -> str:
     digits = -int(np.floor(np.log10(error)))
     if 10 < round(error * 10.0 ** (digits + 1)) < 20:
         digits += 1
-    if digits > 9 or abs(value) >= 1e6:
+    if digits > 9 or max(abs(value), error) >= 1e6:
         return f"{value:.4g} +-{error:.1g}"
     decimals = max(digits, 0)
     unsure = error >= 10 and abs(value) < min(error, 999)  # its own digits tell it from its bound

@@ -95,3 +95,14 @@ def test_a_furnace_in_minutes_is_reported_and_drawn_in_minutes(tmp_path):
     assert re.search(r"gain kp +3\.\d+ %/degC", controller)
     assert re.search(r"integral ti +(39|40)\.\d+ min", controller)
     assert re.search(r"delay margin 1\d\.?\d* min", controller)
+
+
+def test_an_error_of_any_size_is_told_in_a_few_digits():
+    # a dead time beyond the response leaves nothing of the gain: 71 digits stood in its formula
+    t = np.arange(100.0)
+    y = -np.expm1(-np.clip(t - 23, 0, None) / 5)
+    y += 0.01 * np.random.default_rng(0).standard_normal(100)
+    late = cr.identification.ProcessStructure("P1D", fixed={"Td": 200.0})
+    fit = cr.fit_output_error(cr.Record(t, np.where(t < 20, 0.0, 1.0), y), structures=late).fit
+    assert "gain K not determined" in fit.report()
+    assert not re.search(r"\d{12}", fit.report())
