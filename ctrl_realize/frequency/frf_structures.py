@@ -20,8 +20,7 @@ from ..numerics.engine.compared_fits import settled
 from ..numerics.engine.problem import Structure
 from ..numerics.engine.profile import Points, dead_time_error, profile_points
 from ..numerics.engine.structures import Candidate
-from ..numerics.output_error.interval import MOST_ROUNDS
-from ..numerics.output_error.profiles import LOWER
+from ..numerics.output_error.interval import LOWER, MOST_ROUNDS
 from ..numerics.rational.frf_data import FRFData, dead_time_interval
 from ..numerics.rational.search import (
     information_criteria,

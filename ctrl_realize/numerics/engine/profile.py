@@ -55,6 +55,8 @@ profiles swept."""
 
 Points: TypeAlias = dict[float, Candidate]
 """Best models with given dead times, by these, in s."""
+Profile: TypeAlias = tuple[FloatArray, FloatArray]
+"""Dead times, and the misfit at each; see `dead_time_profile`."""
 
 
 def dead_time_profile(

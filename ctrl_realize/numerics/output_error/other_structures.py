@@ -29,7 +29,7 @@ from ..engine.structures import (
 )
 from ..engine.window_fit import WindowFit
 from ..families.process_form import ProcessForm
-from .profiles import profile_of
+from .interval import profile_of
 from .result import OtherStructures, StructureFit
 
 _MOST_ORDER = ALL_STRUCTURES[-1].order  # highest order that is tried

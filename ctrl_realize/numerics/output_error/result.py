@@ -24,7 +24,7 @@ from ..engine.modal import respond
 from ..engine.plausible_models import PlausibleDraw, PlausibleModel
 from ..engine.poles import lag_sum
 from ..engine.problem import Structure
-from ..engine.profile import Points, profile_limits
+from ..engine.profile import Points, Profile, profile_limits
 from ..engine.static_gain import StaticGain, averaged_ends, gain_ends
 from ..engine.structures import Candidate, Scales, needless_parameters
 from ..engine.window_fit import WindowFit
@@ -38,7 +38,6 @@ from ..signals.correlation import fit_percent
 from ..signals.load_step import LoadStep
 from .extrapolation import least_extrapolating
 from .margins import CloseDecision
-from .profiles import Profile
 
 _LEAST_WIDTH = 1e-6  # samples
 AT_BOUND = 0.98  # of the range of dead times, from which on an interval reaches its bound

@@ -45,6 +45,9 @@ few lags, late misfit), so that their median is wrong only if most of them are; 
 compared in [4]_. They were tested on simulated and real plants, see docs/accuracy.md;
 `benchmarks.ablation` switches each of them off.
 
+A residual that is correlated in an unknown way, or coarsely rounded, is one of fewer independent
+samples [5]_, whose likelihood may hardly depend on a short dead time.
+
 References
 ----------
 .. [1] D. J. Venzon and S. H. Moolgavkar, A method for computing profile-likelihood-based confidence
@@ -55,6 +58,8 @@ References
    doi:10.1214/aos/1176344136.
 .. [4] S. Bjorklund and L. Ljung, A review of time-delay estimation techniques, Proc. 42nd IEEE
    Conf. Decision and Control (2003) 2502-2507, doi:10.1109/CDC.2003.1272997.
+.. [5] C. J. Geyer, Practical Markov chain Monte Carlo, Statist. Sci. 7 (1992) 473-483,
+   doi:10.1214/ss/1177011137.
 """
 
 from __future__ import annotations
@@ -65,32 +70,31 @@ from functools import cache, partial
 
 import numpy as np
 
-from ..constants import Z_95
+from ..constants import SMALLEST, Z_95
 from ..engine.compared_fits import at_dead_time
 from ..engine.eliminate import evaluate
 from ..engine.modal import respond
 from ..engine.problem import Structure
+from ..engine.profile import dead_time_error
 from ..engine.structures import ALL_STRUCTURES, SIMPLE_STRUCTURES, Candidate, Scales, choose
 from ..engine.window_fit import WindowFit, among, fit_window, with_noise_of_residual
+from ..families.physical import process_parameters
 from ..rules import Rule
 from ..signals.edges import difference_noise, level_error
 from ..signals.load_step import LoadStep
 from ..signals.noise import rounding_of_level
 from ..signals.noise_model import continues
-from .before_the_step import fitted_from_rest
 from .coloured import in_coloured_noise
 from .extrapolation import least_extrapolating
-from .flat_likelihood import closer, later, moved, pinned, with_close_decision
-from .interval import likelihood_fit
+from .interval import likelihood_fit, profile_of
 from .load import load_of
 from .margins import CloseDecision, close_to
 from .other_structures import Compared, Requested, other_structures
 from .process_models import fit_requested
-from .profiles import profile_of
-from .result import AT_BOUND, DelayInterval, OutputErrorEstimate, RobustKey, assembled
+from .result import AT_BOUND, DelayInterval, OutputErrorEstimate, RobustKey, assembled, followed_by
 from .rounded import in_rounded_data
 from .selection import chains_of, flows_of
-from .step_data import StepData, settled_at, step_scales, stop_at, window
+from .step_data import StepData, fitted_from_rest, settled_at, step_scales, stop_at, window
 
 ADEQUATE = 1.3
 """Residual over noise, in means over bins, up to which a model is taken for right: noise that is
@@ -110,6 +114,9 @@ _FAR_POORER = 2.0
 though none is at noise level. 1.0 to 1.7 on measured plants, 2.5 on one canal, 8.4 for an arm that
 swings in two modes (fit 73.6 with three poles, 96.9 % with five). Ablation: simple models alone."""
 _FEWEST_LATE = 8  # bins in the later half of what comes when the response has settled
+_PINNED = 0.25
+"""Distance of the dead time from the earliest one, where a likelihood interval ends, in its widths,
+up to which it counts as pinned there. Ablation: estimates against a pinned likelihood."""
 
 
 def fit_step_record(
@@ -233,14 +240,14 @@ def _free_choice(
         )
         if data.coarse:
             likely = in_rounded_data(likely, fits, data.quantum)
-        at_the_end = pinned(likely, data, plain)
-        likely = with_close_decision(likely, at_the_end)
+        at_the_end = _pinned(likely, data, plain)
+        likely = _with_close_decision(likely, at_the_end)
         if at_the_end > 1 or not Rule.PINNED.on:
             return likely
     early = fit(data, stop_at(data, 0.15), _LAGS)
     if likely is not None:
-        nearer = closer(early, _LAGS[-1], likely)
-        likely = with_close_decision(likely, nearer)
+        nearer = _closer(early, _LAGS[-1], likely)
+        likely = _with_close_decision(likely, nearer)
         if nearer > 1:
             return likely
     kept = SIMPLE_STRUCTURES if _simple_ones_suffice(plain) else tuple(plain.candidates)
@@ -249,9 +256,9 @@ def _free_choice(
     rise = fit(data, stop_at(data, 0.63), SIMPLE_STRUCTURES)
     estimates = _views(data, early, rise, chosen, plain.scales)
     if likely is not None:
-        agreed = later(likely, estimates)
-        likely = with_close_decision(likely, agreed)
-        return likely if agreed > 1 else moved(likely, plain, estimates)
+        agreed = _later(likely, estimates)
+        likely = _with_close_decision(likely, agreed)
+        return likely if agreed > 1 else _moved(likely, plain, estimates)
     return replace(_robust_fit(simple, chosen, estimates), close=near)
 
 
@@ -377,3 +384,65 @@ def _views(
     )
     amid = float(np.median([at for _, at, on in views[:-1] if on]))
     return tuple((key, at if on else amid) for key, at, on in views)
+
+
+def _with_close_decision(found: OutputErrorEstimate, ratio: float) -> OutputErrorEstimate:
+    """Add a decision on the source of the dead time to the close ones, if its ratio is near 1."""
+    return replace(found, close=found.close + close_to("likelihood", ratio, 1.0))
+
+
+def _pinned(found: OutputErrorEstimate, data: StepData, fits: WindowFit) -> float:
+    """Below 1 if a likelihood is flat down to the earliest dead time, and its maximum there.
+
+    So it may be where the residual is quantised, or correlated in a way that is not known.
+    """
+    white = not data.coarse and fits.correlation == 1.0
+    lags = found.distributed.chain is None and not found.distributed.follows_flow
+    if white or found.residual.whitened or not lags or found.low > fits.scales.earliest:
+        return np.inf
+    return float((found.dead_time - found.low) / max(_PINNED * (found.high - found.low), SMALLEST))
+
+
+def _closer(early: WindowFit, lags: Structure, found: OutputErrorEstimate) -> float:
+    """Below 1 if the first part of the response alone, with `lags`, tells the dead time better.
+
+    Width of the interval that it gives, in that of the likelihood.
+    """
+    error = dead_time_error(early.problem, early.candidates[lags], early.variance)
+    return float(2 * Z_95 * error / max(found.high - found.low, SMALLEST))
+
+
+def _later(found: OutputErrorEstimate, estimates: tuple[tuple[RobustKey, float], ...]) -> float:
+    """Below 1 if most delay estimates agree with each other that the output moves later."""
+    dead_times = np.array([at for _, at in estimates[:-1]])
+    middle = float(np.median(dead_times))
+    apart = float(np.median(np.abs(dead_times - middle)))
+    later = middle - found.dead_time
+    return 2 * apart / later if later > 0 else np.inf
+
+
+def _moved(
+    found: OutputErrorEstimate, fits: WindowFit, estimates: tuple[tuple[RobustKey, float], ...]
+) -> OutputErrorEstimate:
+    """Put the dead time at the median of the delay estimates; the interval is not changed."""
+    dead_time = float(np.clip(np.median([at for _, at in estimates[:-1]]), found.low, found.high))
+    own = fits.candidates[found.structure]
+    fixed = at_dead_time(fits.problem, own, fits.scales, dead_time)
+    fixed, static = least_extrapolating(fits, fixed, dead_time_fixed=True)
+    state = evaluate(fits.problem, fixed.structure, fixed.parameters[None])
+    return replace(
+        found,
+        dead_time=dead_time,
+        poles=fixed.poles,
+        numerator=state.numerator[0],
+        fitted=fits.window.predict(fits.problem, fixed),
+        followed=followed_by(fits, fixed, state.numerator[0]),
+        static=static,
+        delay_estimates=estimates,
+        process=replace(
+            found.process,
+            find=partial(
+                process_parameters, fixed.poles, state.numerator[0], dead_time, fits.scales.length
+            ),
+        ),
+    )

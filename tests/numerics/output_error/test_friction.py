@@ -6,7 +6,7 @@ from scipy.optimize import minimize
 
 from ctrl_realize.numerics.engine.problem import KnownFactor, Structure
 from ctrl_realize.numerics.engine.window_fit import fit_window
-from ctrl_realize.numerics.output_error.friction import latest_slip
+from ctrl_realize.numerics.output_error.interval import latest_slip
 from ctrl_realize.numerics.output_error.step_data import step_data, step_scales, window
 from ctrl_realize.numerics.output_error.step_fit import fit_step_record
 

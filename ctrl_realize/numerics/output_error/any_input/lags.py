@@ -42,9 +42,9 @@ from ...families.process_form import ProcessForm
 from ...rules import Rule
 from ...signals.noise import correlation_time
 from ...signals.noise_model import noise_lags
+from ..interval import profile_of
 from ..load import IN_SLOW_NOISE
 from ..other_structures import Requested, line_of
-from ..profiles import profile_of
 from ..result import (
     DelayInterval,
     OtherStructures,
