@@ -17,8 +17,7 @@ from __future__ import annotations
 import numpy as np
 
 from ctrl_realize.numerics.arrays import ComplexArray, FloatArray
-from ctrl_realize.numerics.engine.modal import respond
-from ctrl_realize.numerics.engine.poles import parameters_from_poles
+from ctrl_realize.numerics.engine.modal import parameters_from_poles, respond
 from ctrl_realize.numerics.engine.problem import KnownFactor, Problem, Structure
 from ctrl_realize.numerics.engine.profile import dead_time_error
 from ctrl_realize.numerics.engine.responses import StepSequence

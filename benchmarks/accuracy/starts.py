@@ -8,8 +8,8 @@ from dataclasses import replace
 import numpy as np
 from joblib import Parallel, delayed
 
-from ctrl_realize.numerics.engine.batch_search import fit_batch
-from ctrl_realize.numerics.engine.poles import parameters_from_poles
+from ctrl_realize.numerics.engine.descend import fit_batch
+from ctrl_realize.numerics.engine.modal import parameters_from_poles
 from ctrl_realize.numerics.engine.problem import KnownFactor, Structure
 from ctrl_realize.numerics.engine.structures import parameter_bounds, search
 from ctrl_realize.numerics.output_error.step_data import step_data, step_scales, window

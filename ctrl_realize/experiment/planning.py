@@ -21,8 +21,8 @@ from ..identification.bound import WANTED, Bound, Experiment, Wanted
 from ..identification.noise import NoiseModel
 from ..identification.plausible import continuous_core
 from ..numerics.arrays import FloatArray
+from ..numerics.engine.modal import lag_sum
 from ..numerics.engine.plausible_models import PlausibleModel
-from ..numerics.engine.poles import lag_sum
 from ..numerics.loops.relay import relay_loop
 from ..numerics.state_space.sampling import sample_with_dead_time
 from .first import Known, known_from

@@ -12,7 +12,7 @@ from .._checks import numbers
 from .._wording import in_time, interval_in_time, time_and_interval, time_within
 from ..numerics.arrays import ComplexArray, FloatArray
 from ..numerics.constants import Z_95
-from ..numerics.engine.poles import parameters_from_poles
+from ..numerics.engine.modal import parameters_from_poles
 from ..numerics.engine.problem import Structure
 from ..numerics.engine.static_gain import static_gain
 from ..numerics.engine.structures import Candidate

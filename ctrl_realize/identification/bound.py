@@ -25,9 +25,8 @@ from ..errors import UnsuitableSystemError
 from ..numerics.arrays import BoolArray, ComplexArray, FloatArray
 from ..numerics.constants import SMALLEST
 from ..numerics.engine.local_terms import Segments, local_columns
-from ..numerics.engine.modal import respond
+from ..numerics.engine.modal import parameters_from_poles, poles_from_parameters, respond
 from ..numerics.engine.plausible_models import PlausibleModel
-from ..numerics.engine.poles import parameters_from_poles, poles_from_parameters
 from ..numerics.engine.problem import KnownFactor, Problem, Structure
 from ..numerics.engine.responses import SampledInput
 from ..numerics.engine.static_gain import LocalErrors, local_errors, parameter_steps

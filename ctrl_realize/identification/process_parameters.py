@@ -10,7 +10,7 @@ from .._parameters import Parameter, slope_unit
 from .._wording import in_time
 from ..numerics.arrays import ComplexArray, FloatArray
 from ..numerics.constants import Z_95
-from ..numerics.engine.poles import lag_sum
+from ..numerics.engine.modal import lag_sum
 from ..numerics.engine.profile import JUMP
 from ..numerics.families.physical import ProcessParameter
 

@@ -35,8 +35,8 @@ from ..errors import DataError, DataWarning
 from ..numerics.arrays import FloatArray
 from ..numerics.blas_threads import single_threaded
 from ..numerics.constants import SMALLEST
+from ..numerics.engine.modal import lag_sum
 from ..numerics.engine.plausible_models import PlausibleModel
-from ..numerics.engine.poles import lag_sum
 from ..numerics.families.physical import ProcessParameter, process_parameters
 from ..numerics.output_error.result import ProcessEstimate
 from .impulse.from_io import impulse_from_io

@@ -8,8 +8,11 @@ from typing import NamedTuple
 import numpy as np
 
 from ctrl_realize.numerics.engine.local_terms import solve_upper
-from ctrl_realize.numerics.engine.modal import moved_amplitudes, partial_fractions
-from ctrl_realize.numerics.engine.poles import poles_from_parameters
+from ctrl_realize.numerics.engine.modal import (
+    moved_amplitudes,
+    partial_fractions,
+    poles_from_parameters,
+)
 from ctrl_realize.numerics.signals.sines import Sines
 
 

@@ -22,7 +22,7 @@ from ...numerics.blas_threads import single_threaded
 from ...numerics.constants import SMALLEST
 from ...numerics.engine.problem import KnownFactor, Structure
 from ...numerics.engine.structures import Scales
-from ...numerics.engine.window import Window
+from ...numerics.engine.window_fit import Window
 from ...numerics.joint.data import JointData, sampled_part, step_part
 from ...numerics.joint.effects import Effect, with_random_effects
 from ...numerics.joint.fit import joint_fit

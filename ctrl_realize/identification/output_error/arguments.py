@@ -16,7 +16,7 @@ from ...delayed.operands import Linear
 from ...errors import DataError, NoStepError, UnsuitableSystemError
 from ...numerics.arrays import FloatArray
 from ...numerics.constants import SMALLEST
-from ...numerics.engine.poles import separated
+from ...numerics.engine.modal import separated
 from ...numerics.engine.problem import KnownFactor
 from ...numerics.output_error.step_data import StepData, step_data
 from ...numerics.rules import Rule

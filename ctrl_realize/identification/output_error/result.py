@@ -20,8 +20,8 @@ from ..._wording import (
 )
 from ...data import Record
 from ...numerics.arrays import ComplexArray, FloatArray, locked
+from ...numerics.engine.modal import lag_sum
 from ...numerics.engine.plausible_models import PlausibleModel
-from ...numerics.engine.poles import lag_sum
 from ...numerics.engine.static_gain import INTEGRATOR
 from ...numerics.output_error.result import OutputErrorEstimate, StructureFit
 from ...numerics.output_error.step_data import StepData

@@ -16,7 +16,7 @@ from ...errors import DataError, DataWarning, DelayRangeError
 from ...numerics.arrays import FloatArray, IntArray
 from ...numerics.constants import VERY_STRONG
 from ...numerics.output_error.any_input.stretch import FOLLOWS
-from ...numerics.output_error.margins import CLOSE
+from ...numerics.output_error.selection import CLOSE
 from ...numerics.state_space.delay_split import split_delays
 from ..impulse.from_io import Method, Start, impulse_from_io
 from ..realization.mimo import delay_matrix

@@ -21,8 +21,7 @@ import numpy as np
 from scipy.signal import lfilter
 
 from ..arrays import ComplexArray, FloatArray
-from ..engine.modal import partial_fractions
-from ..engine.poles import poles_from_parameters
+from ..engine.modal import partial_fractions, poles_from_parameters
 from ..engine.problem import Bounds, Problem, Structure
 from ..engine.responses import TOGETHER
 from ..engine.structures import Scales, parameter_bounds

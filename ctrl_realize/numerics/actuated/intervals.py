@@ -18,8 +18,7 @@ import numpy as np
 
 from ..arrays import FloatArray
 from ..constants import CHI2_95, Z_95
-from ..engine.batch_search import fit_batch
-from ..engine.descend import descend
+from ..engine.descend import descend, fit_batch
 from ..engine.problem import Problem
 from ..engine.profile import bracket_ends, profile_limits, root_of
 from ..engine.static_gain import LocalErrors

@@ -14,8 +14,8 @@ import numpy as np
 
 from ..arrays import FloatArray
 from ..constants import SMALLEST
-from ..engine.batch_search import fit_batch
-from ..engine.poles import parameters_from_poles
+from ..engine.descend import fit_batch
+from ..engine.modal import parameters_from_poles
 from ..engine.problem import Problem, Structure
 from ..engine.structures import Candidate, neighbour_starts, pattern_starts
 from ..families.shaped import lowest

@@ -20,8 +20,8 @@ from ..constants import VERY_STRONG
 from ..rules import Rule
 from .descend import descend
 from .eliminate import eliminate
+from .modal import parameters_from_poles
 from .newton import settle
-from .poles import parameters_from_poles
 from .problem import Bounds, Family, Problem, Structure
 from .structures import (
     Candidate,

@@ -32,8 +32,7 @@ import numpy as np
 from ..arrays import ComplexArray, FloatArray
 from ..signals.sines import Sines
 from .local_terms import LocalTerms, solve_upper, triangle
-from .modal import RealModes, moved_amplitudes, partial_fractions
-from .poles import poles_from_parameters
+from .modal import RealModes, moved_amplitudes, partial_fractions, poles_from_parameters
 from .problem import Compressed, Eliminated, Evaluation, Family, Mapped, Problem, Structure
 
 # The C library of Linux returns freed memory to the system beyond twice the largest block that was

@@ -30,7 +30,7 @@ from ..arrays import ComplexArray, FloatArray
 from ..blas_threads import one_blas_thread
 from ..constants import SMALLEST, VERY_STRONG
 from .eliminate import drawn_numerators, eliminate
-from .poles import poles_from_parameters
+from .modal import poles_from_parameters
 from .problem import Bounds, Family, Structure
 from .static_gain import local_errors
 from .structures import Candidate, parameter_bounds

@@ -4,7 +4,7 @@ The model of one record is
 
     y(t) = L^-1{ exp(-tau s) b(s) K(s) U(s) / a(s) } + fixed regressors,
 
-with a monic `a` of order n (see `poles`), `b` of degree n - r (r: relative degree) and known
+with a monic `a` of order n (see `modal`), `b` of degree n - r (r: relative degree) and known
 dynamics K in cascade. Numerator, regressors and local terms enter linearly and are eliminated
 [1]_, see `eliminate`.
 

@@ -27,8 +27,7 @@ from ..arrays import BoolArray, ComplexArray, FloatArray, unit_columns
 from ..constants import PIECE, SMALLEST, Z_95
 from .eliminate import eliminate, evaluate
 from .local_terms import LocalTerms
-from .modal import partial_fractions, responses
-from .poles import lag_sum, poles_from_parameters
+from .modal import lag_sum, partial_fractions, poles_from_parameters, responses
 from .problem import Family, Problem
 from .structures import Candidate
 

@@ -24,8 +24,8 @@ import numpy as np
 from ..arrays import ComplexArray, FloatArray
 from ..constants import SMALLEST, VERY_STRONG
 from ..rules import Rule
-from .batch_search import fit_batch
-from .poles import parameters_from_poles, poles_from_parameters
+from .descend import fit_batch
+from .modal import parameters_from_poles, poles_from_parameters
 from .problem import Bounds, Family, Problem, Structure
 
 ALL_STRUCTURES = tuple(Structure(n, r) for n in range(1, 6) for r in range(n, 0, -1))

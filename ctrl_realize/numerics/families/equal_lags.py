@@ -27,7 +27,7 @@ import numpy as np
 from ..arrays import FloatArray
 from ..constants import Z_95
 from ..engine.eliminate import eliminate
-from ..engine.poles import lag_sum
+from ..engine.modal import lag_sum
 from ..engine.problem import Bounds, Mapped, Problem, Structure
 from ..engine.profile import dead_time_error
 from ..engine.structures import Candidate, Scales

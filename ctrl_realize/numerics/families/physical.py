@@ -21,7 +21,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..arrays import ComplexArray, FloatArray
-from ..engine.poles import poles_from_parameters
+from ..engine.modal import poles_from_parameters
 from ..engine.problem import Problem
 from ..engine.static_gain import INTEGRATOR, local_errors
 from ..engine.structures import Candidate

@@ -23,12 +23,11 @@ import numpy as np
 
 from ..engine.eliminate import evaluate
 from ..engine.local_terms import Segments
-from ..engine.poles import parameters_from_poles
+from ..engine.modal import parameters_from_poles
 from ..engine.problem import KnownFactor, Problem
 from ..engine.responses import SeveralInputs
 from ..engine.structures import Scales
-from ..engine.window import Window
-from ..engine.window_fit import weighted_correlation
+from ..engine.window_fit import Window, weighted_correlation
 from ..output_error.any_input.data import SampledData
 from ..output_error.any_input.window import window_of
 from ..output_error.result import OutputErrorEstimate

@@ -30,7 +30,7 @@ from ..engine.modal import respond
 from ..engine.problem import KnownFactor
 from ..engine.responses import SampledInput
 from ..engine.structures import Candidate
-from ..engine.window import Window
+from ..engine.window_fit import Window
 from ..output_error.result import OutputErrorEstimate
 from ..signals.sines import stacked_parts
 from ..validation.own_response import response_slopes

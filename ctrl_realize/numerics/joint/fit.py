@@ -19,7 +19,7 @@ import numpy as np
 
 from ..arrays import ComplexArray, FloatArray
 from ..engine.compared_fits import converged
-from ..engine.poles import parameters_from_poles
+from ..engine.modal import parameters_from_poles
 from ..engine.problem import Structure
 from ..engine.structures import Candidate, search
 from ..engine.window_fit import with_known_noise

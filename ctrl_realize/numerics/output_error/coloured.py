@@ -19,8 +19,8 @@ from dataclasses import replace
 import numpy as np
 
 from ..arrays import FloatArray, IntArray
-from ..engine.batch_search import fit_batch
 from ..engine.compared_fits import converged
+from ..engine.descend import fit_batch
 from ..engine.eliminate import eliminate
 from ..engine.problem import Problem, Structure
 from ..engine.static_gain import local_errors

@@ -22,8 +22,8 @@ import numpy as np
 
 from ..constants import CHI2_95
 from ..engine.descend import descend
+from ..engine.modal import parameters_from_poles, poles_from_parameters
 from ..engine.newton import settle
-from ..engine.poles import parameters_from_poles, poles_from_parameters
 from ..engine.problem import Family, KnownFactor, Structure
 from ..engine.static_gain import StaticGain
 from ..engine.structures import Candidate, parameter_bounds

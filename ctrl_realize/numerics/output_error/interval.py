@@ -63,9 +63,8 @@ from ..families.equal_lags import (
 from ..families.flow import DispersedFlow
 from ..rules import Rule
 from .extrapolation import least_extrapolating
-from .margins import CloseDecision, close_choices, close_exclusions
 from .result import DelayInterval, DistributedLags, OtherModel, OutputErrorEstimate, assembled
-from .selection import Choice, choose_model
+from .selection import Choice, CloseDecision, choose_model, close_choices, close_exclusions
 
 _UNSEEN = 3.0
 """How far before the dead time a beginning that is open may lie, in times from there to the first

@@ -33,8 +33,7 @@ import numpy as np
 
 from ..arrays import FloatArray
 from ..constants import OUTLIER, SMALLEST, VERY_STRONG
-from ..engine.batch_search import fit_batch
-from ..engine.descend import descend
+from ..engine.descend import descend, fit_batch
 from ..engine.eliminate import eliminate, evaluate
 from ..engine.modal import partial_fractions
 from ..engine.problem import Problem, Structure

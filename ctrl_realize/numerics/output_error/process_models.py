@@ -26,10 +26,9 @@ from ..families.process_form import ProcessForm
 from ..families.slow_lags import fit_slow_lags
 from ..signals.noise import correlation_time
 from .interval import likelihood_fit
-from .margins import CloseDecision
 from .other_structures import Compared, Requested, better_than, line_of
 from .result import OtherStructures, OutputErrorEstimate, ProcessEstimate, StructureFit
-from .selection import chains_of
+from .selection import CloseDecision, chains_of
 
 _CONTRADICTED = 1.01
 """Sum of squares over that without the prescriptions, from which on these are no small error."""

@@ -20,9 +20,8 @@ import numpy as np
 from ..arrays import ComplexArray, FloatArray, IntArray
 from ..blas_threads import one_blas_thread
 from ..engine.eliminate import eliminate, evaluate
-from ..engine.modal import respond
+from ..engine.modal import lag_sum, respond
 from ..engine.plausible_models import PlausibleDraw, PlausibleModel
-from ..engine.poles import lag_sum
 from ..engine.problem import Structure
 from ..engine.profile import Points, Profile, profile_limits
 from ..engine.static_gain import StaticGain, averaged_ends, gain_ends
@@ -37,7 +36,7 @@ from ..families.process_form import ProcessForm
 from ..signals.correlation import fit_percent
 from ..signals.load_step import LoadStep
 from .extrapolation import least_extrapolating
-from .margins import CloseDecision
+from .selection import CloseDecision
 
 _LEAST_WIDTH = 1e-6  # samples
 AT_BOUND = 0.98  # of the range of dead times, from which on an interval reaches its bound

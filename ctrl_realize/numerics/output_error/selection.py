@@ -5,6 +5,11 @@ Besides the free structures there are chains of lags and axial dispersion, with 
 
 Compared by BIC [1]_, [2]_: lags, chains of lags [3]_ and dispersion [4]_.
 
+Decisions may be so close that rounding, or another processor, changes them. All values that are
+compared have converged (`compared_fits`): different rounding of the same record changes them by
+much less than `CLOSE`; structures that were not followed to their minimum by hundredths of a
+variance at most. The definition of close is our own rule.
+
 References
 ----------
 .. [1] G. Schwarz, Estimating the dimension of a model, Ann. Statist. 6 (1978) 461-464,
@@ -21,10 +26,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Literal, TypeAlias
 
 from ..constants import VERY_STRONG
 from ..engine.problem import Structure
-from ..engine.structures import Candidate, choose, needless_parameters, search
+from ..engine.structures import Candidate, charged, choose, needless_parameters, plausible, search
 from ..engine.window_fit import WindowFit
 from ..families.equal_lags import FREE_IN_A_CHAIN, LagChain, fit_chains, fit_diffusion
 from ..families.flow import DispersedFlow, fit_flows
@@ -36,6 +42,11 @@ lags that grow fourfold and more one hides beside the first."""
 
 _BEHIND_A_FLOW = tuple(Structure(n, r) for n in range(3, 7) for r in range(n, 0, -1))
 """Fewer lags cannot follow a flow that is clearly better than lags."""
+CLOSE = 1e-3
+"""Distance from a threshold, as a part of it, within which a decision is called close. Structures
+compare by the part of `VERY_STRONG` by which their criteria differ: a hundredth of a variance."""
+
+DecisionKey: TypeAlias = Literal["structure", "ruled_out", "adequate", "likelihood"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,3 +125,43 @@ def _behind(fits: WindowFit, flow: DispersedFlow) -> Candidate | None:
     # Their number is not penalised, since they only represent the dispersion model.
     good = {structure: model for structure, model in found.items() if model.cost <= limit}
     return good[choose(fits.criteria(good))] if good else None
+
+
+@dataclass(frozen=True)
+class CloseDecision:
+    """A decision near its threshold: its kind, and the structure that would be chosen instead."""
+
+    key: DecisionKey
+    structure: Structure | None = None
+
+
+def close_to(key: DecisionKey, value: float, threshold: float) -> tuple[CloseDecision, ...]:
+    """Report a value within `CLOSE` of its threshold."""
+    return (CloseDecision(key),) if abs(value - threshold) <= CLOSE * threshold else ()
+
+
+def close_choices(fits: WindowFit, level: float, chosen: Structure) -> tuple[CloseDecision, ...]:
+    """List structures whose criterion nearly equals `level`, that of the chosen one.
+
+    Frequencies of pairs are charged, as in the choice. Also those that could have determined the
+    noise level, on which everything depends.
+    """
+    level += fits.frequency_charge(chosen)
+    near = [
+        s
+        for s, value in fits.criterion.items()
+        if abs(value + needless_parameters(s) + fits.frequency_charge(s) - level)
+        <= CLOSE * VERY_STRONG
+    ]
+    near += [s for s, excess in fits.rivals.items() if excess <= CLOSE * VERY_STRONG]
+    return tuple(CloseDecision("structure", s) for s in dict.fromkeys(near) if s != chosen)
+
+
+def close_exclusions(fits: WindowFit, level: float, chosen: Structure) -> tuple[CloseDecision, ...]:
+    """List structures that are just ruled out, or just not; `level` includes penalties."""
+    values = charged(fits.criterion, fits.penalty)
+    most, least = (
+        plausible(fits.candidates, values, fits.variance, fits.candidates[chosen], level, slack)
+        for slack in (CLOSE * VERY_STRONG, -CLOSE * VERY_STRONG)
+    )
+    return tuple(CloseDecision("ruled_out", s) for s in most if s not in least)

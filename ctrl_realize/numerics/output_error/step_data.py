@@ -32,8 +32,7 @@ from ..engine.modal import respond
 from ..engine.problem import KnownFactor, Problem, Structure
 from ..engine.responses import StepSequence
 from ..engine.structures import SIMPLE_STRUCTURES, Candidate, Scales, needless_parameters
-from ..engine.window import Window
-from ..engine.window_fit import WindowFit
+from ..engine.window_fit import Window, WindowFit
 from ..rules import Rule
 from ..signals.baseline import noise_about_a_motion, relaxation
 from ..signals.bins import response_bins

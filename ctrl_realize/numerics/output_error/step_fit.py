@@ -88,12 +88,11 @@ from .coloured import in_coloured_noise
 from .extrapolation import least_extrapolating
 from .interval import likelihood_fit, profile_of
 from .load import load_of
-from .margins import CloseDecision, close_to
 from .other_structures import Compared, Requested, other_structures
 from .process_models import fit_requested
 from .result import AT_BOUND, DelayInterval, OutputErrorEstimate, RobustKey, assembled, followed_by
 from .rounded import in_rounded_data
-from .selection import chains_of, flows_of
+from .selection import CloseDecision, chains_of, close_to, flows_of
 from .step_data import StepData, fitted_from_rest, settled_at, step_scales, stop_at, window
 
 ADEQUATE = 1.3

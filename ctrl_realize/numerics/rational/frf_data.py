@@ -23,11 +23,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import ComplexArray, FloatArray
-from ..engine.batch_search import fit_batch
-from ..engine.descend import descend
+from ..engine.descend import descend, fit_batch
 from ..engine.eliminate import evaluate
-from ..engine.modal import partial_fractions
-from ..engine.poles import poles_from_parameters
+from ..engine.modal import partial_fractions, poles_from_parameters
 from ..engine.problem import Bounds, Evaluation, KnownFactor, Problem, Structure
 from ..engine.profile import Points, profile_curve, profile_limits, with_ends, without_points
 from ..engine.structures import Candidate, Scales, parameter_bounds

@@ -22,7 +22,7 @@ import numpy as np
 
 from ..arrays import ComplexArray, FloatArray
 from ..engine.compared_fits import settled
-from ..engine.poles import parameters_from_poles
+from ..engine.modal import parameters_from_poles
 from ..engine.problem import Structure
 from ..engine.structures import Candidate
 from .frf_data import FRFData, refined

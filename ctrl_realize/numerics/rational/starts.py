@@ -22,7 +22,7 @@ import numpy as np
 
 from ..arrays import ComplexArray, FloatArray
 from ..engine.eliminate import eliminate
-from ..engine.poles import parameters_from_poles
+from ..engine.modal import parameters_from_poles
 from ..engine.problem import Structure
 from ..engine.structures import Candidate, parameter_bounds
 from .frf_data import FRFData

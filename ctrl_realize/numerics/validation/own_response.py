@@ -23,8 +23,7 @@ import numpy as np
 from scipy.special import chdtrc, ndtri, stdtrit
 
 from ..arrays import ComplexArray, FloatArray, unit_columns
-from ..engine.modal import respond
-from ..engine.poles import parameters_from_poles
+from ..engine.modal import parameters_from_poles, respond
 from ..engine.problem import KnownFactor
 from ..engine.responses import HeldInput
 from ..signals.correlation import fit_percent

@@ -8,7 +8,7 @@ import numpy as np
 import ctrl_realize as cr
 from ctrl_realize.numerics.actuated.family import actuated_family
 from ctrl_realize.numerics.actuated.records import MOST_SAMPLES, ActuatedRecord, Records
-from ctrl_realize.numerics.engine.poles import parameters_from_poles
+from ctrl_realize.numerics.engine.modal import parameters_from_poles
 from ctrl_realize.numerics.engine.structures import Scales
 
 

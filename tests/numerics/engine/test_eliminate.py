@@ -6,11 +6,10 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from ctrl_realize.numerics.engine.batch_search import fit_batch
+from ctrl_realize.numerics.engine.descend import fit_batch
 from ctrl_realize.numerics.engine.eliminate import compress, drawn_numerators, eliminate, evaluate
 from ctrl_realize.numerics.engine.local_terms import Segments
-from ctrl_realize.numerics.engine.modal import respond
-from ctrl_realize.numerics.engine.poles import parameters_from_poles
+from ctrl_realize.numerics.engine.modal import parameters_from_poles, respond
 from ctrl_realize.numerics.engine.problem import KnownFactor, Problem, Structure
 from ctrl_realize.numerics.engine.responses import SampledInput, SeveralInputs, StepSequence
 from ctrl_realize.numerics.engine.structures import Scales, parameter_bounds, search

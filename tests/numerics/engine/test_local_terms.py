@@ -5,7 +5,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from ctrl_realize.numerics.engine.local_terms import LocalTerms, Segments
-from ctrl_realize.numerics.engine.poles import poles_from_parameters
+from ctrl_realize.numerics.engine.modal import poles_from_parameters
 
 CLOCK = np.concatenate([np.arange(70.0), np.arange(110.0)])
 EDGES = np.array([0, 70, 180])

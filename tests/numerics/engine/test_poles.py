@@ -5,7 +5,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from ctrl_realize.numerics.constants import VERY_STRONG
-from ctrl_realize.numerics.engine.poles import parameters_from_poles, poles_from_parameters
+from ctrl_realize.numerics.engine.modal import parameters_from_poles, poles_from_parameters
 from ctrl_realize.numerics.engine.problem import Structure
 from ctrl_realize.numerics.engine.responses import StepSequence
 from ctrl_realize.numerics.engine.structures import (

@@ -7,14 +7,13 @@ from scipy.integrate import quad
 from scipy.special import gammainc
 from scipy.stats import invgauss
 
-from ctrl_realize.numerics.engine.batch_search import fit_batch
-from ctrl_realize.numerics.engine.poles import parameters_from_poles
+from ctrl_realize.numerics.engine.descend import fit_batch
+from ctrl_realize.numerics.engine.modal import parameters_from_poles
 from ctrl_realize.numerics.engine.problem import KnownFactor, Structure
 from ctrl_realize.numerics.engine.structures import Candidate, parameter_bounds
-from ctrl_realize.numerics.engine.window import window_of_rows
-from ctrl_realize.numerics.engine.window_fit import with_known_noise
+from ctrl_realize.numerics.engine.window_fit import window_of_rows, with_known_noise
 from ctrl_realize.numerics.families.equal_lags import fit_diffusion
-from ctrl_realize.numerics.families.residence import flow_modes
+from ctrl_realize.numerics.families.flow import flow_modes
 from ctrl_realize.numerics.output_error.step_data import step_data, step_scales, window
 
 SIGMA = 1e-3

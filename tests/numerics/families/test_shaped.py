@@ -11,8 +11,7 @@ from ctrl_realize.numerics.engine.eliminate import eliminate
 from ctrl_realize.numerics.engine.problem import Bounds, KnownFactor, Structure
 from ctrl_realize.numerics.engine.static_gain import static_gain
 from ctrl_realize.numerics.engine.structures import Candidate
-from ctrl_realize.numerics.engine.window import window_of_rows
-from ctrl_realize.numerics.engine.window_fit import with_known_noise
+from ctrl_realize.numerics.engine.window_fit import window_of_rows, with_known_noise
 from ctrl_realize.numerics.families.equal_lags import fit_chains
 from ctrl_realize.numerics.families.flow import fit_flows
 from ctrl_realize.numerics.families.form_fit import fit_form, form_family

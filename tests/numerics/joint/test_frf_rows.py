@@ -7,8 +7,7 @@ from numpy.testing import assert_allclose
 
 from ctrl_realize.numerics.engine.eliminate import compress, evaluate
 from ctrl_realize.numerics.engine.local_terms import Segments
-from ctrl_realize.numerics.engine.modal import respond
-from ctrl_realize.numerics.engine.poles import parameters_from_poles
+from ctrl_realize.numerics.engine.modal import parameters_from_poles, respond
 from ctrl_realize.numerics.engine.problem import KnownFactor, Problem, Structure
 from ctrl_realize.numerics.engine.responses import SampledInput
 from ctrl_realize.numerics.joint.data import with_rows

@@ -13,8 +13,8 @@ from ctrl_realize.numerics.engine.problem import KnownFactor, Structure
 from ctrl_realize.numerics.engine.structures import Scales, needless_parameters
 from ctrl_realize.numerics.engine.window_fit import WindowFit, fit_window
 from ctrl_realize.numerics.output_error.interval import laid_profiles, likelihood_fit, lower_minima
-from ctrl_realize.numerics.output_error.margins import CLOSE, close_to
 from ctrl_realize.numerics.output_error.result import DelayInterval
+from ctrl_realize.numerics.output_error.selection import CLOSE, close_to
 from ctrl_realize.numerics.output_error.step_data import step_data, step_scales, window
 from tests import rigs
 

@@ -5,7 +5,7 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy import signal
 
-from ctrl_realize.numerics.engine.poles import parameters_from_poles
+from ctrl_realize.numerics.engine.modal import parameters_from_poles
 from ctrl_realize.numerics.engine.problem import Structure
 from ctrl_realize.numerics.engine.structures import Candidate
 from ctrl_realize.numerics.rational.frf_data import FRFData, modal_state_space

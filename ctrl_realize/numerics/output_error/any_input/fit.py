@@ -28,22 +28,19 @@ from ...arrays import FloatArray
 from ...constants import Z_95
 from ...engine.compared_fits import converged
 from ...engine.local_terms import local_columns
-from ...engine.modal import respond
-from ...engine.poles import lag_sum, parameters_from_poles, poles_from_parameters
+from ...engine.modal import lag_sum, parameters_from_poles, poles_from_parameters, respond
 from ...engine.problem import KnownFactor, Problem, Structure
 from ...engine.profile import dead_time_error
 from ...engine.structures import Candidate, search
-from ...engine.window import window_of_rows
-from ...engine.window_fit import WindowFit, extended, with_known_noise
+from ...engine.window_fit import WindowFit, extended, window_of_rows, with_known_noise
 from ...rules import Rule
 from ...signals.noise import correlation_time, winsorised_sigma
 from ...validation.own_response import OwnResponse, matched, response_slopes
 from ..interval import likelihood_fit
-from ..margins import close_to
 from ..other_structures import Compared, Requested, other_structures
 from ..process_models import fit_requested
 from ..result import OutputErrorEstimate, followed_by, followed_percent, levels
-from ..selection import chains_of
+from ..selection import chains_of, close_to
 from .condensed import MOST_LAGS, Condensed, condensed
 from .data import BEYOND, MOST_SAMPLES, Load, SampledData, cut
 from .lag_weights import posterior_of

@@ -28,9 +28,8 @@ from ...constants import SMALLEST, STRONG, VERY_STRONG
 from ...engine.compared_fits import settled
 from ...engine.eliminate import evaluate
 from ...engine.local_terms import local_columns
-from ...engine.modal import respond
+from ...engine.modal import poles_from_parameters, respond
 from ...engine.plausible_models import PlausibleModel
-from ...engine.poles import poles_from_parameters
 from ...engine.problem import Problem, Structure
 from ...engine.static_gain import StaticGain, local_errors
 from ...engine.structures import (
@@ -41,8 +40,7 @@ from ...engine.structures import (
     pattern_starts,
     search,
 )
-from ...engine.window import Window, window_of_rows
-from ...engine.window_fit import WindowFit, fit_window
+from ...engine.window_fit import Window, WindowFit, fit_window, window_of_rows
 from ...rules import Rule
 from ...signals.noise import correlation_time, quantisation_step, winsorised_sigma
 from ...signals.noise_model import noise_lags, whitening_filter
