@@ -14,9 +14,13 @@ from ..delayed import DelayedStateSpace
 from ..errors import DataError, OptionError, OrderError
 from ..numerics.arrays import FloatArray
 from ..numerics.blas_threads import single_threaded
-from ..numerics.rational.error_floor import fits_with_unknown_errors
 from ..numerics.rational.frf_data import FRFData
-from ..numerics.rational.search import DEFAULT_ORDERS, dead_time_bound, fit_structures
+from ..numerics.rational.search import (
+    DEFAULT_ORDERS,
+    dead_time_bound,
+    fit_structures,
+    fits_with_unknown_errors,
+)
 from ..numerics.rational.spectra import hold_response
 from ..numerics.rational.starts import longest_search
 from .frf_selection import chosen_model

@@ -16,10 +16,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..numerics.engine.compared_fits import settled
 from ..numerics.engine.problem import Structure
 from ..numerics.engine.profile import Points, dead_time_error, profile_points
-from ..numerics.engine.structures import Candidate
+from ..numerics.engine.structures import Candidate, settled
 from ..numerics.output_error.interval import LOWER, MOST_ROUNDS
 from ..numerics.rational.frf_data import FRFData, dead_time_interval
 from ..numerics.rational.search import (

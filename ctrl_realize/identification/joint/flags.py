@@ -11,7 +11,7 @@ from ..._flags import Flag, flagged
 from ..._wording import in_time, interval_in_time
 from ...frequency.comparison import hertz
 from ...frequency.disagreement import FAR
-from ...numerics.joint.agreement import BY_CHANCE
+from ...numerics.joint.fit import BY_CHANCE
 from ...numerics.rational.bands import running_median, widest_run
 from ...numerics.signals.noise import largest_excess
 from ..output_error.flags import model_flags

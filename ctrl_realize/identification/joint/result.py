@@ -11,7 +11,7 @@ from ..._wording import time_within
 from ...frequency.frf_fit import FRFFit
 from ...numerics.arrays import ComplexArray, FloatArray
 from ...numerics.constants import Z_95
-from ...numerics.joint.agreement import Agreement
+from ...numerics.joint.fit import Agreement
 from ...results import IntervalKind
 from ..output_error.result import OutputErrorFit
 

@@ -36,7 +36,6 @@ from ..constants import HUBER, SMALLEST, VERY_STRONG, Z_95
 from ..rules import Rule
 from ..signals.bins import Bins
 from ..signals.noise import correlation_of_noise, correlation_time, is_coarse, mad_sigma
-from .compared_fits import converged, on_new_data, settled
 from .eliminate import evaluate
 from .local_terms import Segments
 from .modal import respond
@@ -47,10 +46,13 @@ from .structures import (
     Candidate,
     Scales,
     choose,
+    converged,
     criteria,
     needless_parameters,
+    on_new_data,
     parameter_charge,
     search,
+    settled,
 )
 
 _PASSES = 2  # of modified residuals; see `fit_window`

@@ -37,12 +37,11 @@ from scipy.special import erfcx
 
 from ..arrays import ComplexArray, FloatArray
 from ..constants import VERY_STRONG
-from ..engine.compared_fits import REACH
 from ..engine.eliminate import eliminate
 from ..engine.modal import moved_amplitudes, partial_fractions
 from ..engine.problem import Bounds, KnownFactor, Problem
 from ..engine.responses import StepSequence
-from ..engine.structures import Candidate
+from ..engine.structures import REACH, Candidate
 from ..engine.window_fit import WindowFit
 from ..rules import Rule
 from .equal_lags import time_moments

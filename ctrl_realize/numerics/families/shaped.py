@@ -24,12 +24,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..arrays import ComplexArray, FloatArray
-from ..engine.compared_fits import CLOSE
 from ..engine.descend import descend
 from ..engine.eliminate import compress_mapped, evaluate_mapped, evaluate_shaped
 from ..engine.newton import settle
 from ..engine.problem import Compressed, Evaluation, Family, Mapped, Problem
-from ..engine.structures import Candidate, apart
+from ..engine.structures import CLOSE, Candidate, apart
 
 _OTHERS = 1  # ends beside the best that are followed to their minimum, if they are as close
 

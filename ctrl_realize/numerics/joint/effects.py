@@ -24,12 +24,11 @@ from typing import Literal, TypeAlias
 import numpy as np
 
 from ..arrays import FloatArray
-from ..engine.compared_fits import settled
 from ..engine.eliminate import evaluate
 from ..engine.modal import respond
 from ..engine.problem import KnownFactor
 from ..engine.responses import SampledInput
-from ..engine.structures import Candidate
+from ..engine.structures import Candidate, settled
 from ..engine.window_fit import Window
 from ..output_error.result import OutputErrorEstimate
 from ..signals.sines import stacked_parts

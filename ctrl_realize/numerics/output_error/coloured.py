@@ -19,12 +19,18 @@ from dataclasses import replace
 import numpy as np
 
 from ..arrays import FloatArray, IntArray
-from ..engine.compared_fits import converged
 from ..engine.descend import fit_batch
 from ..engine.eliminate import eliminate
 from ..engine.problem import Problem, Structure
 from ..engine.static_gain import local_errors
-from ..engine.structures import Candidate, Scales, choose, neighbour_starts, parameter_bounds
+from ..engine.structures import (
+    Candidate,
+    Scales,
+    choose,
+    converged,
+    neighbour_starts,
+    parameter_bounds,
+)
 from ..engine.window_fit import WindowFit
 from ..rules import Rule
 from ..signals.noise import correlation_time, mad_sigma

@@ -38,7 +38,6 @@ from dataclasses import replace
 import numpy as np
 
 from ..constants import VERY_STRONG, Z_95
-from ..engine.compared_fits import settled
 from ..engine.descend import descend
 from ..engine.problem import Structure
 from ..engine.profile import (
@@ -51,7 +50,14 @@ from ..engine.profile import (
     with_ends,
     without_points,
 )
-from ..engine.structures import Candidate, charged, least_charge, parameter_bounds, plausible
+from ..engine.structures import (
+    Candidate,
+    charged,
+    least_charge,
+    parameter_bounds,
+    plausible,
+    settled,
+)
 from ..engine.window_fit import WindowFit
 from ..families.equal_lags import (
     FREE_IN_A_CHAIN,
@@ -62,9 +68,15 @@ from ..families.equal_lags import (
 )
 from ..families.flow import DispersedFlow
 from ..rules import Rule
-from .extrapolation import least_extrapolating
 from .result import DelayInterval, DistributedLags, OtherModel, OutputErrorEstimate, assembled
-from .selection import Choice, CloseDecision, choose_model, close_choices, close_exclusions
+from .selection import (
+    Choice,
+    CloseDecision,
+    choose_model,
+    close_choices,
+    close_exclusions,
+    least_extrapolating,
+)
 
 _UNSEEN = 3.0
 """How far before the dead time a beginning that is open may lie, in times from there to the first

@@ -15,17 +15,20 @@ from dataclasses import dataclass, field, replace
 from functools import partial
 
 from ..constants import VERY_STRONG
-from ..engine.compared_fits import SLACK, converged, on_new_data, settled
 from ..engine.problem import KnownFactor, Structure
 from ..engine.profile import profile_limits
 from ..engine.structures import (
     ALL_STRUCTURES,
+    SLACK,
     Candidate,
     charged,
+    converged,
     least_charge,
     needless_parameters,
+    on_new_data,
     plausible,
     search,
+    settled,
 )
 from ..engine.window_fit import WindowFit
 from ..families.process_form import ProcessForm

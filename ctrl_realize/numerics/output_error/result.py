@@ -35,8 +35,7 @@ from ..families.physical import ProcessParameter, fitted_parameters
 from ..families.process_form import ProcessForm
 from ..signals.correlation import fit_percent
 from ..signals.load_step import LoadStep
-from .extrapolation import least_extrapolating
-from .selection import CloseDecision
+from .selection import CloseDecision, least_extrapolating
 
 _LEAST_WIDTH = 1e-6  # samples
 AT_BOUND = 0.98  # of the range of dead times, from which on an interval reaches its bound

@@ -71,12 +71,18 @@ from functools import cache, partial
 import numpy as np
 
 from ..constants import SMALLEST, Z_95
-from ..engine.compared_fits import at_dead_time
 from ..engine.eliminate import evaluate
 from ..engine.modal import respond
 from ..engine.problem import Structure
 from ..engine.profile import dead_time_error
-from ..engine.structures import ALL_STRUCTURES, SIMPLE_STRUCTURES, Candidate, Scales, choose
+from ..engine.structures import (
+    ALL_STRUCTURES,
+    SIMPLE_STRUCTURES,
+    Candidate,
+    Scales,
+    at_dead_time,
+    choose,
+)
 from ..engine.window_fit import WindowFit, among, fit_window, with_noise_of_residual
 from ..families.physical import process_parameters
 from ..rules import Rule
@@ -85,14 +91,13 @@ from ..signals.load_step import LoadStep
 from ..signals.noise import rounding_of_level
 from ..signals.noise_model import continues
 from .coloured import in_coloured_noise
-from .extrapolation import least_extrapolating
 from .interval import likelihood_fit, profile_of
 from .load import load_of
 from .other_structures import Compared, Requested, other_structures
 from .process_models import fit_requested
 from .result import AT_BOUND, DelayInterval, OutputErrorEstimate, RobustKey, assembled, followed_by
 from .rounded import in_rounded_data
-from .selection import CloseDecision, chains_of, close_to, flows_of
+from .selection import CloseDecision, chains_of, close_to, flows_of, least_extrapolating
 from .step_data import StepData, fitted_from_rest, settled_at, step_scales, stop_at, window
 
 ADEQUATE = 1.3

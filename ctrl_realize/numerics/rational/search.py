@@ -4,12 +4,21 @@ Structures are compared by BIC [1]_, [2]_. Where residuals are correlated along 
 of points is divided by ``(1 + r) / (1 - r)``, the variance factor of the mean of a first-order
 autoregression with correlation r between neighbours.
 
+Errors of which nothing is known are a part of the response and a floor. An error in proportion to
+the response would be none at an anti-resonance, whose few points then outweigh all others; a floor
+is an error that is the same everywhere, as of a noisy sensor. Both are variances of the complex
+error, estimated from residuals by maximum likelihood [3]_ (a regression of variances, [4]_).
+
 References
 ----------
 .. [1] G. Schwarz, Estimating the dimension of a model, Ann. Statist. 6 (1978) 461-464,
    doi:10.1214/aos/1176344136.
 .. [2] L. Ljung, System Identification: Theory for the User, 2nd ed., Prentice Hall 1999, section
    16.4 (Comparing model structures).
+.. [3] R. Pintelon and J. Schoukens, System Identification: A Frequency Domain Approach, 2nd ed.,
+   Wiley 2012, chapter 9, doi:10.1002/9781118287422.
+.. [4] M. Davidian and R. J. Carroll, Variance function estimation, J. Amer. Statist. Assoc. 82
+   (1987) 1079-1091, doi:10.1080/01621459.1987.10478543.
 """
 
 from __future__ import annotations
@@ -21,10 +30,10 @@ from functools import cache
 import numpy as np
 
 from ..arrays import ComplexArray, FloatArray
-from ..engine.compared_fits import settled
+from ..constants import VERY_STRONG
 from ..engine.modal import parameters_from_poles
 from ..engine.problem import Structure
-from ..engine.structures import Candidate
+from ..engine.structures import Candidate, settled
 from .frf_data import FRFData, refined
 from .starts import delay_grid, grown_starts, starting_points
 
@@ -40,6 +49,7 @@ _SETTLED = 10.0
 """Excess of the criterion up to which a structure is followed to its very minimum: it may be chosen
 or widen the interval."""
 _KEPT = 4  # starts followed to the end, and fits of every order that are extended: time
+_TRIED = 100  # floors over the range of the response: 10 % apart over four decades
 
 
 def dead_time_bound(response: ComplexArray, omega: FloatArray, sigma: FloatArray) -> float:
@@ -247,3 +257,86 @@ def points_as_one(residual: ComplexArray) -> float:
     if correlation < 2 / np.sqrt(residual.size):
         return 1.0
     return (1 + correlation) / (1 - correlation)
+
+
+def fits_with_unknown_errors(
+    data: FRFData, orders: Sequence[int] | None, degrees: Sequence[int] | None
+) -> list[tuple[FRFData, dict[Structure, Candidate]]]:
+    """Fit all structures to points with relative, with uniform weights, and with a floor if seen.
+
+    Each kind of weights has a fit in which few points outweigh all others where the errors are of
+    the other kind: a floor is looked for in the residuals of both. The lowest information criterion
+    tells.
+
+    Returns
+    -------
+    list of FRFData, dict
+        The best, and those against which there is no very strong evidence.
+    """
+    uniform = replace(data, weight=np.ones(data.s.size))
+    ways = [(way, fit_structures(way, orders, degrees)) for way in (data, uniform)]
+    for way, fits in ways[:2]:
+        residual = way.misfit(_best(way, fits)) / way.weight
+        if floor := error_floor(np.abs(way.response - residual), np.abs(residual)):
+            between = replace(data, weight=1 / np.hypot(np.abs(data.response), floor))
+            ways.append((between, fit_structures(between, orders, degrees)))
+    values = [_criterion(*way, int(k > 1)) for k, way in enumerate(ways)]
+    # A part of the response that the model does not follow is no noise.
+    noise = [True, *(correlation_cost(way, _best(way, fits)) == 1.0 for way, fits in ways[1:])]
+    taken = np.where(noise, values, np.inf)
+    # Of few points a good model leaves as little by chance, as in an F test.
+    part = max(parameters(_best(*way)) for way in ways) / (2 * data.s.size)
+    reach = taken.min() + VERY_STRONG / (1 - part)
+    return [ways[k] for k in np.argsort(taken) if taken[k] <= reach]
+
+
+def _criterion(data: FRFData, fits: dict[Structure, Candidate], floors: int) -> float:
+    """Information criterion of the best fit, for any weights: those of a density [3]_.
+
+    The variance is that without bias: what a model with a parameter for every third number leaves
+    in points of small errors is no sign of them.
+    """
+    best, count = _best(data, fits), 2 * data.s.size
+    own = information_criterion(data, best, count, floors)
+    return float(own - count * np.log(count - parameters(best)) - 4 * np.sum(np.log(data.weight)))
+
+
+def _best(data: FRFData, fits: dict[Structure, Candidate]) -> Candidate:
+    criteria = information_criteria(data, fits)
+    return fits[min(criteria, key=lambda key: criteria[key])]
+
+
+def error_floor(size: FloatArray, residual: FloatArray) -> float:
+    """Estimate the floor of the error, over the part of the response that it is elsewhere.
+
+    Parameters
+    ----------
+    size : ndarray, shape (K,)
+        Magnitude of the response.
+    residual : ndarray, shape (K,)
+        Magnitude of the error.
+
+    Returns
+    -------
+    float
+        Size of the response at which both are equal; 0 if the data show no floor.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> size = np.geomspace(1e-3, 1, 200)
+    >>> error = np.abs(np.random.default_rng(0).standard_normal((200, 2)) @ [1, 1j])
+    >>> print(f"{error_floor(size, error * np.hypot(size, 0.1)):.2f}")
+    0.11
+    >>> error_floor(size, error * size)
+    0.0
+    """
+    power, square = size**2, residual**2
+    least = max(float(power.min()), 1e-12 * float(power.max()))
+    tried = np.concatenate([[0.0], np.geomspace(least, max(float(power.max()), least), _TRIED)])
+    variance = np.maximum(power + tried[:, None], np.finfo(float).tiny)
+    # Squares of complex Gaussian errors are exponential; the common factor is eliminated.
+    cost = np.log(np.maximum(np.mean(square / variance, axis=1), np.finfo(float).tiny))
+    cost = size.size * cost + np.log(variance).sum(axis=1)
+    best = int(np.argmin(cost))
+    return float(np.sqrt(tried[best])) if 2 * (cost[0] - cost[best]) > VERY_STRONG else 0.0

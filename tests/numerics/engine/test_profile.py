@@ -6,14 +6,20 @@ import numpy as np
 import pytest
 from scipy.optimize import least_squares, minimize
 
-from ctrl_realize.numerics.engine.compared_fits import at_dead_time, converged, on_new_data
 from ctrl_realize.numerics.engine.descend import descend, fit_batch
 from ctrl_realize.numerics.engine.eliminate import evaluate
 from ctrl_realize.numerics.engine.modal import parameters_from_poles
 from ctrl_realize.numerics.engine.newton import settle, solve_level
 from ctrl_realize.numerics.engine.problem import Bounds, KnownFactor, Structure
 from ctrl_realize.numerics.engine.profile import dead_time_error, dead_time_profile, profile_limits
-from ctrl_realize.numerics.engine.structures import Candidate, parameter_bounds, search
+from ctrl_realize.numerics.engine.structures import (
+    Candidate,
+    at_dead_time,
+    converged,
+    on_new_data,
+    parameter_bounds,
+    search,
+)
 from ctrl_realize.numerics.output_error.step_data import step_data, step_scales, window
 
 SIGMA, DEAD, LAGS = 0.01, 20.3, (12.0, 30.0)

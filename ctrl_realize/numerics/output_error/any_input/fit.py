@@ -26,12 +26,11 @@ import numpy as np
 
 from ...arrays import FloatArray
 from ...constants import Z_95
-from ...engine.compared_fits import converged
 from ...engine.local_terms import local_columns
 from ...engine.modal import lag_sum, parameters_from_poles, poles_from_parameters, respond
 from ...engine.problem import KnownFactor, Problem, Structure
 from ...engine.profile import dead_time_error
-from ...engine.structures import Candidate, search
+from ...engine.structures import Candidate, converged, search
 from ...engine.window_fit import WindowFit, extended, window_of_rows, with_known_noise
 from ...rules import Rule
 from ...signals.noise import correlation_time, winsorised_sigma

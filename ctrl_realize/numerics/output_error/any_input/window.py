@@ -25,7 +25,6 @@ from scipy.linalg import block_diag
 
 from ...arrays import FloatArray, unit_columns, without_gaps
 from ...constants import SMALLEST, STRONG, VERY_STRONG
-from ...engine.compared_fits import settled
 from ...engine.eliminate import evaluate
 from ...engine.local_terms import local_columns
 from ...engine.modal import poles_from_parameters, respond
@@ -39,6 +38,7 @@ from ...engine.structures import (
     needless_parameters,
     pattern_starts,
     search,
+    settled,
 )
 from ...engine.window_fit import Window, WindowFit, fit_window, window_of_rows
 from ...rules import Rule
