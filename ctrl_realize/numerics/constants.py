@@ -23,6 +23,9 @@ OUTLIER = 4.0
 """Standard deviations at which residuals are cut where explanations are compared: of 16 000 samples
 of Gaussian noise one is larger."""
 
+FAR_OUTLIER = 5.0
+"""Standard deviations beyond which Gaussian noise has none of a million samples."""
+
 LEAST_FREEDOM = 40
 """Degrees of freedom left by a regression that is tested: Student's point of 1e-4 is then within
 11 % of the normal one, so that a residual that is not quite normal does little."""

@@ -16,7 +16,7 @@ from ..._wording import (
     time_within,
 )
 from ...numerics.arrays import ComplexArray, FloatArray
-from ...numerics.constants import SMALLEST
+from ...numerics.constants import FAR_OUTLIER, SMALLEST
 from ...numerics.engine.modal import lag_sum, partial_fractions
 from ...numerics.engine.profile import profile_limits
 from ...numerics.engine.static_gain import INTEGRATOR, NEARLY_STRAIGHT
@@ -60,7 +60,6 @@ _HELD = 0.5
 """Fraction of moving samples that repeat the previous one, above which an output counts as held;
 noise of one quantisation step repeats 28 %. Ablation: held output."""
 # The following thresholds for flags are a matter of presentation.
-_OUTLIER = 5.0  # standard deviations: Gaussian noise has none of a million samples beyond
 _MANY = 0.002  # of the samples beyond, from which on they are named
 _GAP = 3.0  # usual distances of samples that a gap has at least
 _OF_THE_ONSET = 0.2  # part of the time to the first sample of the response that it takes at least
@@ -381,12 +380,12 @@ def outliers(output: FloatArray, off: FloatArray, time: FloatArray) -> Iterator[
     `off` (N,) is the residual in standard deviations of the noise, at `time` in s; zero if the
     residual is more than noise.
     """
-    share, worst = float(np.mean(np.abs(off) > _OUTLIER)), int(np.argmax(np.abs(off)))
+    share, worst = float(np.mean(np.abs(off) > FAR_OUTLIER)), int(np.argmax(np.abs(off)))
     if code := missing_code(output):
         yield code
     elif share > _MANY:
         most = f"{plainly(abs(off[worst]), 2)} at {in_time(time[worst])}"
-        yield flagged("outliers", share=100 * share, limit=_OUTLIER, most=most)
+        yield flagged("outliers", share=100 * share, limit=FAR_OUTLIER, most=most)
 
 
 def missing_code(output: FloatArray) -> Flag | None:
@@ -464,7 +463,7 @@ def _lead(fit: OutputErrorFit, output: FloatArray, fitted: FloatArray) -> Iterat
     moved = moved[: k + 2] - np.median(moved[: k - _LEAD + 1])
     before = moved[: k - _LEAD + 1]
     # A rest may be padded, or quieter than what follows.
-    least = _OUTLIER * max(winsorised_sigma(before, data.quantum), data.sigma, fit.residual)
+    least = FAR_OUTLIER * max(winsorised_sigma(before, data.quantum), data.sigma, fit.residual)
     goes_on = (output[k + 1] - fitted[k]) * data.motion.sign
     if moved[k] > least and goes_on >= _STAYS * moved[k]:
         samples = next((n for n in range(1, _LEAD) if moved[k - n] <= least), _LEAD)

@@ -20,7 +20,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..arrays import FloatArray, runs
-from ..constants import SMALLEST, VERY_STRONG
+from ..constants import OUTLIER, SMALLEST, VERY_STRONG
 from ..engine.problem import Problem, Structure
 from ..engine.structures import (
     Candidate,
@@ -47,7 +47,6 @@ LAGS = (1, 2, 3)
 _HOPELESS = 100.0
 """Variances by which a kind with its first number of lags may be above the best model, for other
 numbers to be tried: time."""
-_WILD = 4.0  # standard deviations beyond which samples are outliers, and cut
 _SPIKE = 3  # samples in a row: more are a slip that the model has at another time
 _FEW_SPIKES = 2e-3  # of the samples, which noise has as well
 _MOST = 3  # other models whose dead times are profiled: time
@@ -118,7 +117,7 @@ def fit_actuated(
     linear = search_linear(problem, LINEAR, scales)
     found = _with_actuators(records, scales, wanted, orders, linear)
     residual = _residual(problem, found)
-    spikes = _spikes(residual, _WILD * mad_sigma(residual))
+    spikes = _spikes(residual, OUTLIER * mad_sigma(residual))
     if np.mean(spikes != 0) > _FEW_SPIKES:
         problem = replace(problem, data=problem.data - spikes)
         linear = search_linear(problem, LINEAR, scales)

@@ -21,6 +21,7 @@ from functools import cached_property
 
 import numpy as np
 
+from ..constants import FAR_OUTLIER
 from ..engine.eliminate import evaluate
 from ..engine.local_terms import Segments
 from ..engine.modal import parameters_from_poles
@@ -35,7 +36,6 @@ from ..output_error.step_data import StepData, step_scales, window
 from ..rational.frf_data import FRFData
 from ..signals.noise import correlation_time, is_coarse, mad_sigma
 
-_WILD = 5.0  # standard deviations, beyond which Gaussian noise has none of a million samples: cut
 _LATE = 1e200
 """Time in s at which every free response has ended: a frequency response has no initial state."""
 
@@ -94,7 +94,7 @@ def step_part(
     data: StepData, fit: OutputErrorEstimate, latest: float | None
 ) -> tuple[Window, Scales]:
     """Set up the record of a step experiment, or the mean of several."""
-    limit = _WILD * max(mad_sigma(data.output - fit.fitted), data.sigma)
+    limit = FAR_OUTLIER * max(mad_sigma(data.output - fit.fitted), data.sigma)
     calm = fit.fitted + np.clip(data.output - fit.fitted, -limit, limit)
     part = window(replace(data, output=calm), calm.size, KnownFactor())
     rounding = data.quantum / np.sqrt(12) if is_coarse(data.sigma, data.quantum) else 0.0
@@ -123,7 +123,7 @@ def sampled_part(
     problem = part.problem
     parameters = np.concatenate([[fit.dead_time], parameters_from_poles(fit.poles)])
     error = evaluate(problem, fit.structure, parameters[None]).residual[0]
-    limit = _WILD * mad_sigma(error)
+    limit = FAR_OUTLIER * mad_sigma(error)
     lost = fit.poles.size + fit.numerator.size + problem.local_count(fit.poles.size)
     correlation = correlation_time(error)
     variance = float(error @ error) / max(error.size - lost, 1) * correlation

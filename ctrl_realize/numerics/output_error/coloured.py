@@ -19,6 +19,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..arrays import FloatArray, IntArray
+from ..constants import FAR_OUTLIER
 from ..engine.descend import fit_batch
 from ..engine.eliminate import eliminate
 from ..engine.problem import Problem, Structure
@@ -41,9 +42,6 @@ _COLOURED = 2.0  # samples at rest that count as one, from which on: white noise
 _FEWEST = 100  # samples at rest, and
 _ENOUGH = 100_000  # of a kind, where there are more: time
 _TIMES = 8  # correlation times, that tell its colour. Ablation of all of them: noise made white
-_OUTLIER = (
-    5.0  # standard deviations, beyond which Gaussian noise has none of a million samples: cut
-)
 _NEAR = np.arange(-6, 6.5, 0.5)  # samples from the dead time of before, where it starts again
 _ENDS = 4  # of these starts that are followed to the bottom: time
 _UNLIKE = 3.0
@@ -72,7 +70,7 @@ def in_coloured_noise(fits: WindowFit, data: StepData) -> WindowFit:
     if (samples if told else fits.correlation) < max(_COLOURED, 0.5 * fits.correlation):
         return fits
     # Not the pseudo-values of Huber's loss, which distort smooth noise.
-    limit = _OUTLIER * max(mad_sigma(error), fits.sigma)
+    limit = FAR_OUTLIER * max(mad_sigma(error), fits.sigma)
     plain = fits.window.with_output(fits.window.output - error + np.clip(error, -limit, limit))
     quiet = _quiet(error.size, data) if told else np.arange(error.size)
     lags = 0 if told else whitening_filter(error, noise_lags(error.size)).size - 1

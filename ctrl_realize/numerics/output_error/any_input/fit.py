@@ -42,8 +42,7 @@ from ..result import OutputErrorEstimate, followed_by, followed_percent, levels
 from ..selection import chains_of, close_to
 from .condensed import MOST_LAGS, Condensed, condensed
 from .data import BEYOND, MOST_SAMPLES, Load, SampledData, cut
-from .lag_weights import posterior_of
-from .lags import fit_lags, plain_lags
+from .lags import fit_lags, plain_lags, posterior_of
 from .stretch import (
     DIED_AWAY,
     FOLLOWS,
