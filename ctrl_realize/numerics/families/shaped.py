@@ -2,7 +2,7 @@
 
 Lags have rates, a pair and a zero that depend on few parameters: a family maps these to dead time,
 poles and numerator of a structure, which the engine eliminates and differentiates. Real poles are
-paired as in `engine.poles`, neighbours together: a pair of rates f >= s has omega = sqrt(f s) and
+paired as in `engine.modal`, neighbours together: a pair of rates f >= s has omega = sqrt(f s) and
 zeta = cosh(log(f / s) / 2), so that derivatives with respect to logarithms of rates are finite for
 equal ones.
 
