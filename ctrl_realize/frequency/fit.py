@@ -111,7 +111,8 @@ def fit_frf(
 
     The flag ``"phase_leads"`` reports an FRF whose time axis starts late, ``"systematic_error"``
     that poles beyond the fourth describe what may be an error of all points of unknown noise; the
-    interval then covers lower orders within 3 % too.
+    interval then covers lower orders within 3 % too. With ``"highest_order"`` the plant may be a
+    distributed one, whose dead time the interval need not hold.
 
     The interval is that of the profile likelihood, widened if residuals are larger than the noise
     or correlated along frequency, joined with that of the mixture of all structures with weights

@@ -100,6 +100,8 @@ def chosen_model(
         first, stop = largest_excess(np.abs(data.misfit(chosen)))
         band = f"{hertz(frequency[first])} and {hertz(frequency[stop - 1])}"
         flags.append(flagged("structured_misfit.frf", ratio=plainly(ratio, 2), band=band, order=n))
+    elif noise_known and not stated and n == max(row.order for row in rows) > max(DEFAULT_ORDERS):
+        flags.append(flagged("highest_order.frf", order=n))
     left = np.linalg.norm(data.misfit(chosen)) / np.linalg.norm(data.weight * data.response)
     if left > _MOST_LEFT and not noise_known:
         flags.append(flagged("structured_misfit.most", left=plainly(100 * float(left), 2)))

@@ -592,6 +592,23 @@ def test_an_error_that_all_points_share_widens_the_interval_and_is_said():
     assert fit.interval[0] <= 0.002 <= fit.interval[1]
 
 
+def test_a_heat_exchanger_that_takes_all_poles_is_told():
+    """A wall temperature along a pipe: poles without end, part of the dead time among them."""
+    f = np.geomspace(0.002, 1, 80)
+    s = 2j * np.pi * f
+    noise = 0.005 * np.random.default_rng(0).standard_normal((80, 2)) @ [1, 1j] / np.sqrt(2)
+    fits = [
+        cr.fit_frf(cr.MeasuredFRF(h * (1 + noise), f, std=0.005 * np.abs(h))).fit
+        for h in (
+            (1 - np.exp(-1 - 4 * s)) / (1 + 4 * s) * np.exp(-0.6 * s),
+            np.exp(-0.6 * s) / ((2 * s + 1) * (s + 1)),
+        )
+    ]
+    told = [{flag.code for flag in fit.flags} for fit in fits]
+    assert "highest_order" in told[0] - told[1]
+    assert fits[1].interval[0] <= 0.6 <= fits[1].interval[1]
+
+
 def test_two_repeats_of_an_undulator_have_dead_times_in_common(shared_data):
     ends = []
     for name in ("process_1", "process_2"):
