@@ -120,8 +120,10 @@ def checked(fit: OutputErrorFit, *, alone: bool = True) -> OutputErrorFit:
     if (low, high) != fit.interval:  # which they may name
         old, new = (f" {interval_in_time(*ends)}" for ends in (fit.interval, (low, high)))
         before = [replace(flag, message=flag.message.replace(old, new)) for flag in before]
+    # That an output is recorded late is the cause of what its model misses.
+    every = tuple(sorted((*before, *known), key=lambda flag: flag.code != "held_output"))
     estimate = replace(fit.estimate, low=low, high=high)
-    return replace(fit, estimate=estimate, flags=(*before, *known), choices=(*fit.choices, *notes))
+    return replace(fit, estimate=estimate, flags=every, choices=(*fit.choices, *notes))
 
 
 @dataclass(frozen=True, eq=False)
