@@ -23,11 +23,12 @@ from ...numerics.rules import Rule
 from ...numerics.signals.counters import counter_period
 from ...numerics.validation.own_response import OwnResponse
 from .averaging import common_sample_time
-from .flags import missing_code, sampled_flags
+from .flags import sampled_flags
 from .loop_flags import late_input, loop_choices, unstable_flags
 from .repeat_flags import repeat_flags
 from .repeatability import Repeatability, delay_outliers, fit_alike, gain_outliers, unlike_records
 from .result import OutputErrorFit
+from .sensor_flags import missing_code
 from .summary import choices_of
 
 _LEAST_REST = 20  # samples before the first move of the input, for a plant at rest

@@ -17,7 +17,6 @@ from ...numerics.constants import Z_95
 from ...numerics.rules import Rule
 from ...numerics.validation.innovations import RARE, REGRESSED, nonlinear_chance, past_inputs
 from ...numerics.validation.parameter_change import ParameterChange, parameter_change
-from .flags import held_output, sensor_flags, stored_output
 from .loop_flags import (
     coloured_flags,
     excitation_flags,
@@ -29,6 +28,7 @@ from .loop_flags import (
 )
 from .repeat_flags import time_apart
 from .result import OutputErrorFit
+from .sensor_flags import held_output, sensor_flags, stored_output
 
 # The following thresholds for flags are a matter of presentation.
 _GAINS_APART = 0.1  # least relative difference between groups of samples for a flag
