@@ -29,7 +29,9 @@ from .newton import solve_level
 from .problem import Bounds, Problem
 from .structures import Candidate, Scales, parameter_bounds
 
-_SOLVED = 1e-6  # standard errors, and samples, to which an end is solved
+_SOLVED = 1e-3
+"""Standard errors to which regula falsi solves for an end: as closely as its points are at their
+minima, about which it would go to and fro."""
 _MOST_TRIES = 12  # of regula falsi, each of which halves the bracket or does better
 
 _NEAR = np.array([-3, -1.7, -1.2, -0.9, 0.9, 1.2, 1.7, 3])  # in half intervals, of a parabola
@@ -232,8 +234,6 @@ def _end(
         solved = solve_level(problem, structure, point.parameters, bounds, dt, goal, variance)
         if solved is not None and first <= solved[0] <= last:
             return [*found, Candidate(structure, solved, goal)]
-        if last - first < _SOLVED * dt:
-            break
         starts = np.stack([inside.parameters, outside.parameters])
         starts[:, 0] = inside.dead_time + below / (below - above) * (
             outside.dead_time - inside.dead_time
@@ -243,6 +243,8 @@ def _end(
         point = Candidate(structure, x[best], float(cost[best]))
         found.append(point)
         root = root_of((point.cost - least) / variance) - Z_95
+        if abs(root) <= _SOLVED:
+            break
         if root < 0:
             above = above / 2 if side < 0 else above
             inside, below, side = point, root, -1
