@@ -86,7 +86,7 @@ def chosen_model(
     n, r = best.order, best.relative_degree
     chosen = fits[key_of(best)]
     ends = [compared.interval(data, key_of(row), solved=row is best) for row in compared.near]
-    beside = []
+    beside = [] if stated else compared.of_many_lags(data)
     for other, its in others:
         more = compared_fits(other, its, unit, noise_known)
         beside.append(more.interval(other, key_of(more.rows[0]), solved=True))
@@ -255,7 +255,7 @@ def _cover(
 ) -> tuple[tuple[float, float], list[Flag]]:
     """Widen the best structure's interval to those that the data do not tell from it.
 
-    Those of other weights are ``beside``.
+    Those of chains, diffusion and dispersion, and of other weights are ``beside``.
     """
     best, interval = rows[0], within[0]
     ends = np.array(within)

@@ -609,6 +609,38 @@ def test_a_heat_exchanger_that_takes_all_poles_is_told():
     assert fits[1].interval[0] <= 0.6 <= fits[1].interval[1]
 
 
+def root_of_diffusion(s):
+    return np.sqrt(4 * s)
+
+
+def flow(s):
+    """Residence times of 2 s that spread by half of that: Peclet number 8."""
+    return np.exp(4 * (1 - np.sqrt(1 + s)))
+
+
+@pytest.mark.parametrize(
+    "plant",
+    [
+        lambda s: 1 / np.cosh(root_of_diffusion(s)),
+        lambda s: root_of_diffusion(s) / np.sinh(root_of_diffusion(s)),
+        lambda s: 1 / np.cosh(root_of_diffusion(s)) / (s + 1),
+        flow,
+        lambda s: flow(s) / (s / 2 + 1),
+    ],
+    ids=["isolated wall", "wall between two", "wall behind a sensor", "pipe", "pipe and sensor"],
+)
+def test_infinitely_many_lags_leave_the_dead_time_inside(plant):
+    """Three or four poles took 0.1 to 0.5 s of them for dead time; intervals began too late."""
+    f = np.geomspace(0.002, 1, 80)
+    s = 2j * np.pi * f
+    noise = 0.01 * np.random.default_rng(1).standard_normal((80, 2)) @ [1, 1j] / np.sqrt(2)
+    exact = plant(s) * np.exp(-0.6 * s)
+    fit = cr.fit_frf(cr.MeasuredFRF(exact * (1 + noise), f, std=0.01 * np.abs(exact))).fit
+    assert fit.interval[0] <= 0.6 <= fit.interval[1]
+    assert np.ptp(fit.interval) < 1.6  # the longest lag of a wall: 16 / pi^2
+    assert "structures_disagree" in {flag.code for flag in fit.flags}
+
+
 def test_two_repeats_of_an_undulator_have_dead_times_in_common(shared_data):
     ends = []
     for name in ("process_1", "process_2"):

@@ -91,18 +91,24 @@ _DIFFUSION = _Law(_diffusion_rates, 0.0, 0.25, 0.5)
 
 @dataclass(frozen=True, eq=False)
 class _Chain(LagFamily):
-    """Lags that follow a law, over x = (dead time, logarithm of a lag, shape)."""
+    """Lags that follow a law, over x = (dead time, logarithm of a lag, shape).
+
+    After these there may be the logarithm of a lag in series.
+    """
 
     law: _Law
 
     def mapped(self, parameters: FloatArray) -> Mapped:
-        """Models at parameters (B, 3), and their derivatives."""
-        x = parameters
-        rates, by_shape = self.law.rates(self.order, x[:, 2:])
-        slopes = np.stack([np.zeros_like(rates), -np.ones_like(rates), by_shape], axis=2)
-        theta, dtheta = paired(rates - x[:, 1:2], slopes)
-        level = np.exp(np.sum(rates - x[:, 1:2], axis=1, keepdims=True))
-        first = np.tile(np.eye(1, 3), (len(x), 1, 1))
+        """Models at parameters (B, 3) or (B, 4), and their derivatives."""
+        x, k = parameters, parameters.shape[1]
+        within, by_shape = self.law.rates(self.order - k + 3, x[:, 2:3])
+        rates = np.hstack([within - x[:, 1:2], -x[:, 3:]])
+        slopes = np.zeros((*rates.shape, k))
+        of_law, alone = slice(within.shape[1]), slice(within.shape[1], None)
+        slopes[:, of_law, 1], slopes[:, of_law, 2], slopes[:, alone, 3:] = -1.0, by_shape, -1.0
+        theta, dtheta = paired(rates, slopes)
+        level = np.exp(np.sum(rates, axis=1, keepdims=True))
+        first = np.tile(np.eye(1, k), (len(x), 1, 1))
         return Mapped(
             np.append(x[:, :1], theta, axis=1), np.append(first, dtheta, axis=1),
             level, level[:, :, None] * slopes.sum(axis=1, keepdims=True), self.gains,
@@ -128,7 +134,7 @@ def fit_chains(fits: WindowFit) -> list[LagChain]:
     if not moments[1] > 0:
         return chains
     for order in range(SHORTEST, LONGEST + 1):
-        chain = _chain(fits, order, TANKS, moments)
+        chain, _ = _chain(fits, order, TANKS, moments)
         worse = bool(chains) and chain.criterion > chains[-1].criterion + _WORSE
         if worse or _over_within_a_sample(chain, fits.scales):
             break
@@ -136,19 +142,21 @@ def fit_chains(fits: WindowFit) -> list[LagChain]:
     return chains
 
 
-def fit_diffusion(fits: WindowFit) -> list[LagChain]:
-    """Fit the first eight modes of diffusion; see `fit_chains`. One chain, or none."""
+def fit_diffusion(
+    fits: WindowFit, modes: int = LONGEST, behind: Sequence[float] = ()
+) -> list[LagChain]:
+    """Fit the first modes of diffusion; see `fit_chains`. One chain, or none.
+
+    With `behind` there is a lag in series, of which these are starts, over the spread of all.
+    """
     moments = time_moments(fits.problem, fits.best)
     if not moments[1] > 0:
         return []
-    chain = _chain(fits, LONGEST, _DIFFUSION, moments)
+    chain, (_, log_lag, shape, *_) = _chain(fits, modes, _DIFFUSION, moments, behind)
     if _over_within_a_sample(chain, fits.scales):
         return []
     # The sum of 1 / (k - c)^2 beyond n is approximated by the integral from n + 1/2 - c on.
-    slowest, second = np.sort(np.abs(chain.candidate.poles))[:2]
-    root = float(np.sqrt(second / slowest))  # (2 - c) / (1 - c)
-    first = 1 / (root - 1)  # 1 - c
-    truncated = first**2 / (LONGEST - 0.5 + first) / float(slowest)
+    truncated = float(np.exp(log_lag)) * (1 - shape) ** 2 / (modes + 0.5 - shape)
     charge = _DIFFUSION_CHARGE if Rule.DIFFUSION_CHARGE.on else 0.0
     return [replace(chain, criterion=chain.criterion + charge, truncated=truncated)]
 
@@ -196,17 +204,31 @@ def time_moments(problem: Problem, like: Candidate) -> tuple[float, float]:
     return mean, float(np.sum(like.poles**-2.0).real - np.sum(zeros**-2.0).real)
 
 
-def _chain(fits: WindowFit, order: int, law: _Law, moments: tuple[float, float]) -> LagChain:
-    problem, scales = fits.problem, fits.scales
-    mean, spread = moments
+def _chain(
+    fits: WindowFit,
+    order: int,
+    law: _Law,
+    moments: tuple[float, float],
+    behind: Sequence[float] = (),
+) -> tuple[LagChain, list[float]]:
+    """The best chain, and its parameters."""
+    problem, scales, more = fits.problem, fits.scales, int(bool(behind))
+    mean, spread = moments[0], float(np.sqrt(moments[1]))
     lags = np.exp(-law.rates(order, law.first)[0])
-    lag = float(np.sqrt(spread / (lags @ lags)))
-    start = np.array([[mean - lag * float(lags.sum()), np.log(lag), law.first]])
+    starts = []
+    for part in behind or (0.0,):
+        lag = spread * float(np.sqrt((1 - part**2) / (lags @ lags)))
+        dead_time = mean - lag * float(lags.sum()) - part * spread
+        alone = [np.log(part * spread)] if behind else []
+        starts.append([dead_time, np.log(lag), law.first, *alone])
     # A response that begins with the fourth power of the time has no kinks.
-    low, high = [scales.earliest, -np.inf, law.low], [scales.latest, np.inf, law.high]
-    bounds = Bounds(np.array(low), np.array(high), smooth=True)
-    fit = lowest(problem, _Chain(order, order, bounds, (-np.inf, np.inf), law), start, scales.dt)
-    value = fit.cost / fits.variance + (FREE_IN_A_CHAIN + 2) * fits.penalty
+    low = [scales.earliest, -np.inf, law.low] + [-np.inf] * more
+    high = [scales.latest, np.inf, law.high] + [np.inf] * more
+    bounds, order = Bounds(np.array(low), np.array(high), smooth=True), order + more
+    family = _Chain(order, order, bounds, (-np.inf, np.inf), law)
+    fit = lowest(problem, family, np.array(starts), scales.dt)
+    value = fit.cost / fits.variance + (FREE_IN_A_CHAIN + more + 2) * fits.penalty
     value += problem.local_count(order)
     error = dead_time_error(problem, fit, fits.variance)
-    return LagChain(Candidate(Structure(order, order), fit.theta, fit.cost), value, error)
+    found = LagChain(Candidate(Structure(order, order), fit.theta, fit.cost), value, error)
+    return found, fit.parameters.tolist()

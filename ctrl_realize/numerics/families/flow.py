@@ -1,4 +1,4 @@
-"""Axial dispersion behind a dead time: the family of models, and its fit to a step record.
+"""Axial dispersion behind a dead time: the family of models, and its fit.
 
 Three or four lags with a longer dead time have the same response as a flow that disperses [1]_ to
 within the noise, which no residual shows; in a fit to the same record, dispersion needs two
@@ -44,6 +44,7 @@ from ..engine.responses import StepSequence
 from ..engine.structures import REACH, Candidate
 from ..engine.window_fit import WindowFit
 from ..rules import Rule
+from ..signals.sines import Sines, stacked_parts
 from .equal_lags import time_moments
 from .shaped import ShapedFamily, UnitResponse, lowest
 
@@ -156,7 +157,9 @@ class FlowFamily(ShapedFamily):
         Where samples are missing, in means over two times, as in `StepSequence`. The slopes
         (m, k) are derivatives with respect to the parameters.
         """
-        drive = problem.drive
+        drive, none = problem.drive, np.empty((0, x.size), dtype=np.complex128)
+        if isinstance(drive, Sines):
+            return UnitResponse(*self._points(drive.omega, x), np.ones(1), none[:, 0], none)
         assert isinstance(drive, StepSequence)
         sampled = partial(self._sampled, drive, problem.known, x)
         if drive.samples is not None:
@@ -171,8 +174,18 @@ class FlowFamily(ShapedFamily):
             every = sampled(since)
             total, middle, end = np.split(every, [wide.size, wide.size + span.size])
             total[wide] = (total[wide] + 4 * middle + end) / 6
-        none = np.empty((0, x.size), dtype=np.complex128)
         return UnitResponse(total[:, 0], total[:, 1:], np.ones(1), none[:, 0], none)
+
+    def _points(self, omega: FloatArray, x: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Frequency response at omega (K,) in 2 K rows, as `Sines` has it, and its slopes."""
+        dead_time, mean, spread, lag = self.times(x)
+        s = 1j * omega
+        q = np.sqrt(1 + 2 * spread**2 * mean * s)
+        late, turned = (1 - q) / spread**2, mean * s / q
+        response = np.exp(late - s * dead_time) / (1 + lag * s)
+        slopes = [-s, -turned, -2 * (late + turned), -lag * s / (1 + lag * s)][: x.size]
+        made = stacked_parts(response[:, None] * np.stack([np.ones_like(s), *slopes], axis=1))
+        return made[:, 0], made[:, 1:]
 
     def _sampled(
         self, drive: StepSequence, known: KnownFactor, x: FloatArray, times: FloatArray
@@ -262,8 +275,8 @@ def fit_flows(fits: WindowFit, level: float) -> list[DispersedFlow]:
     Parameters
     ----------
     fits : WindowFit
-        Of a step record; the best of them has the dead time and the spread in time of the initial
-        values.
+        Of a step record or a frequency response; the best of them has the dead time and the spread
+        in time of the initial values.
     level : float
         Criterion of the best lags: fits far above it are abandoned.
 
@@ -276,7 +289,7 @@ def fit_flows(fits: WindowFit, level: float) -> list[DispersedFlow]:
         the record has a free response, for which dispersion has no poles.
     """
     problem, scales, penalty = fits.problem, fits.scales, fits.penalty
-    if problem.segments is not None or not isinstance(problem.drive, StepSequence):
+    if problem.segments is not None or not isinstance(problem.drive, StepSequence | Sines):
         return []
     mean, square = time_moments(problem, fits.best)
     if not square > scales.dt**2:

@@ -57,7 +57,7 @@ from ..engine.structures import (
     search,
 )
 from ..engine.window_fit import WindowFit
-from ..families.equal_lags import FREE_IN_A_CHAIN, LagChain, fit_chains, fit_diffusion
+from ..families.equal_lags import FREE_IN_A_CHAIN, LONGEST, LagChain, fit_chains, fit_diffusion
 from ..families.flow import DispersedFlow, fit_flows
 from ..rules import Rule
 
@@ -99,12 +99,19 @@ class Choice:
         return FREE_IN_A_CHAIN if self.chain is not None else self.model.structure.free
 
 
-def chains_of(fits: WindowFit) -> list[LagChain]:
-    """Fit chains of lags if the best order suggests more lags than were tried."""
+def chains_of(
+    fits: WindowFit, modes: int = LONGEST, behind: Sequence[float] = ()
+) -> list[LagChain]:
+    """Fit chains of lags if the best order suggests more lags than were tried.
+
+    Among them is diffusion, and with `behind` diffusion beside a lag: see `fit_diffusion`.
+    """
     order = fits.best.structure.order
     equal_lags = fit_chains(fits) if order >= _LAGS_OF_TANKS and Rule.CHAINS.on else []
-    diffuses = order >= _LAGS_OF_DIFFUSION and Rule.DIFFUSION.on
-    return equal_lags + (fit_diffusion(fits) if diffuses else [])
+    if order < _LAGS_OF_DIFFUSION or not Rule.DIFFUSION.on:
+        return equal_lags
+    beside = fit_diffusion(fits, modes, behind) if behind else []
+    return equal_lags + fit_diffusion(fits, modes) + beside
 
 
 def flows_of(fits: WindowFit, chains: Sequence[LagChain]) -> list[DispersedFlow]:
