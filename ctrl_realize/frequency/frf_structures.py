@@ -23,9 +23,10 @@ from ..numerics.engine.structures import Candidate, settled
 from ..numerics.engine.window_fit import window_of_rows, with_known_noise
 from ..numerics.families.equal_lags import chain_limits
 from ..numerics.output_error.interval import LOWER, MOST_ROUNDS, profile_of
-from ..numerics.output_error.selection import chains_of, flows_of
+from ..numerics.output_error.selection import flows_of
 from ..numerics.rational.frf_data import FRFData, dead_time_interval
 from ..numerics.rational.search import (
+    chains_in_sines,
     information_criteria,
     parameters,
     residual_variance,
@@ -36,11 +37,6 @@ from .frf_fit import FRFStructure
 _NEAR_BIC = 8.0
 """Difference to the best BIC below which a structure widens the interval; beyond, its weight is
 below 2 %."""
-_MODES, _BEHIND = 16, (0.3, 0.6, 0.9)
-"""Modes of diffusion, and starts of a lag in series with it over the spread of all. Of 72 simulated
-responses of walls, a third behind a lag, the interval missed 56 dead times without diffusion, 36
-with eight modes and no lag, and 10 with these; of 24 of flows 20 without dispersion and 4 with it.
-Of 80 of plants with up to four lags 2 in every case, in intervals that are 4 % wider."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,7 +59,7 @@ class ComparedFits:
         sigma = float(np.sqrt(_row_variance(data, self.fits[key], self.scales[key])))
         fits = with_known_noise(window_of_rows(data.problem), self.fits, data.scales, sigma)
         level = fits.criterion[key] + VERY_STRONG
-        chains = chains_of(fits, _MODES, _BEHIND)
+        chains = chains_in_sines(fits)
         flows = [flow.fit for flow in flows_of(fits, chains) if flow.criterion <= level]
         ends = [chain_limits(one, data.scales) for one in chains if one.criterion <= level]
         return ends + [profile_limits(*profile_of(fits, flow)) for flow in flows]

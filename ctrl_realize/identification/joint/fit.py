@@ -151,7 +151,7 @@ def fit_joint(
     window = with_random_effects(window, first.estimate, spread, scales.dt)
     points, freedom = _points(other, scales.latest)
     both = JointData(window, scales, points, freedom)
-    estimate, agreed = joint_fit(both, _starts(first, other), span)
+    estimate, agreed = joint_fit(both, _starts(first, other), span, stated=pairs is not None)
     if agreed.contradicts:
         low, high = min(span[0], estimate.dead_time), max(span[1], estimate.dead_time)
         estimate = replace(estimate, low=low, high=high)

@@ -35,6 +35,7 @@ from ..engine.structures import Candidate, converged, search, settled
 from ..engine.window_fit import with_known_noise
 from ..output_error.interval import likelihood_fit
 from ..output_error.result import OutputErrorEstimate
+from ..rational.search import chains_in_sines
 from .data import JointData
 from .effects import freed
 
@@ -136,7 +137,7 @@ def _alone(
 ) -> Candidate:
     """Best fit of the joint structure to one of the two."""
     cost = float(evaluate(problem, joint.structure, joint.parameters[None]).cost[0])
-    ends = np.array(starts[joint.structure]).reshape(-1, joint.parameters.size)
+    ends = np.array(starts.get(joint.structure, ())).reshape(-1, joint.parameters.size)
     return settled(problem, replace(joint, cost=cost, ends=ends), data.scales)
 
 
@@ -151,7 +152,11 @@ def _chance_of(statistic: float, parameters: int, freedom: float) -> float:
 
 
 def joint_fit(
-    data: JointData, starts: Mapping[Structure, Sequence[StartPoint]], within: tuple[float, float]
+    data: JointData,
+    starts: Mapping[Structure, Sequence[StartPoint]],
+    within: tuple[float, float],
+    *,
+    stated: bool,
 ) -> tuple[OutputErrorEstimate, Agreement]:
     """Fit all structures to both, and compare with what each would have alone.
 
@@ -163,6 +168,8 @@ def joint_fit(
     within : tuple of float
         Range of the dead time in s that contains the intervals of both: where they contradict each
         other, a compromise in all other parameters may lie far from either.
+    stated : bool
+        The structures were; otherwise chains of lags and diffusion are compared as well.
     """
     low = min(within[0], 0.99 * data.scales.latest)
     scales = replace(data.scales, earliest=low, latest=min(within[1], data.scales.latest))
@@ -172,7 +179,9 @@ def joint_fit(
     candidates = search(problem, near, scales, starts=near)
     candidates = converged(problem, candidates, scales, 1.0, samples)
     window = replace(data.records, problem=problem, samples=samples)
-    estimate = likelihood_fit(with_known_noise(window, candidates, scales, 1.0), adequate=True)
+    fits = with_known_noise(window, candidates, scales, 1.0)
+    chains = [] if stated else chains_in_sines(fits)
+    estimate = likelihood_fit(fits, adequate=True, chains=chains)
     compared = agreement(data, _model(estimate.structure, estimate.dead_time, estimate.poles), near)
     for line in estimate.structures:
         if not compared.contradicts:

@@ -34,6 +34,9 @@ from ..constants import VERY_STRONG
 from ..engine.modal import parameters_from_poles
 from ..engine.problem import Structure
 from ..engine.structures import Candidate, settled
+from ..engine.window_fit import WindowFit
+from ..families.equal_lags import LagChain
+from ..output_error.selection import chains_of
 from .frf_data import FRFData, refined
 from .starts import delay_grid, grown_starts, starting_points
 
@@ -50,6 +53,11 @@ _SETTLED = 10.0
 or widen the interval."""
 _KEPT = 4  # starts followed to the end, and fits of every order that are extended: time
 _TRIED = 100  # floors over the range of the response: 10 % apart over four decades
+_MODES, _BEHIND = 16, (0.3, 0.6, 0.9)
+"""Modes of diffusion, and starts of a lag in series with it over the spread of all. Of 72 simulated
+responses of walls, a third behind a lag, the interval missed 56 dead times without diffusion, 36
+with eight modes and no lag, and 10 with these; of 24 of flows 20 without dispersion and 4 with it.
+Of 80 of plants with up to four lags 2 in every case, in intervals that are 4 % wider."""
 
 
 def dead_time_bound(response: ComplexArray, omega: FloatArray, sigma: FloatArray) -> float:
@@ -340,3 +348,11 @@ def error_floor(size: FloatArray, residual: FloatArray) -> float:
     cost = size.size * cost + np.log(variance).sum(axis=1)
     best = int(np.argmin(cost))
     return float(np.sqrt(tried[best])) if 2 * (cost[0] - cost[best]) > VERY_STRONG else 0.0
+
+
+def chains_in_sines(fits: WindowFit) -> list[LagChain]:
+    """Fit chains of lags, and diffusion alone and beside a lag, to points of a frequency response.
+
+    There may be records beside them.
+    """
+    return chains_of(fits, _MODES, _BEHIND)

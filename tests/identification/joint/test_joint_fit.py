@@ -304,3 +304,25 @@ def test_a_gain_that_both_contradict_has_one_interval_in_the_report():
     assert fit.agreement.contradicts
     rows = [re.split(r" {2,}", line.strip()) for line in fit.report().splitlines()]
     assert f"final gain {dict(row for row in rows if len(row) == 2)['gain']}. " in told
+
+
+def of_poles(poles, t):
+    """Step response of lags with these distinct poles."""
+    others = [np.delete(poles, i) for i in range(poles.size)]
+    weights = [np.prod(o / (o - p)) for o, p in zip(others, poles, strict=True)]
+    return np.where(t > 0, 1 - np.exp(np.outer(t, poles)) @ weights, 0.0)
+
+
+def test_a_wall_is_no_dead_time_of_both_together():
+    """Of infinitely many lags three took 1.8 s for dead time, in an interval 0.2 s late."""
+    poles = -((np.pi * (np.arange(1, 41) - 0.5)) ** 2) / 110.0
+    t, f, dead_time = np.arange(-80.0, 400.0), np.geomspace(5e-4, 0.06, 30), 8.0
+    rng = np.random.default_rng(0)
+    y = of_poles(poles, np.clip(t - dead_time, 0, None)) + 0.01 * rng.standard_normal(t.size)
+    s = 2j * np.pi * f
+    exact = np.exp(-dead_time * s) / np.prod(1 - s[:, None] / poles, axis=1)
+    noise = 0.01 / np.sqrt(2) * (rng.standard_normal((30, 2)) @ [1, 1j])
+    frf = cr.MeasuredFRF(exact * (1 + noise), f, std=0.01 * np.abs(exact))
+    fit = cr.identify(cr.Record(t, 1.0 * (t >= 0), y), frf=frf).fit
+    assert fit.interval[0] <= dead_time <= fit.interval[1] < fit.interval[0] + 6
+    assert not fit.agreement.contradicts
