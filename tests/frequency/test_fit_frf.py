@@ -641,6 +641,16 @@ def test_infinitely_many_lags_leave_the_dead_time_inside(plant):
     assert "structures_disagree" in {flag.code for flag in fit.flags}
 
 
+@pytest.mark.parametrize("seed", [1, 3])
+def test_a_dead_time_of_two_longest_periods_overflows_nowhere(seed):
+    f = np.geomspace(1, 5, 12)
+    s = 2j * np.pi * f
+    noise = 0.03 * np.random.default_rng(seed).standard_normal((12, 2)) @ [1, 1j]
+    frf = cr.MeasuredFRF(np.exp(-2 * s) / (s + 1) / (s / 300 + 1) * (1 + noise), f)
+    low, high = cr.fit_frf(frf).fit.interval
+    assert low <= 2 <= high
+
+
 def test_two_repeats_of_an_undulator_have_dead_times_in_common(shared_data):
     ends = []
     for name in ("process_1", "process_2"):

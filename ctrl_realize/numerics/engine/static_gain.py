@@ -158,7 +158,7 @@ def static_gain(
         powers, moving = at[theta.size :], poles[np.abs(poles) * length >= INTEGRATOR]
         gain = (powers[0] / np.prod(-moving)).real
         distinct = poles_from_parameters(at[None, 1 : theta.size])[0][0]
-        reached = reached_after(distinct, powers, length - at[0])
+        reached = reached_after(distinct, powers, max(length - at[0], 0.0))
         return np.array([gain, at[0] + lag_sum(moving, powers), reached])
 
     gradient = np.stack(
