@@ -203,20 +203,24 @@ def test_hours_as_sample_time_give_the_model_of_seconds(name):
 
 
 @pytest.mark.parametrize("name", ["P1D", "P2D"])
-def test_all_parameters_may_be_prescribed_and_a_contradiction_is_told(name):
+def test_all_parameters_may_be_prescribed(name):
     data = record(TWO_LAGS)
     given = {"gain": 2.0, "dead_time": DEAD_TIME, "lag_1": 5.0}
     given |= {"lag_2": 2.0} if name == "P2D" else {}
     every = cr.identify(data, structures=ProcessStructure(name, fixed=given)).fit
     assert {one.name: one.value for one in every.parameters} == pytest.approx(given)
     assert every.at_noise_level == (name == "P2D")
+
+
+def test_a_bound_may_be_open_and_one_that_the_data_contradict_is_told():
+    data = record(TWO_LAGS)
     positive, endless = (
-        cr.identify(data, structures=ProcessStructure(name, bounds={"gain": (0, end)})).fit
+        cr.identify(data, structures=ProcessStructure("P2D", bounds={"gain": (0, end)})).fit
         for end in (None, np.inf)
     )
     assert positive.dead_time == endless.dead_time
     for wrong in ({"fixed": {"gain": -2.0}}, {"bounds": {"gain": (-3.0, -1.0)}}):
-        fit = cr.identify(data, structures=ProcessStructure(name, **wrong)).fit
+        fit = cr.identify(data, structures=ProcessStructure("P2D", **wrong)).fit
         assert {"structured_misfit", "apparent_dead_time"} <= codes(fit)
 
 
