@@ -30,8 +30,8 @@ from .problem import Bounds, Problem
 from .structures import Candidate, Scales, parameter_bounds
 
 _SOLVED = 1e-3
-"""Standard errors to which regula falsi solves for an end: as closely as its points are at their
-minima, about which it would go to and fro."""
+"""Standard errors to which regula falsi solves for an end: its points are no closer to their
+minima, so that more of them come no nearer."""
 _MOST_TRIES = 12  # of regula falsi, each of which halves the bracket or does better
 
 _NEAR = np.array([-3, -1.7, -1.2, -0.9, 0.9, 1.2, 1.7, 3])  # in half intervals, of a parabola
