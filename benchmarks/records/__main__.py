@@ -4,8 +4,7 @@ Data are simulated; CPU time of the process, one call each. ``python -m benchmar
 measured`` prints how well halves of measured records are simulated, beside rivals, and
 ``responses`` what measured frequency responses gave, ``joint`` what they gave with step records,
 ``several`` what several records of a plant give together, ``kinds`` tests of several kinds,
-``statements`` what it gains to state a
-fastest lag.
+``lags`` plants of very many lags, ``statements`` what it gains to state a fastest lag.
 """
 
 from __future__ import annotations
@@ -20,7 +19,7 @@ from scipy.signal import lfilter
 
 import ctrl_realize as cr
 
-from . import joint, kinds, measured, responses, several, statements
+from . import joint, kinds, many_lags, measured, responses, several, statements
 
 
 def cpu(work: Callable[[], object]) -> float:
@@ -88,6 +87,7 @@ if __name__ == "__main__":
         "responses": responses.table,
         "joint": joint.table,
         "kinds": kinds.table,
+        "lags": many_lags.table,
         "several": several.table,
         "statements": statements.table,
     }

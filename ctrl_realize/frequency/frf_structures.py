@@ -23,11 +23,10 @@ from ..numerics.engine.structures import Candidate, settled
 from ..numerics.engine.window_fit import window_of_rows, with_known_noise
 from ..numerics.families.equal_lags import chain_limits
 from ..numerics.output_error.interval import LOWER, MOST_ROUNDS, profile_of
-from ..numerics.output_error.selection import flows_of
 from ..numerics.rational.frf_data import FRFData, dead_time_interval
 from ..numerics.rational.search import (
-    chains_in_sines,
     information_criteria,
+    many_lags,
     parameters,
     residual_variance,
     smallest_cost,
@@ -59,10 +58,10 @@ class ComparedFits:
         sigma = float(np.sqrt(_row_variance(data, self.fits[key], self.scales[key])))
         fits = with_known_noise(window_of_rows(data.problem), self.fits, data.scales, sigma)
         level = fits.criterion[key] + VERY_STRONG
-        chains = chains_in_sines(fits)
-        flows = [flow.fit for flow in flows_of(fits, chains) if flow.criterion <= level]
+        chains, flows = many_lags(fits)
         ends = [chain_limits(one, data.scales) for one in chains if one.criterion <= level]
-        return ends + [profile_limits(*profile_of(fits, flow)) for flow in flows]
+        profiles = [profile_of(fits, flow.fit) for flow in flows if flow.criterion <= level]
+        return ends + [profile_limits(*profile) for profile in profiles]
 
     def interval(self, data: FRFData, key: Structure, *, solved: bool) -> tuple[float, float]:
         """95 % interval of one structure, in units of the data."""

@@ -35,8 +35,7 @@ from ..output_error.any_input import joined
 from ..output_error.fit import fit_output_error
 from ..output_error.repeat_flags import BY_CHANCE
 from ..output_error.result import OutputErrorFit
-from ..output_error.summary import fitted_model
-from ..output_error.words import order_words
+from ..output_error.summary import fitted_model, interval_of, kind_of
 from ..process_structures import Structures, plain_pairs
 from .flags import joint_flags
 from .result import JointFit
@@ -222,8 +221,9 @@ def _choices(
     other: FRFFit,
     spread: Sequence[tuple[Effect, float]],
 ) -> Iterator[str]:
-    kind, count = order_words(estimate.structure), len(estimate.structures)
+    kind, count = kind_of(estimate), len(estimate.structures)
     yield chosen("structure.joint" if count > 1 else "structure.only", kind=kind, count=count)
+    yield interval_of(estimate)
     yield chosen("joint.records", noise=first.residual, samples=first.correlation)
     yield chosen("joint.stated" if other.noise_known else "joint.scatter")
     if spread:

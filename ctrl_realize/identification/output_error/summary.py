@@ -34,8 +34,7 @@ def fitted_model(result: OutputErrorFit, known: Any = None) -> DelayedStateSpace
 
 def choices_of(fit: OutputErrorEstimate) -> Iterator[str]:
     """Say what was chosen automatically, and why."""
-    chain = fit.distributed.chain
-    kind = model_words(chain) if chain else order_words(fit.structure)
+    kind = kind_of(fit)
     count = len(fit.structures)
     if fit.averaged and fit.process.form is None:
         yield chosen("dead_time.averaged", kinds=f"1 to {count}", kind=kind)
@@ -62,7 +61,7 @@ def choices_of(fit: OutputErrorEstimate) -> Iterator[str]:
     if fit.delay_estimates:
         yield chosen("dead_time.robust" if fit.robust else "dead_time.flat")
     if not fit.robust:
-        yield _interval_of(fit)
+        yield interval_of(fit)
     if fit.load is not None and not fit.load.early:
         yield chosen("load.step")
     if fit.open_start:
@@ -75,7 +74,13 @@ def choices_of(fit: OutputErrorEstimate) -> Iterator[str]:
         yield chosen("noise.correlated", samples=residual.correlation)
 
 
-def _interval_of(fit: OutputErrorEstimate) -> str:
+def kind_of(fit: OutputErrorEstimate) -> str:
+    """Name the model: a chain of lags, or a structure."""
+    chain = fit.distributed.chain
+    return model_words(chain) if chain else order_words(fit.structure)
+
+
+def interval_of(fit: OutputErrorEstimate) -> str:
     """Describe the interval: structures, and other models that extend it."""
     if fit.averaged:
         return chosen("interval.averaged")

@@ -40,7 +40,7 @@ from ..constants import VERY_STRONG
 from ..engine.eliminate import eliminate
 from ..engine.modal import moved_amplitudes, partial_fractions
 from ..engine.problem import Bounds, KnownFactor, Problem
-from ..engine.responses import StepSequence
+from ..engine.responses import HeldInput, SeveralInputs, StepSequence
 from ..engine.structures import REACH, Candidate
 from ..engine.window_fit import WindowFit
 from ..rules import Rule
@@ -106,7 +106,7 @@ def flow_modes(
     for rate in rates:
         square = (1 + 2 * spread**2 * mean * rate) or _DOUBLE
         q = np.sqrt(square) if complex_ones or square > 0 else 1j * np.sqrt(-square)
-        value, late = _parts(q, x, root, envelope, time * rate + (1 - q) / spread**2)
+        value, late = _halves(q, x, root, envelope, time * rate + (1 - q) / spread**2)
         turned = (value - 2 * late) * (mean / q)
         curved = ((1 - q) ** 2 * value - 2 * (square + 1) * late) / (q * spread**2)
         if not complex_ones:
@@ -116,7 +116,7 @@ def flow_modes(
     return FlowModes(*(np.stack(column, axis=1) for column in zip(*columns, strict=True)))
 
 
-def _parts(
+def _halves(
     q: Any, x: FloatArray, root: FloatArray, envelope: FloatArray, tilt: Any
 ) -> tuple[Any, Any]:
     """A mode, and its late part."""
@@ -157,26 +157,30 @@ class FlowFamily(ShapedFamily):
         Where samples are missing, in means over two times, as in `StepSequence`. The slopes
         (m, k) are derivatives with respect to the parameters.
         """
-        drive, none = problem.drive, np.empty((0, x.size), dtype=np.complex128)
+        drives = _parts(problem.drive)
+        made = np.concatenate([self._rows(drive, problem.known, x) for drive in drives])
+        none = np.empty((0, x.size), dtype=np.complex128)
+        return UnitResponse(made[:, 0], made[:, 1:], np.ones(1), none[:, 0], none)
+
+    def _rows(self, drive: HeldInput, known: KnownFactor, x: FloatArray) -> FloatArray:
+        """Unit response and its slopes (m, 1 + k) in the rows of one part of the data."""
         if isinstance(drive, Sines):
-            return UnitResponse(*self._points(drive.omega, x), np.ones(1), none[:, 0], none)
+            return self._points(drive.omega, x)
         assert isinstance(drive, StepSequence)
-        sampled = partial(self._sampled, drive, problem.known, x)
+        sampled = partial(self._sampled, drive, known, x)
         if drive.samples is not None:
             early, late = (sampled(drive.first + node) for node in drive.nodes)
-            total = (early + late) / 2
-        else:
-            wide = drive.width > 1
-            span = drive.lengths[wide]
-            since = np.concatenate(
-                [drive.first, drive.first[wide] + span / 2, drive.first[wide] + span]
-            )
-            every = sampled(since)
-            total, middle, end = np.split(every, [wide.size, wide.size + span.size])
-            total[wide] = (total[wide] + 4 * middle + end) / 6
-        return UnitResponse(total[:, 0], total[:, 1:], np.ones(1), none[:, 0], none)
+            return np.asarray((early + late) / 2)
+        wide = drive.width > 1
+        span = drive.lengths[wide]
+        since = np.concatenate(
+            [drive.first, drive.first[wide] + span / 2, drive.first[wide] + span]
+        )
+        total, middle, end = np.split(sampled(since), [wide.size, wide.size + span.size])
+        total[wide] = (total[wide] + 4 * middle + end) / 6
+        return total
 
-    def _points(self, omega: FloatArray, x: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def _points(self, omega: FloatArray, x: FloatArray) -> FloatArray:
         """Frequency response at omega (K,) in 2 K rows, as `Sines` has it, and its slopes."""
         dead_time, mean, spread, lag = self.times(x)
         s = 1j * omega
@@ -184,8 +188,7 @@ class FlowFamily(ShapedFamily):
         late, turned = (1 - q) / spread**2, mean * s / q
         response = np.exp(late - s * dead_time) / (1 + lag * s)
         slopes = [-s, -turned, -2 * (late + turned), -lag * s / (1 + lag * s)][: x.size]
-        made = stacked_parts(response[:, None] * np.stack([np.ones_like(s), *slopes], axis=1))
-        return made[:, 0], made[:, 1:]
+        return stacked_parts(response[:, None] * np.stack([np.ones_like(s), *slopes], axis=1))
 
     def _sampled(
         self, drive: StepSequence, known: KnownFactor, x: FloatArray, times: FloatArray
@@ -240,6 +243,10 @@ class FlowFamily(ShapedFamily):
         )
 
 
+def _parts(drive: HeldInput) -> tuple[HeldInput, ...]:
+    return drive.parts if isinstance(drive, SeveralInputs) else (drive,)
+
+
 @dataclass(frozen=True, eq=False)
 class DispersedFlow:
     """Best fit of dispersion with a dead time; times in s.
@@ -275,8 +282,8 @@ def fit_flows(fits: WindowFit, level: float) -> list[DispersedFlow]:
     Parameters
     ----------
     fits : WindowFit
-        Of a step record or a frequency response; the best of them has the dead time and the spread
-        in time of the initial values.
+        Of a step record, a frequency response or both; the best of them has the dead time and the
+        spread in time of the initial values.
     level : float
         Criterion of the best lags: fits far above it are abandoned.
 
@@ -289,7 +296,8 @@ def fit_flows(fits: WindowFit, level: float) -> list[DispersedFlow]:
         the record has a free response, for which dispersion has no poles.
     """
     problem, scales, penalty = fits.problem, fits.scales, fits.penalty
-    if problem.segments is not None or not isinstance(problem.drive, StepSequence | Sines):
+    known = all(isinstance(drive, StepSequence | Sines) for drive in _parts(problem.drive))
+    if problem.segments is not None or not known:
         return []
     mean, square = time_moments(problem, fits.best)
     if not square > scales.dt**2:

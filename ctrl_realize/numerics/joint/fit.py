@@ -35,7 +35,7 @@ from ..engine.structures import Candidate, converged, search, settled
 from ..engine.window_fit import with_known_noise
 from ..output_error.interval import likelihood_fit
 from ..output_error.result import OutputErrorEstimate
-from ..rational.search import chains_in_sines
+from ..rational.search import many_lags
 from .data import JointData
 from .effects import freed
 
@@ -135,7 +135,7 @@ def _alone(
     joint: Candidate,
     starts: Mapping[Structure, Sequence[FloatArray]],
 ) -> Candidate:
-    """Best fit of the joint structure to one of the two."""
+    """Best fit of the joint structure to one of the two, or to both."""
     cost = float(evaluate(problem, joint.structure, joint.parameters[None]).cost[0])
     ends = np.array(starts.get(joint.structure, ())).reshape(-1, joint.parameters.size)
     return settled(problem, replace(joint, cost=cost, ends=ends), data.scales)
@@ -169,7 +169,8 @@ def joint_fit(
         Range of the dead time in s that contains the intervals of both: where they contradict each
         other, a compromise in all other parameters may lie far from either.
     stated : bool
-        The structures were; otherwise chains of lags and diffusion are compared as well.
+        The structures were; otherwise chains of lags, diffusion and dispersion are compared as
+        well.
     """
     low = min(within[0], 0.99 * data.scales.latest)
     scales = replace(data.scales, earliest=low, latest=min(within[1], data.scales.latest))
@@ -180,9 +181,12 @@ def joint_fit(
     candidates = converged(problem, candidates, scales, 1.0, samples)
     window = replace(data.records, problem=problem, samples=samples)
     fits = with_known_noise(window, candidates, scales, 1.0)
-    chains = [] if stated else chains_in_sines(fits)
-    estimate = likelihood_fit(fits, adequate=True, chains=chains)
-    compared = agreement(data, _model(estimate.structure, estimate.dead_time, estimate.poles), near)
+    chains, flows = ([], []) if stated else many_lags(fits)
+    estimate = likelihood_fit(fits, adequate=True, chains=chains, flows=flows)
+    model = _model(estimate.structure, estimate.dead_time, estimate.poles)
+    if estimate.distributed.follows_flow:  # lags at a dead time that is not the best for them
+        model = _alone(data, problem, model, near)
+    compared = agreement(data, model, near)
     for line in estimate.structures:
         if not compared.contradicts:
             break

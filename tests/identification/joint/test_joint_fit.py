@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from scipy.optimize import least_squares
+from scipy.stats import invgauss
 
 import ctrl_realize as cr
 from ctrl_realize.errors import DataError, OptionError, UnsuitableSystemError
@@ -313,6 +314,24 @@ def of_poles(poles, t):
     return np.where(t > 0, 1 - np.exp(np.outer(t, poles)) @ weights, 0.0)
 
 
+@pytest.mark.parametrize("seed", [1, 2])
+def test_a_flow_that_disperses_is_no_dead_time_of_both_together(seed):
+    """Three or four lags took 3 to 4 s of it for dead time; the interval began 0.2 to 1.6 s late."""
+    t, f, dead_time = np.arange(-80.0, 400.0), np.geomspace(5e-4, 0.06, 30), 8.0
+    rng = np.random.default_rng(seed)
+    y = invgauss(mu=0.25, scale=20 / 0.25).cdf(t - dead_time)  # 20 s, and a spread of half of them
+    y += 0.01 * rng.standard_normal(t.size)
+    s = 2j * np.pi * f
+    exact = np.exp(4 * (1 - np.sqrt(1 + 10 * s)) - dead_time * s)
+    noise = 0.01 / np.sqrt(2) * (rng.standard_normal((30, 2)) @ [1, 1j])
+    frf = cr.MeasuredFRF(exact * (1 + noise), f, std=0.01 * np.abs(exact))
+    fit = cr.identify(cr.Record(t, 1.0 * (t >= 0), y), frf=frf).fit
+    assert fit.interval[0] <= dead_time <= fit.interval[1]
+    assert abs(fit.dead_time - dead_time) < 0.2  # a fiftieth of the spread of 10 s
+    assert "dispersed_flow" in {flag.code for flag in fit.flags}
+    assert not fit.agreement.contradicts
+
+
 def test_a_wall_is_no_dead_time_of_both_together():
     """Of infinitely many lags three took 1.8 s for dead time, in an interval 0.2 s late."""
     poles = -((np.pi * (np.arange(1, 41) - 0.5)) ** 2) / 110.0
@@ -325,4 +344,5 @@ def test_a_wall_is_no_dead_time_of_both_together():
     frf = cr.MeasuredFRF(exact * (1 + noise), f, std=0.01 * np.abs(exact))
     fit = cr.identify(cr.Record(t, 1.0 * (t >= 0), y), frf=frf).fit
     assert fit.interval[0] <= dead_time <= fit.interval[1] < fit.interval[0] + 6
+    assert any("diffusion model" in choice for choice in fit.choices)
     assert not fit.agreement.contradicts
