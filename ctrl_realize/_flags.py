@@ -4,8 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cache
+from typing import TYPE_CHECKING
 
 from ._facts import facts
+from ._wording import in_time
+
+if TYPE_CHECKING:
+    from .numerics.families.flow import DispersedFlow
 
 
 @dataclass(frozen=True)
@@ -54,6 +59,21 @@ def flagged(key: str, /, **values: object) -> Flag:
     """
     code, _, case = key.partition(".")
     return Flag(code, facts("flags.toml")[code][case or "words"].format(**values))
+
+
+def flow_flag(flow: DispersedFlow, *, followed: bool, unit: float = 1.0) -> Flag:
+    """Report axial dispersion, whose times are in units of ``1 / unit`` s.
+
+    `followed`: the dead time is that of it; otherwise it fits better than lags, not clearly.
+    """
+    lag = f" and a lag of {in_time(flow.lag / unit)}" if flow.lag else ""
+    return flagged(
+        "dispersed_flow.chosen" if followed else "dispersed_flow",
+        mean=in_time(flow.mean / unit),
+        peclet=flow.peclet,
+        behind=lag,
+        dead_time=in_time(flow.dead_time / unit),
+    )
 
 
 @cache

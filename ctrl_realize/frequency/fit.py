@@ -117,10 +117,15 @@ def fit_frf(
     The interval is that of the profile likelihood, widened if residuals are larger than the noise
     or correlated along frequency, joined with that of the mixture of all structures with weights
     ``exp(-BIC / 2)`` [4]_: how the phase is divided between dead time and lags depends on the
-    structure, which the data may not determine. Unless order or relative degree are given, it also
-    covers what the data do not rule out of chains of nearly equal lags, and of diffusion and axial
-    dispersion, alone or beside a lag, as of heat in a wall or of what flows through a pipe: poles
-    take a part of their infinitely many lags for dead time.
+    structure, which the data may not determine.
+
+    Unless order or relative degree are given, chains of four to eight nearly equal lags, diffusion
+    and axial dispersion are compared as well, the latter two alone or beside a lag, as of heat in a
+    wall or of what flows through a pipe: poles take a part of their many lags for dead time. The
+    interval covers those that the data do not rule out. Equal lags and dispersion that fit better
+    than all structures are the model; of dispersion, lags and zeros that approximate it for its
+    dead time, with the flag ``"dispersed_flow"``. Where longer chains fit better, up to the longest,
+    the interval begins at zero, with the flag ``"many_lags"``.
 
     References
     ----------

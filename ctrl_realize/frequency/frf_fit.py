@@ -84,7 +84,8 @@ class FRFFit(FractionalDelayFit):
         Poles of the core in rad/s, slow ones first.
     pole_std : ndarray, shape (order,)
         Standard error of each pole for the chosen structure, in rad/s. If the noise is not known it
-        is computed from the residuals of the individual points.
+        is computed from the residuals of the individual points. NaN for lags that follow a law
+        (many equal lags, axial dispersion).
     structures : tuple of FRFStructure
         All that were tried, best first.
     name : str
@@ -185,7 +186,7 @@ class FRFFit(FractionalDelayFit):
 
         A pole within the band that a zero nearly cancels is uncertain while the gain is known.
         """
-        uncertain = Z_95 * self.pole_std > np.abs(self.poles)
+        uncertain = ~(Z_95 * self.pole_std <= np.abs(self.poles))  # NaN as well
         if np.any(uncertain & (np.abs(self.poles) < 2 * np.pi * self.frequency_hz[0])):
             return False
         return not uncertain[:1].any() or Z_95 * self._gain_std < abs(self.gain)
@@ -206,7 +207,8 @@ class FRFFit(FractionalDelayFit):
         shown = [
             f"{abs(p) / (2 * np.pi):.4g} Hz"
             + (f" (damping {-p.real / abs(p):.2g})" if p.imag > 0 else "")
-            + (f" +-{100 * error / abs(p):.2g} %" if error < abs(p) else " +-100 % or more")
+            + (f" +-{100 * error / abs(p):.2g} %" if error < abs(p) else "")
+            + (" +-100 % or more" if error >= abs(p) else "")
             for p, error in zip(self.poles, self.pole_std, strict=True)
             if p.imag >= 0
         ]

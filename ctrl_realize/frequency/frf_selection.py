@@ -10,14 +10,15 @@ from typing import Any
 import numpy as np
 from scipy.optimize import minimize_scalar
 
-from .._flags import Flag, flagged
-from .._wording import in_time, plainly
+from .._flags import Flag, flagged, flow_flag
+from .._wording import chosen, in_time, plainly
 from ..delayed import DelayedStateSpace, delayed_ss
 from ..numerics.arrays import locked, read_only
 from ..numerics.constants import VERY_STRONG, Z_95
 from ..numerics.engine.problem import Structure
 from ..numerics.engine.static_gain import mixture_quantile
 from ..numerics.engine.structures import Candidate
+from ..numerics.output_error.selection import Choice
 from ..numerics.rational.frf_data import FRFData, modal_state_space, pole_deviations
 from ..numerics.rational.search import (
     DEFAULT_ORDERS,
@@ -30,7 +31,7 @@ from ..numerics.rational.search import (
 from ..numerics.signals.noise import largest_excess
 from .comparison import hertz
 from .frf_fit import FRFFit, FRFStructure
-from .frf_structures import ComparedFits, compared_fits, key_of, residual_ratio
+from .frf_structures import ComparedFits, ManyLags, compared_fits, key_of, residual_ratio
 from .points import FRFPoints
 
 _POOR_MISFIT, _MOST_LEFT = 2.0, 0.5
@@ -83,43 +84,60 @@ def chosen_model(
     compared = compared_fits(data, fits, unit, noise_known)
     fits, rows, scales = compared.fits, compared.rows, compared.scales
     best = rows[0]
-    n, r = best.order, best.relative_degree
-    chosen = fits[key_of(best)]
-    ends = [compared.interval(data, key_of(row), solved=row is best) for row in compared.near]
-    beside = [] if stated else compared.of_many_lags(data)
+    many = ManyLags() if stated else compared.of_many_lags(data)
+    near, beside = compared.near(many.better), list(many.ends)
+    ends = [compared.interval(data, key_of(row), solved=row is best) for row in near]
     for other, its in others:
         more = compared_fits(other, its, unit, noise_known)
         beside.append(more.interval(other, key_of(more.rows[0]), solved=True))
-    within, beside = ([(low / unit, high / unit) for low, high in e] for e in (ends, beside))
-    interval, flags = _cover(rows, within, beside, data.max_dead_time / unit, 1 / frequency[-1])
-    ratio = residual_ratio(data, chosen)
-    if not noise_known and n > max(DEFAULT_ORDERS) and ratio < _ACCURACY:
+    own, choices = many.own or ends[0], []
+    if many.choice is None:
+        model, std = fits[key_of(best)], best.std
+        poles, pole_std = pole_deviations(data, model, scales[key_of(best)], robust=not noise_known)
+    else:
+        model, std = many.choice.model, (own[1] - own[0]) / (2 * Z_95 * unit)
+        choices.append(_why(many.choice, len(rows)))
+        poles = model.poles[np.argsort(np.abs(model.poles), kind="stable")]
+        pole_std = np.full(poles.size, np.nan)  # they follow a law, or approximate one
+    n, r, dead_time = model.structure.order, model.structure.relative_degree, model.dead_time / unit
+    many_poles = n > max(DEFAULT_ORDERS) and many.choice is None
+    own, *every = [(low / unit, high / unit) for low, high in (own, *ends, *beside)]
+    within, beside = every[: len(near)], [own, *every[len(near) :]]
+    limits = data.max_dead_time / unit, 1 / frequency[-1]
+    interval, flags = _cover(dead_time, near, within, beside, *limits)
+    if many.unlimited:
+        interval = 0.0, interval[1]
+        flags.append(flagged("many_lags", known=""))
+    if many.flow is not None:
+        followed = many.choice is not None and many.choice.flow is not None
+        flags.append(flow_flag(many.flow, followed=followed, unit=unit))
+    ratio = residual_ratio(data, model)
+    if not noise_known and many_poles and ratio < _ACCURACY:
         interval, systematic = _of_lower_orders(data, compared, unit, interval)
         flags.extend(systematic)
     if noise_known and ratio > _POOR_MISFIT:
-        first, stop = largest_excess(np.abs(data.misfit(chosen)))
+        first, stop = largest_excess(np.abs(data.misfit(model)))
         band = f"{hertz(frequency[first])} and {hertz(frequency[stop - 1])}"
         flags.append(flagged("structured_misfit.frf", ratio=plainly(ratio, 2), band=band, order=n))
-    elif noise_known and not stated and n == max(row.order for row in rows) > max(DEFAULT_ORDERS):
+    elif noise_known and not stated and many_poles and n == max(row.order for row in rows):
         flags.append(flagged("highest_order.frf", order=n))
-    left = np.linalg.norm(data.misfit(chosen)) / np.linalg.norm(data.weight * data.response)
+    left = np.linalg.norm(data.misfit(model)) / np.linalg.norm(data.weight * data.response)
     if left > _MOST_LEFT and not noise_known:
         flags.append(flagged("structured_misfit.most", left=plainly(100 * float(left), 2)))
     # A response that leads its input explains the misfit, which no other order or bound mends.
-    flags = [*_leading_phase(data, fits, chosen, unit)] or flags
-    if n > max(DEFAULT_ORDERS) or left > _MOST_LEFT:
-        flags.extend(_unstable_pole(data, fits, chosen, unit))
-    poles, pole_std = pole_deviations(data, chosen, scales[key_of(best)], robust=not noise_known)
-    A, B, C, D = modal_state_space(data, chosen)
-    used = best.dead_time
+    flags = [*_leading_phase(data, fits, model, unit)] or flags
+    if many_poles or left > _MOST_LEFT:
+        flags.extend(_unstable_pole(data, fits, model, unit))
+    A, B, C, D = modal_state_space(data, model)
+    used = dead_time
     if r == 0:
         # more than any model can hold are refused when it is made; a held input waits for a sample
         used = (round if held is None else ceil)(min(used / dt, 1e9)) * dt
-        if abs(used - best.dead_time) > 1e-9 * dt:
-            exact = in_time(best.dead_time, 5)
+        if abs(used - dead_time) > 1e-9 * dt:
+            exact = in_time(dead_time, 5)
             flags.append(flagged("dead_time_rounded", used=in_time(used, 5), dead_time=exact))
     result = FRFFit(
-        order=n, relative_degree=r, dead_time=best.dead_time, std_given_structure=best.std,
+        order=n, relative_degree=r, dead_time=dead_time, std_given_structure=std,
         interval=interval,
         frequency_hz=read_only(frequency),
         measured=locked(points.response),
@@ -136,6 +154,7 @@ def chosen_model(
         dt=dt,
         hold_time=held,
         flags=tuple(flags),
+        choices=tuple(choices),
         stated=stated,
     )  # fmt: skip
     if not result.gain_resolved:
@@ -143,9 +162,20 @@ def chosen_model(
         open_end = flagged("gain_not_resolved.frf", gain=result.gain, lowest=lowest)
         result = replace(result, flags=(*result.flags, open_end))
     if held is not None:
-        own = result.response(2 * np.pi * frequency) + data.misfit(chosen) / data.weight * size
-        result = replace(result, measured=locked(own))
+        points_alone = (
+            result.response(2 * np.pi * frequency) + data.misfit(model) / data.weight * size
+        )
+        result = replace(result, measured=locked(points_alone))
     return delayed_ss(result.core, dead_time=used, dt=dt, fit=result, name=name)
+
+
+def _why(choice: Choice, count: int) -> str:
+    """Say why a chain of lags or dispersion was chosen instead of one of `count` structures."""
+    structure = choice.model.structure
+    if choice.flow is None:
+        return chosen("structure.chain", order=structure.order, count=count)
+    kind = f"order {structure.order}, relative degree {structure.relative_degree}"
+    return chosen("structure.flow", kind=kind, count=count)
 
 
 def _leading_phase(
@@ -247,33 +277,35 @@ def _of_lower_orders(
 
 
 def _cover(
+    dead_time: float,
     rows: list[FRFStructure],
     within: list[tuple[float, float]],
     beside: list[tuple[float, float]],
     bound: float,
     shortest: float,
 ) -> tuple[tuple[float, float], list[Flag]]:
-    """Widen the best structure's interval to those that the data do not tell from it.
+    """Widen the interval of the model to those that the data do not tell from it.
 
-    Those of chains, diffusion and dispersion, and of other weights are ``beside``.
+    `within` are those of structures, `beside` that of the model first, and then those of chains,
+    diffusion and dispersion, and of other weights.
     """
-    best, interval = rows[0], within[0]
-    ends = np.array(within)
-    # exp(-BIC / 2) is the evidence for a structure: the interval is that of the mixture.
-    share = np.exp(-0.5 * np.array([row.bic - best.bic for row in rows[: len(within)]]))
-    spread = np.maximum((ends[:, 1] - ends[:, 0]) / (2 * Z_95), 1e-12 * bound)
-    centre = ends.mean(axis=1)
-    lows, highs = zip(interval, *beside, strict=True)
-    low = min(*lows, mixture_quantile(0.025, centre, spread, share))
-    high = max(*highs, mixture_quantile(0.975, centre, spread, share))
+    (first, last), ends = beside[0], np.array(within).reshape(-1, 2)
+    low, high = min(low for low, _ in beside), max(high for _, high in beside)
+    if rows:
+        # exp(-BIC / 2) is the evidence for a structure: the interval is that of the mixture.
+        share = np.exp(-0.5 * np.array([row.bic - rows[0].bic for row in rows]))
+        spread = np.maximum((ends[:, 1] - ends[:, 0]) / (2 * Z_95), 1e-12 * bound)
+        centre = ends.mean(axis=1)
+        low = min(low, mixture_quantile(0.025, centre, spread, share))
+        high = max(high, mixture_quantile(0.975, centre, spread, share))
     flags = []
     low, high = max(low, 0.0), min(high, bound)
     if high >= (1 - 1e-9) * bound:
         flags.append(flagged("delay_at_bound.frf", bound=in_time(bound, 4)))
-    chosen = interval[1] - interval[0]
-    worth = max(0.5 * chosen, _SHARE * best.dead_time, _SMALL_WIDTH * shortest)
-    if high - low - chosen > worth:
+    own = last - first
+    worth = max(0.5 * own, _SHARE * dead_time, _SMALL_WIDTH * shortest)
+    if high - low - own > worth:
         flags.append(
-            flagged("structures_disagree.frf", wide=in_time(high - low), chosen=in_time(chosen))
+            flagged("structures_disagree.frf", wide=in_time(high - low), chosen=in_time(own))
         )
     return (low, high), flags

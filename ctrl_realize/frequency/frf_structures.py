@@ -12,7 +12,7 @@ References
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -21,8 +21,10 @@ from ..numerics.engine.problem import Structure
 from ..numerics.engine.profile import Points, dead_time_error, profile_limits, profile_points
 from ..numerics.engine.structures import Candidate, settled
 from ..numerics.engine.window_fit import window_of_rows, with_known_noise
-from ..numerics.families.equal_lags import chain_limits
+from ..numerics.families.equal_lags import LagChain, chain_limits, still_improving
+from ..numerics.families.flow import DispersedFlow
 from ..numerics.output_error.interval import LOWER, MOST_ROUNDS, profile_of
+from ..numerics.output_error.selection import Choice, choose_model
 from ..numerics.rational.frf_data import FRFData, dead_time_interval
 from ..numerics.rational.search import (
     information_criteria,
@@ -39,6 +41,24 @@ below 2 %."""
 
 
 @dataclass(frozen=True, eq=False)
+class ManyLags:
+    """What chains of lags, diffusion and dispersion say, in units of the data.
+
+    `ends` are the 95 % intervals of those that are not ruled out; `unlimited`: chains fit the
+    better the longer they are; `flow` is dispersion that fits better than all lags. If there are
+    models that fit better than all structures, `better` is the difference of the criteria, and
+    `choice` and `own` are the best of them and its interval.
+    """
+
+    ends: tuple[tuple[float, float], ...] = ()
+    unlimited: bool = False
+    flow: DispersedFlow | None = None
+    better: float = 0.0
+    choice: Choice | None = None
+    own: tuple[float, float] | None = None
+
+
+@dataclass(frozen=True, eq=False)
 class ComparedFits:
     """Fits with rows, best first, residual variances of points, and profiles of the nearest."""
 
@@ -47,21 +67,31 @@ class ComparedFits:
     scales: dict[Structure, float]
     points: dict[Structure, Points]
 
-    @property
-    def near(self) -> list[FRFStructure]:
-        """Rows that come close to the best, the best first."""
-        return [row for row in self.rows if row.bic - self.rows[0].bic < _NEAR_BIC]
+    def near(self, better: float = 0.0) -> list[FRFStructure]:
+        """Rows that come close to the best, the best first, or to what is so much better."""
+        return [row for row in self.rows if row.bic - self.rows[0].bic < _NEAR_BIC - better]
 
-    def of_many_lags(self, data: FRFData) -> list[tuple[float, float]]:
-        """95 % intervals of chains of lags, diffusion and dispersion that are not ruled out."""
+    def of_many_lags(self, data: FRFData) -> ManyLags:
+        """Fit chains of lags, diffusion and dispersion, and compare them with the structures."""
         key = key_of(self.rows[0])
         sigma = float(np.sqrt(_row_variance(data, self.fits[key], self.scales[key])))
         fits = with_known_noise(window_of_rows(data.problem), self.fits, data.scales, sigma)
-        level = fits.criterion[key] + VERY_STRONG
         chains, flows = many_lags(fits)
-        ends = [chain_limits(one, data.scales) for one in chains if one.criterion <= level]
-        profiles = [profile_of(fits, flow.fit) for flow in flows if flow.criterion <= level]
-        return ends + [profile_limits(*profile) for profile in profiles]
+        equal_lags = [chain for chain in chains if not chain.truncated]
+        choice = choose_model(fits, equal_lags, flows)
+        law, least = choice.chain or choice.flow, fits.criterion[key]
+        better = max(least - choice.level, 0.0) if law else 0.0
+        most = least - better + VERY_STRONG
+        ends: dict[LagChain | DispersedFlow | None, tuple[float, float]] = {
+            one: chain_limits(one, data.scales) for one in chains if one.criterion <= most
+        }
+        for one in flows:
+            if one.criterion <= most:
+                ends[one] = profile_limits(*profile_of(fits, one.fit))
+        flow = min(flows, key=lambda flow: flow.delta_bic, default=None)
+        flow = None if flow is None or flow.delta_bic >= 0 else flow
+        found = ManyLags(tuple(ends.values()), still_improving(equal_lags), flow)
+        return replace(found, better=better, choice=choice, own=ends[law]) if better else found
 
     def interval(self, data: FRFData, key: Structure, *, solved: bool) -> tuple[float, float]:
         """95 % interval of one structure, in units of the data."""

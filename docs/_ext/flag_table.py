@@ -8,6 +8,7 @@ import tomllib
 from pathlib import Path
 
 RAISED_BY = {
+    "_flags": "fit_output_error",
     "design/loops/data_loops": "design.margins",
     "design/loops/loop_check": "design.pid",
     "design/loops/margins": "design.margins",

@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
+from scipy.stats import invgauss
 
 import ctrl_realize as cr
 from ctrl_realize.numerics.rational.spectra import hold_response
@@ -639,6 +640,56 @@ def test_infinitely_many_lags_leave_the_dead_time_inside(plant):
     assert fit.interval[0] <= 0.6 <= fit.interval[1]
     assert np.ptp(fit.interval) < 1.6  # the longest lag of a wall: 16 / pi^2
     assert "structures_disagree" in {flag.code for flag in fit.flags}
+
+
+def measured(exact, f, std, seed):
+    """Points with errors in proportion to the response, which are known."""
+    noise = std / np.sqrt(2) * np.random.default_rng(seed).standard_normal((f.size, 2)) @ [1, 1j]
+    return cr.MeasuredFRF(exact * (1 + noise), f, std=std * np.abs(exact))
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+def test_a_flow_that_disperses_has_its_own_dead_time(seed):
+    """Three lags took 0.4 to 0.5 s of it for dead time."""
+    f = np.geomspace(0.002, 1, 80)
+    s = 2j * np.pi * f
+    fit = cr.fit_frf(measured(flow(s) * np.exp(-0.6 * s), f, 0.01, seed)).fit
+    assert fit.interval[0] <= 0.6 <= fit.interval[1]
+    assert abs(fit.dead_time - 0.6) < 0.05  # a twentieth of the spread of 1 s
+    assert "dispersed_flow" in {flag.code for flag in fit.flags}
+    assert np.median(fit.relative_error) < 0.02  # lags and zeros follow it
+
+
+def test_a_flow_behind_a_hold_has_its_own_dead_time():
+    """Four to six lags took 0.3 s of it for dead time, in an interval 0.2 s late."""
+    dt, k = 0.1, np.arange(600)
+    pulses = np.diff(invgauss(mu=0.25, scale=2 / 0.25).cdf(dt * k - 0.6), prepend=0)
+    f = np.arange(1, 121) / (dt * k.size)
+    sampled = np.exp(-2j * np.pi * dt * np.outer(f, k)) @ pulses
+    fit = cr.fit_frf(measured(sampled, f, 0.003, 1), dt=dt, hold="zoh").fit
+    assert fit.interval[0] <= 0.6 <= fit.interval[1] < fit.interval[0] + 0.05
+
+
+def test_of_eight_equal_lags_none_is_dead_time():
+    """Five or six free poles took 0.1 to 0.5 s of 2.4 s for dead time."""
+    f = np.geomspace(0.002, 1, 80)
+    s = 2j * np.pi * f
+    fit = cr.fit_frf(measured(np.exp(-0.6 * s) / (0.3 * s + 1) ** 8, f, 0.003, 0)).fit
+    assert fit.interval[0] <= 0.6 <= fit.interval[1]
+    assert abs(fit.dead_time - 0.6) < 0.003  # a hundredth of a lag
+    assert fit.order == 8
+    assert any("equal lags" in choice for choice in fit.choices)
+    assert np.isnan(fit.pole_std).all()  # they are not free
+    assert_allclose(fit.total_delay, 3.0, rtol=0.01)
+
+
+def test_twelve_equal_lags_leave_the_dead_time_open():
+    """Of 3.6 s of lags 0.3 to 0.7 s were dead time, in intervals 0.1 to 0.5 s late."""
+    f = np.geomspace(0.002, 1, 80)
+    s = 2j * np.pi * f
+    fit = cr.fit_frf(measured(np.exp(-0.6 * s) / (0.3 * s + 1) ** 12, f, 0.003, 0)).fit
+    assert fit.interval[0] <= 0.6 <= fit.interval[1]
+    assert "many_lags" in {flag.code for flag in fit.flags}
 
 
 @pytest.mark.parametrize("seed", [1, 3])

@@ -222,7 +222,10 @@ def _choices(
     spread: Sequence[tuple[Effect, float]],
 ) -> Iterator[str]:
     kind, count = kind_of(estimate), len(estimate.structures)
-    yield chosen("structure.joint" if count > 1 else "structure.only", kind=kind, count=count)
+    if estimate.distributed.follows_flow:
+        yield chosen("structure.flow", kind=kind, count=count)
+    else:
+        yield chosen("structure.joint" if count > 1 else "structure.only", kind=kind, count=count)
     yield interval_of(estimate)
     yield chosen("joint.records", noise=first.residual, samples=first.correlation)
     yield chosen("joint.stated" if other.noise_known else "joint.scatter")

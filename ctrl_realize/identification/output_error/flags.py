@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from ..._flags import Flag, flagged
+from ..._flags import Flag, flagged, flow_flag
 from ..._wording import (
     in_time,
     interval_in_time,
@@ -173,13 +173,7 @@ def _dispersed_flow(fit: OutputErrorEstimate) -> Iterator[Flag]:
     flow = min(fit.distributed.flows, key=lambda flow: flow.delta_bic, default=None)
     if flow is None or (flow.delta_bic >= 0 and not fit.distributed.follows_flow):
         return
-    yield flagged(
-        "dispersed_flow.chosen" if fit.distributed.follows_flow else "dispersed_flow",
-        mean=in_time(flow.mean),
-        peclet=flow.peclet,
-        behind=f" and a lag of {in_time(flow.lag)}" if flow.lag else "",
-        dead_time=in_time(flow.dead_time),
-    )
+    yield flow_flag(flow, followed=fit.distributed.follows_flow)
 
 
 def _extrapolated(

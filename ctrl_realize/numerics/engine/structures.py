@@ -83,8 +83,8 @@ class Scales:
     `length` the duration of the record after the change of the input, `dt` the sample time.
     `latest` and `earliest` bound the dead time; `ringing` is an angular frequency that stands out
     of the residual of a first-order fit, or 0; `integrating`: the pole of that fit is far slower
-    than the record. No pole is slower than `slowest`, in 1/s. `bounds` are those of the parameters
-    of an order where there are no samples, as for points of a frequency response.
+    than the record. No pole is slower than `slowest`, in 1/s. `bounds` are those of the pole
+    parameters of an order where there are no samples, as for points of a frequency response.
     """
 
     onset: float
@@ -96,7 +96,7 @@ class Scales:
     ringing: float = 0.0
     integrating: bool = False
     slowest: float = 0.0
-    bounds: Callable[[int], Bounds] | None = None
+    bounds: Callable[[int], tuple[FloatArray, FloatArray]] | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -206,7 +206,9 @@ def parameter_bounds(structure: Structure, scales: Scales) -> Bounds:
         return structure.bounds
     order = structure.order
     if scales.bounds is not None:
-        return scales.bounds(order)
+        least, most = scales.bounds(order)
+        ends = np.append(scales.earliest, least), np.append(scales.latest, most)
+        return Bounds(*ends, smooth=True)
     slower = structure.zeros and Rule.SLOWER.on
     fast = np.log((SLOWER_WITH_ZEROS if slower else FASTEST) / scales.dt)
     slow = np.log(max(SLOWEST / scales.length, scales.slowest))

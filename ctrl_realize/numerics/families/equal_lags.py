@@ -230,5 +230,9 @@ def _chain(
     value = fit.cost / fits.variance + (FREE_IN_A_CHAIN + more + 2) * fits.penalty
     value += problem.local_count(order)
     error = dead_time_error(problem, fit, fits.variance)
+    if law is TANKS and fit.parameters[2] <= law.low:
+        # Lags that are equal have another dead time: with the same mean and variance of the impulse
+        # response it is earlier by half the variance of the lags over their mean.
+        error += law.low / 6 * float(np.sum(1 / np.abs(fit.poles))) / Z_95
     found = LagChain(Candidate(Structure(order, order), fit.theta, fit.cost), value, error)
     return found, fit.parameters.tolist()

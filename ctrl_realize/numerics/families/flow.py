@@ -44,7 +44,7 @@ from ..engine.responses import HeldInput, SeveralInputs, StepSequence
 from ..engine.structures import REACH, Candidate
 from ..engine.window_fit import WindowFit
 from ..rules import Rule
-from ..signals.sines import Sines, stacked_parts
+from ..signals.sines import HeldSines, Sines, stacked_parts
 from .equal_lags import time_moments
 from .shaped import ShapedFamily, UnitResponse, lowest
 
@@ -57,6 +57,9 @@ _SPREADS = (0.1, 1.2)
 """Standard deviations over means: narrower is no different from many lags, wider from few."""
 _DELAYS, _LAGS = (0.0, 0.4, 0.7, 0.95), (0.05, 0.3, 0.6, 0.9)
 """Starts: parts of a dead time that is too long, and of the whole spread in time."""
+_ALIASES = 20
+"""On either side: what others pass is 1e-5 of the response of a flow that spreads over a tenth of a
+sample, and 1e-4 over a twentieth."""
 _DOUBLE = 1e-12
 """Instead of a square of q of 0, where a derivative is a quotient of two zeros."""
 
@@ -165,7 +168,13 @@ class FlowFamily(ShapedFamily):
     def _rows(self, drive: HeldInput, known: KnownFactor, x: FloatArray) -> FloatArray:
         """Unit response and its slopes (m, 1 + k) in the rows of one part of the data."""
         if isinstance(drive, Sines):
-            return self._points(drive.omega, x)
+            return stacked_parts(self._points(drive.omega, x))
+        if isinstance(drive, HeldSines):
+            # Samples have all aliases of what passes the hold, over the response of the hold.
+            turns = 2 * np.pi / drive.step * np.arange(-_ALIASES, _ALIASES + 1)[:, None]
+            omega = drive.omega + turns
+            parts = self._points(omega.ravel(), x).reshape(*omega.shape, -1)
+            return stacked_parts(np.einsum("ak,akj->kj", drive.omega / omega, parts))
         assert isinstance(drive, StepSequence)
         sampled = partial(self._sampled, drive, known, x)
         if drive.samples is not None:
@@ -180,15 +189,15 @@ class FlowFamily(ShapedFamily):
         total[wide] = (total[wide] + 4 * middle + end) / 6
         return total
 
-    def _points(self, omega: FloatArray, x: FloatArray) -> FloatArray:
-        """Frequency response at omega (K,) in 2 K rows, as `Sines` has it, and its slopes."""
+    def _points(self, omega: FloatArray, x: FloatArray) -> ComplexArray:
+        """Frequency response at omega (K,), and its slopes: (K, 1 + k)."""
         dead_time, mean, spread, lag = self.times(x)
         s = 1j * omega
         q = np.sqrt(1 + 2 * spread**2 * mean * s)
         late, turned = (1 - q) / spread**2, mean * s / q
         response = np.exp(late - s * dead_time) / (1 + lag * s)
         slopes = [-s, -turned, -2 * (late + turned), -lag * s / (1 + lag * s)][: x.size]
-        return stacked_parts(response[:, None] * np.stack([np.ones_like(s), *slopes], axis=1))
+        return np.asarray(response[:, None] * np.stack([np.ones_like(s), *slopes], axis=1))
 
     def _sampled(
         self, drive: StepSequence, known: KnownFactor, x: FloatArray, times: FloatArray
@@ -296,7 +305,9 @@ def fit_flows(fits: WindowFit, level: float) -> list[DispersedFlow]:
         the record has a free response, for which dispersion has no poles.
     """
     problem, scales, penalty = fits.problem, fits.scales, fits.penalty
-    known = all(isinstance(drive, StepSequence | Sines) for drive in _parts(problem.drive))
+    known = all(
+        isinstance(drive, StepSequence | Sines | HeldSines) for drive in _parts(problem.drive)
+    )
     if problem.segments is not None or not known:
         return []
     mean, square = time_moments(problem, fits.best)

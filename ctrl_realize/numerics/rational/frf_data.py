@@ -26,7 +26,7 @@ from ..arrays import ComplexArray, FloatArray
 from ..engine.descend import descend, fit_batch
 from ..engine.eliminate import evaluate
 from ..engine.modal import partial_fractions, poles_from_parameters
-from ..engine.problem import Bounds, Evaluation, KnownFactor, Problem, Structure
+from ..engine.problem import Evaluation, KnownFactor, Problem, Structure
 from ..engine.profile import Points, profile_curve, profile_limits, with_ends, without_points
 from ..engine.structures import Candidate, Scales, parameter_bounds
 from ..signals.sines import HeldSines, Sines, stacked_parts
@@ -91,14 +91,14 @@ class FRFData:
         low, high = float(self.omega.min()), float(self.omega.max())
         return Scales(1 / high, 1 / low, 1 / low, 1 / high, self.max_dead_time, bounds=self._bounds)
 
-    def _bounds(self, order: int) -> Bounds:
+    def _bounds(self, order: int) -> tuple[FloatArray, FloatArray]:
         """Poles two decades beyond the band, resonances sharper than a record can show them."""
         slow = float(np.log(self.omega.min() / (_INTEGRATES if order == 1 else _BEYOND)))
         fast = float(np.log(self.omega.max() * _BEYOND))
         pairs, single = order // 2, order % 2
-        low = [0.0, *[slow] * single, *[slow, np.log(_SHARPEST)] * pairs]
-        high = [self.max_dead_time, *[fast] * single, *[fast, np.log(_DULLEST)] * pairs]
-        return Bounds(np.array(low), np.array(high), smooth=True)
+        low = [slow] * single + [slow, np.log(_SHARPEST)] * pairs
+        high = [fast] * single + [fast, np.log(_DULLEST)] * pairs
+        return np.array(low), np.array(high)
 
     def poles_to_grow(self, fit: Candidate) -> ComplexArray:
         """Poles (n,) from which larger orders start: those have no integrator of their own."""

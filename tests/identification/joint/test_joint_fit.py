@@ -316,7 +316,7 @@ def of_poles(poles, t):
 
 @pytest.mark.parametrize("seed", [1, 2])
 def test_a_flow_that_disperses_is_no_dead_time_of_both_together(seed):
-    """Three or four lags took 3 to 4 s of it for dead time; the interval began 0.2 to 1.6 s late."""
+    """Three or four lags took 3 to 4 s of it for dead time, in intervals 0.2 to 1.6 s late."""
     t, f, dead_time = np.arange(-80.0, 400.0), np.geomspace(5e-4, 0.06, 30), 8.0
     rng = np.random.default_rng(seed)
     y = invgauss(mu=0.25, scale=20 / 0.25).cdf(t - dead_time)  # 20 s, and a spread of half of them
