@@ -124,8 +124,8 @@ def fit_frf(
     wall or of what flows through a pipe: poles take a part of their many lags for dead time. The
     interval covers those that the data do not rule out. Equal lags and dispersion that fit better
     than all structures are the model; of dispersion, lags and zeros that approximate it for its
-    dead time, with the flag ``"dispersed_flow"``. Where longer chains fit better, up to the longest,
-    the interval begins at zero, with the flag ``"many_lags"``.
+    dead time, with the flag ``"dispersed_flow"``. Where longer chains fit better, up to the
+    longest, the interval begins at zero, with the flag ``"many_lags"``.
 
     References
     ----------

@@ -19,9 +19,9 @@ import numpy as np
 from ..numerics.constants import VERY_STRONG
 from ..numerics.engine.problem import Structure
 from ..numerics.engine.profile import Points, dead_time_error, profile_limits, profile_points
-from ..numerics.engine.structures import Candidate, settled
-from ..numerics.engine.window_fit import window_of_rows, with_known_noise
-from ..numerics.families.equal_lags import LagChain, chain_limits, still_improving
+from ..numerics.engine.structures import Candidate, charged, least_charge, plausible, settled
+from ..numerics.engine.window_fit import WindowFit, window_of_rows, with_known_noise
+from ..numerics.families.equal_lags import SHORTEST, LagChain, chain_limits, still_improving
 from ..numerics.families.flow import DispersedFlow
 from ..numerics.output_error.interval import LOWER, MOST_ROUNDS, profile_of
 from ..numerics.output_error.selection import Choice, choose_model
@@ -90,7 +90,8 @@ class ComparedFits:
                 ends[one] = profile_limits(*profile_of(fits, one.fit))
         flow = min(flows, key=lambda flow: flow.delta_bic, default=None)
         flow = None if flow is None or flow.delta_bic >= 0 else flow
-        found = ManyLags(tuple(ends.values()), still_improving(equal_lags), flow)
+        of_lags = [self.interval(data, s, solved=True) for s in _many_lags(fits, choice)]
+        found = ManyLags((*ends.values(), *of_lags), still_improving(equal_lags, least), flow)
         return replace(found, better=better, choice=choice, own=ends[law]) if better else found
 
     def interval(self, data: FRFData, key: Structure, *, solved: bool) -> tuple[float, float]:
@@ -98,6 +99,14 @@ class ComparedFits:
         fit, variance = self.fits[key], _row_variance(data, self.fits[key], self.scales[key])
         points = self.points.get(key) or profile_points(data.problem, fit, variance, data.scales)
         return dead_time_interval(data, fit, points, variance, solved=solved)
+
+
+def _many_lags(fits: WindowFit, choice: Choice) -> list[Structure]:
+    """Lags without zeros that are not ruled out, one more than chosen: few points tell so many."""
+    values = charged(fits.criterion, fits.penalty)
+    level = choice.level + (least_charge(fits.penalty) - fits.penalty) * choice.parameters
+    kept = plausible(fits.candidates, values, fits.variance, choice.model, level)
+    return [s for s in kept if s.zeros == 0 and s.order >= SHORTEST and s in fits.candidates]
 
 
 def compared_fits(

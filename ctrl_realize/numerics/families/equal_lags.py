@@ -19,13 +19,13 @@ References
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ..arrays import FloatArray
-from ..constants import Z_95
+from ..constants import VERY_STRONG, Z_95
 from ..engine.eliminate import eliminate
 from ..engine.modal import lag_sum
 from ..engine.problem import Bounds, Mapped, Problem, Structure
@@ -142,6 +142,17 @@ def fit_chains(fits: WindowFit) -> list[LagChain]:
     return chains
 
 
+def free_lags(problem: Problem, scales: Scales, like: Candidate) -> Iterator[Candidate]:
+    """Starts of four to eight lags without zeros: the best of them that are nearly equal.
+
+    The initial values of the chains are those of a fit, as in `fit_chains`.
+    """
+    moments = time_moments(problem, like)
+    for order in range(SHORTEST, LONGEST + 1) if moments[1] > 0 else ():
+        chain = _lowest(problem, scales, order, TANKS, moments)
+        yield Candidate(Structure(order, order), chain.theta, chain.cost)
+
+
 def fit_diffusion(
     fits: WindowFit, modes: int = LONGEST, behind: Sequence[float] = ()
 ) -> list[LagChain]:
@@ -166,16 +177,23 @@ def _over_within_a_sample(chain: LagChain, scales: Scales) -> bool:
     return float(np.sum(1 / np.abs(chain.candidate.poles))) < scales.dt
 
 
-def still_improving(chains: Sequence[LagChain]) -> bool:
-    """Whether the fit would improve beyond the longest chain, by a parabola of the last three.
+def still_improving(chains: Sequence[LagChain], least: float) -> bool:
+    """Whether the fit would improve beyond the longest chain; `least` is the best criterion.
 
-    Where the plant is such a chain every lag improves the fit.
+    If the longest is ruled out, by the excess of the criterion: that of a chain of n lags falls as
+    a power of n - k, faster and faster, and that of another plant towards what no chain explains.
+    Otherwise by a parabola of the last three. Where the plant is a chain every lag improves the
+    fit.
     """
     if not chains or chains[-1].candidate.structure.order < LONGEST:
         return False
-    first, middle, last = (chain.criterion for chain in chains[-3:])
-    bend = first - 2 * middle + last
-    return last < middle < first and (bend <= 0 or (middle - last) / bend > 1.0)
+    excess = np.array([chain.criterion for chain in chains]) - least
+    if not np.all(np.diff(excess) < 0):
+        return False
+    if excess[-1] > VERY_STRONG:
+        return bool(np.all(np.diff(np.log(excess), 2) < 0))
+    last, bend = excess[-2] - excess[-1], np.diff(excess, 2)[-1]
+    return bool(bend <= 0 or last / bend > 1.0)
 
 
 def chain_profile(chain: LagChain, scales: Scales) -> tuple[FloatArray, FloatArray]:
@@ -204,16 +222,16 @@ def time_moments(problem: Problem, like: Candidate) -> tuple[float, float]:
     return mean, float(np.sum(like.poles**-2.0).real - np.sum(zeros**-2.0).real)
 
 
-def _chain(
-    fits: WindowFit,
+def _lowest(
+    problem: Problem,
+    scales: Scales,
     order: int,
     law: _Law,
     moments: tuple[float, float],
     behind: Sequence[float] = (),
-) -> tuple[LagChain, list[float]]:
-    """The best chain, and its parameters."""
-    problem, scales, more = fits.problem, fits.scales, int(bool(behind))
-    mean, spread = moments[0], float(np.sqrt(moments[1]))
+) -> Candidate:
+    """The best fit of a law."""
+    more, mean, spread = int(bool(behind)), moments[0], float(np.sqrt(moments[1]))
     lags = np.exp(-law.rates(order, law.first)[0])
     starts = []
     for part in behind or (0.0,):
@@ -226,8 +244,21 @@ def _chain(
     high = [scales.latest, np.inf, law.high] + [np.inf] * more
     bounds, order = Bounds(np.array(low), np.array(high), smooth=True), order + more
     family = _Chain(order, order, bounds, (-np.inf, np.inf), law)
-    fit = lowest(problem, family, np.array(starts), scales.dt)
-    value = fit.cost / fits.variance + (FREE_IN_A_CHAIN + more + 2) * fits.penalty
+    return lowest(problem, family, np.array(starts), scales.dt)
+
+
+def _chain(
+    fits: WindowFit,
+    order: int,
+    law: _Law,
+    moments: tuple[float, float],
+    behind: Sequence[float] = (),
+) -> tuple[LagChain, list[float]]:
+    """The best chain, and its parameters."""
+    problem = fits.problem
+    fit = _lowest(problem, fits.scales, order, law, moments, behind)
+    order = fit.structure.order
+    value = fit.cost / fits.variance + (FREE_IN_A_CHAIN + bool(behind) + 2) * fits.penalty
     value += problem.local_count(order)
     error = dead_time_error(problem, fit, fits.variance)
     if law is TANKS and fit.parameters[2] <= law.low:

@@ -225,7 +225,7 @@ def likelihood_fit(
     limits += [(other.low, other.high) for other in others]
     low = min(chosen.dead_time, *(first for first, _ in limits))
     high = max(chosen.dead_time, *(last for _, last in limits))
-    if unlimited := still_improving(equal_lags) and Rule.IMPROVING.on:
+    if unlimited := still_improving(equal_lags, min(fits.criterion.values())) and Rule.IMPROVING.on:
         low = scales.earliest
     open_start = onset is not None and choice.flow is None and chosen.structure.zeros > 0
     if onset is not None and open_start and Rule.OPEN_START.on:

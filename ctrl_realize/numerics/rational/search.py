@@ -35,9 +35,10 @@ from ..engine.modal import parameters_from_poles
 from ..engine.problem import Structure
 from ..engine.structures import Candidate, settled
 from ..engine.window_fit import WindowFit
-from ..families.equal_lags import LagChain
+from ..families.equal_lags import SHORTEST, LagChain, free_lags
 from ..families.flow import DispersedFlow
 from ..output_error.selection import chains_of, flows_of
+from ..rules import Rule
 from .frf_data import FRFData, refined
 from .starts import delay_grid, grown_starts, starting_points
 
@@ -113,6 +114,8 @@ def fit_structures(
                 fits[Structure(n, r)] = _fit_one(data, ladder, fits, Structure(n, r))
     if orders is None:
         _with_larger_orders(data, ladder, fits, degrees)
+    if Rule.CHAINS.on:
+        _with_free_lags(data, fits, orders, degrees)
     # One zero more is never worse: if it is, it was caught beside the minimum.
     for structure in sorted(fits, key=lambda one: -one.relative_degree):
         fewer = fits.get(Structure(structure.order, structure.relative_degree + 1))
@@ -147,6 +150,28 @@ def _with_larger_orders(
             if near in (degrees if degrees is not None else range(1, largest + 2)):
                 larger = Structure(largest + 1, near)
                 fits[larger] = _fit_one(data, ladder, fits, larger)
+
+
+def _with_free_lags(
+    data: FRFData,
+    fits: dict[Structure, Candidate],
+    orders: Sequence[int] | None,
+    degrees: Sequence[int] | None,
+) -> None:
+    """Fit four to eight lags without zeros from chains of nearly equal ones.
+
+    From fewer lags, one more at a time, searches end at pairs and zeros that imitate them.
+    """
+    criteria = information_criteria(data, fits)
+    best = fits[min(criteria, key=lambda key: criteria[key])]
+    if best.structure.order < SHORTEST - 1:
+        return
+    for start in free_lags(data.problem, data.scales, best):
+        n = start.structure.order
+        if 4 * n <= data.s.size and n in (orders or (n,)) and n in (degrees or (n,)):
+            found = refined(data, start.structure, [start.parameters], 1)[0]
+            known = fits.get(start.structure, found)
+            fits[start.structure] = min(known, found, key=lambda fit: fit.cost)
 
 
 def information_criteria(data: FRFData, fits: dict[Structure, Candidate]) -> dict[Structure, float]:
