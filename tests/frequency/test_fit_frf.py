@@ -683,6 +683,21 @@ def test_of_eight_equal_lags_none_is_dead_time():
     assert_allclose(fit.total_delay, 3.0, rtol=0.01)
 
 
+@pytest.mark.parametrize(
+    ("lags", "seed"),
+    [((0.1, 0.2, 0.4, 0.5, 0.8), 0), ((0.2, 0.3, 0.4, 0.4, 0.5, 0.5, 0.6, 0.8), 1)],
+)
+def test_of_several_lags_none_is_dead_time(lags, seed):
+    """Zeros of four to six poles took 0.1 to 0.4 s of them."""
+    f = np.geomspace(0.002, 1, 80)
+    s = 2j * np.pi * f
+    exact = np.exp(-0.6 * s) / np.prod(1 + np.multiply.outer(s, lags), axis=1)
+    fit = cr.fit_frf(measured(exact, f, 0.003, seed)).fit
+    assert fit.interval[0] <= 0.6 <= fit.interval[1]
+    assert abs(fit.dead_time - 0.6) < 0.05  # half of the shortest lag
+    assert_allclose(fit.total_delay, 0.6 + sum(lags), rtol=0.01)
+
+
 def test_twelve_equal_lags_leave_the_dead_time_open():
     """Of 3.6 s of lags 0.3 to 0.7 s were dead time, in intervals 0.1 to 0.5 s late."""
     f = np.geomspace(0.002, 1, 80)

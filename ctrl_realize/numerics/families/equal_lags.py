@@ -25,7 +25,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..arrays import FloatArray
-from ..constants import VERY_STRONG, Z_95
+from ..constants import Z_95
 from ..engine.eliminate import eliminate
 from ..engine.modal import lag_sum
 from ..engine.problem import Bounds, Mapped, Problem, Structure
@@ -43,7 +43,7 @@ FREE_IN_A_CHAIN = 2
 
 _DIFFUSION_CHARGE = 8.0
 """Two lags far apart look like diffusion, and are more common. Ablation: charge for diffusion."""
-_WORSE = 100.0  # in the criterion: a longer chain will not come back from there
+_WORSE = 100.0  # in the criterion: a longer chain will not come back from there in a few lags
 
 
 @dataclass(frozen=True, eq=False)
@@ -180,17 +180,16 @@ def _over_within_a_sample(chain: LagChain, scales: Scales) -> bool:
 def still_improving(chains: Sequence[LagChain], least: float) -> bool:
     """Whether the fit would improve beyond the longest chain; `least` is the best criterion.
 
-    If the longest is ruled out, by the excess of the criterion: that of a chain of n lags falls as
-    a power of n - k, faster and faster, and that of another plant towards what no chain explains.
-    Otherwise by a parabola of the last three. Where the plant is a chain every lag improves the
-    fit.
+    Far from it the excess of the criterion tells: that of a chain of n lags falls as a power of
+    n - k, faster and faster, and that of another plant towards what no chain explains. Near it a
+    parabola of the last three does. Where the plant is a chain every lag improves the fit.
     """
     if not chains or chains[-1].candidate.structure.order < LONGEST:
         return False
     excess = np.array([chain.criterion for chain in chains]) - least
     if not np.all(np.diff(excess) < 0):
         return False
-    if excess[-1] > VERY_STRONG:
+    if excess[-1] > _WORSE:
         return bool(np.all(np.diff(np.log(excess), 2) < 0))
     last, bend = excess[-2] - excess[-1], np.diff(excess, 2)[-1]
     return bool(bend <= 0 or last / bend > 1.0)
