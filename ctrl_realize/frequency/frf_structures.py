@@ -91,7 +91,8 @@ class ComparedFits:
         flow = min(flows, key=lambda flow: flow.delta_bic, default=None)
         flow = None if flow is None or flow.delta_bic >= 0 else flow
         of_lags = [self.interval(data, s, solved=True) for s in _many_lags(fits, choice)]
-        found = ManyLags((*ends.values(), *of_lags), still_improving(equal_lags, least), flow)
+        unlimited = choice.flow is None and still_improving(equal_lags, least)
+        found = ManyLags((*ends.values(), *of_lags), unlimited, flow)
         return replace(found, better=better, choice=choice, own=ends[law]) if better else found
 
     def interval(self, data: FRFData, key: Structure, *, solved: bool) -> tuple[float, float]:

@@ -51,7 +51,9 @@ from .shaped import ShapedFamily, UnitResponse, lowest
 _CHARGE = 8.0
 """What a flow must be worth in the criterion: a few lags are more common. Ablation: charge for a
 flow."""
-_MINOR = 0.5  # of the lag behind it: a flow that spreads by less is no different from a second lag
+_MINOR = 0.5
+"""Of the lag behind it: a flow that spreads by less is no different from a second lag in a step
+response. In points of a frequency response, which reach further, it is."""
 _FOLLOWED = 3  # starts that are improved: time
 _SPREADS = (0.1, 1.2)
 """Standard deviations over means: narrower is no different from many lags, wider from few."""
@@ -299,16 +301,16 @@ def fit_flows(fits: WindowFit, level: float) -> list[DispersedFlow]:
     Returns
     -------
     list of DispersedFlow
-        Only fits whose spread is at least half of the lag in series; otherwise a second lag would
-        be equivalent. A short flow with a long lag and a long flow alone are often equally good:
-        both are returned. Empty if the spread in time of the best fit is less than a sample, or if
-        the record has a free response, for which dispersion has no poles.
+        Of steps alone only fits whose spread is at least half of the lag in series; otherwise a
+        second lag would be equivalent. A short flow with a long lag and a long flow alone are often
+        equally good: both are returned. Empty if the spread in time of the best fit is less than a
+        sample, or if the record has a free response, for which dispersion has no poles.
     """
     problem, scales, penalty = fits.problem, fits.scales, fits.penalty
-    known = all(
-        isinstance(drive, StepSequence | Sines | HeldSines) for drive in _parts(problem.drive)
-    )
-    if problem.segments is not None or not known:
+    drives = _parts(problem.drive)
+    points = [isinstance(drive, Sines | HeldSines) for drive in drives]
+    known = [isinstance(drive, StepSequence) for drive in drives] + points
+    if problem.segments is not None or sum(known) < len(drives):
         return []
     mean, square = time_moments(problem, fits.best)
     if not square > scales.dt**2:
@@ -336,7 +338,8 @@ def fit_flows(fits: WindowFit, level: float) -> list[DispersedFlow]:
         flows.append(
             DispersedFlow(fit, *family.times(fit.parameters), criterion, criterion - level)
         )
-    return [flow for flow in flows if flow.spread * flow.mean >= _MINOR * flow.lag]
+    least = 0.0 if any(points) else _MINOR
+    return [flow for flow in flows if flow.spread * flow.mean >= least * flow.lag]
 
 
 def _starts(
