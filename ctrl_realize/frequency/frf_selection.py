@@ -85,7 +85,7 @@ def chosen_model(
     fits, rows, scales = compared.fits, compared.rows, compared.scales
     best = rows[0]
     many = ManyLags() if stated else compared.of_many_lags(data)
-    near, beside = compared.near(many.better), list(many.ends)
+    near, beside = compared.near(many.better), [*many.ends, *[(0.0, 0.0)] * many.unlimited]
     ends = [compared.interval(data, key_of(row), solved=row is best) for row in near]
     for other, its in others:
         more = compared_fits(other, its, unit, noise_known)
@@ -106,7 +106,6 @@ def chosen_model(
     limits = data.max_dead_time / unit, 1 / frequency[-1]
     interval, flags = _cover(dead_time, near, within, beside, *limits)
     if many.unlimited:
-        interval = 0.0, interval[1]
         flags.append(flagged("many_lags", known=""))
     if many.flow is not None:
         followed = many.choice is not None and many.choice.flow is not None
