@@ -21,9 +21,9 @@ from .text_options import TextOptions
 from .units import plain_unit
 
 _NAMES = facts("io/words.toml")["frf"]
-_IN_HZ = {"mHz": 1e-3, "hz": 1.0, "khz": 1e3, "MHz": 1e6, "rad/s": 1 / (2 * np.pi)}
+_IN_HZ = {"mHz": 1e-3, "Hz": 1.0, "kHz": 1e3, "MHz": 1e6, "rad/s": 1 / (2 * np.pi)}
 _SHALLOW = 60.0  # degrees, by which a lag turns the phase where it has halved the magnitude
-_UNITS = {"frequency": tuple(_IN_HZ), "magnitude": ("", "db"), "phase": ("deg", "rad")}
+_UNITS = {"frequency": tuple(_IN_HZ), "magnitude": ("abs", "dB"), "phase": ("deg", "rad")}
 
 
 def read_frf(
@@ -55,7 +55,8 @@ def read_frf(
     Columns are identified by their names (``frequency_hz``, ``omega``, ``magnitude_db``, ``phase
     [rad]``, ``real``, ``imag``, ``coherence``, ``std``); without a header, three columns are
     frequency, magnitude and phase. Units are taken from the header; default: frequency in Hz
-    (``omega``: rad/s), magnitude as a ratio and phase in degrees. If the values contradict this, or
+    (``omega``: rad/s), magnitude as a ratio and phase in degrees. A ratio of other units, as of
+    ``gain [%/mA]``, is kept as it is. If the values contradict this, or
     the frequency is in rad/s and the phase has no unit, it is an error.
 
     Parameters
@@ -76,8 +77,8 @@ def read_frf(
         Complex numbers (as text ``0.5-0.3i``), in place of magnitude and phase, or real and
         imaginary part.
     coherence, std : str or int, optional
-        Columns of the coherence, and of the standard deviation of the complex response, in its
-        unit.
+        Columns of the coherence, from 0 to 1 or in %, and of the standard deviation of the complex
+        response, in its unit.
     frequency_unit : str, optional
         ``"mHz"``, ``"Hz"``, ``"kHz"``, ``"MHz"`` or ``"rad/s"``.
     magnitude_unit : str, optional
@@ -126,6 +127,8 @@ def read_frf(
     coherences, stds = (
         table.numbers(columns[key]) if key in columns else None for key in ("coherence", "std")
     )
+    if coherences is not None and table.columns[columns["coherence"]].unit == "%":
+        coherences = coherences / 100
     try:
         values = _response(table, columns, units)
         points = _frequency_hz(table, columns["frequency"], units["frequency"])
@@ -143,8 +146,8 @@ def _checked_unit(given: Mapping[str, Any], argument: str, known: Iterable[str])
     if unit == "auto":
         return None
     plain = plain_unit(str(unit))
-    if plain not in known:
-        names = ", ".join(repr(one or "abs") for one in known)
+    if plain not in map(plain_unit, known):
+        names = ", ".join(map(repr, known))
         raise OptionError(f"{argument}={unit!r} must be one of {names} or 'auto'")
     return plain
 
@@ -197,12 +200,13 @@ def _frequency_unit(table: Table, index: int, unit: str | None) -> str:
 
 def _frequency_hz(table: Table, index: int, unit: str | None) -> FloatArray:
     unit = _frequency_unit(table, index, unit)
-    if unit not in _IN_HZ:
+    in_hz = {plain_unit(name): size for name, size in _IN_HZ.items()}
+    if unit not in in_hz:
+        *names, last = map(repr, _IN_HZ)
         raise OptionError(
-            f"{table.at(index)} is in {unit!r}; give frequency_unit='mHz', "
-            "'Hz', 'kHz', 'MHz' or 'rad/s'"
+            f"{table.at(index)} is in {unit!r}; give frequency_unit={', '.join(names)} or {last}"
         )
-    return table.numbers(index) * _IN_HZ[unit]
+    return table.numbers(index) * in_hz[unit]
 
 
 def _check_unit_of_std(table: Table, columns: Mapping[str, int]) -> None:

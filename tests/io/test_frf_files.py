@@ -99,7 +99,9 @@ def test_columns_and_units_are_chosen(tmp_path):
         (written("f,re,im,coh", F, F, F, F), {}, DataError, "a.csv: coherence runs from"),
         (written("f,re,im", F, F, F * np.nan), {}, DataError, "line 2: 'nan': a value is missing"),
         (written("f,re,im", F, F, F), {"phase_unit": "turns"}, OptionError, "phase_unit='turns'"),
-        (written("f,re,im", F, F, F), {"magnitude_unit": "V"}, OptionError, "'abs', 'db'"),
+        (written("f,re,im", F, F, F), {"magnitude_unit": "V"}, OptionError, "'abs', 'dB'"),
+        (written("f,re,im", F, F, F), {"frequency_unit": "GHz"}, OptionError, "'Hz', 'kHz'"),
+        (written("f [GHz],re,im", F, F, F), {}, OptionError, "'mHz', 'Hz', 'kHz', 'MHz' or"),
         (written("f,re,im", F, F, F), {"frequency": "w"}, OptionError, "frequency='w'"),
         ("hello\n", {}, FileFormatError, "numeric columns"),
     ],
@@ -140,6 +142,12 @@ def test_complex_numbers_are_read_as_programs_write_them(tmp_path, head, form, d
     file.write_text(file.read_text().replace(rows[3], f"5{decimal}0{mark}1{decimal}2+k"))
     with pytest.raises(DataError, match=r"line 5: '1[.,]2\+k': is not a number"):
         read_frf(file)
+
+
+def test_a_coherence_in_per_cent_is_read(tmp_path):
+    file = tmp_path / "a.csv"
+    file.write_text(written("f,re,im,coherence [%]", F, G.real, G.imag, np.linspace(100, 20, 5)))
+    assert_allclose(read_frf(file).coherence, np.linspace(1, 0.2, 5), rtol=1e-15)
 
 
 def test_coherence_and_std_come_along_and_a_cut_last_line_does_not(tmp_path):
