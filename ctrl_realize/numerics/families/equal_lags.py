@@ -142,13 +142,15 @@ def fit_chains(fits: WindowFit) -> list[LagChain]:
     return chains
 
 
-def free_lags(problem: Problem, scales: Scales, like: Candidate) -> Iterator[Candidate]:
-    """Starts of four to eight lags without zeros: the best of them that are nearly equal.
+def free_lags(
+    problem: Problem, scales: Scales, like: Candidate, orders: Sequence[int]
+) -> Iterator[Candidate]:
+    """Starts of so many lags without zeros: the best of them that are nearly equal.
 
     The initial values of the chains are those of a fit, as in `fit_chains`.
     """
     moments = time_moments(problem, like)
-    for order in range(SHORTEST, LONGEST + 1) if moments[1] > 0 else ():
+    for order in orders if moments[1] > 0 else ():
         chain = _lowest(problem, scales, order, TANKS, moments)
         yield Candidate(Structure(order, order), chain.theta, chain.cost)
 

@@ -35,7 +35,7 @@ from ..engine.modal import parameters_from_poles
 from ..engine.problem import Structure
 from ..engine.structures import Candidate, settled
 from ..engine.window_fit import WindowFit
-from ..families.equal_lags import SHORTEST, LagChain, free_lags
+from ..families.equal_lags import LONGEST, SHORTEST, LagChain, free_lags
 from ..families.flow import DispersedFlow
 from ..output_error.selection import chains_of, flows_of
 from ..rules import Rule
@@ -164,14 +164,13 @@ def _with_free_lags(
     """
     criteria = information_criteria(data, fits)
     best = fits[min(criteria, key=lambda key: criteria[key])]
-    if best.structure.order < SHORTEST - 1:
-        return
-    for start in free_lags(data.problem, data.scales, best):
-        n = start.structure.order
-        if 4 * n <= data.s.size and n in (orders or (n,)) and n in (degrees or (n,)):
-            found = refined(data, start.structure, [start.parameters], 1)[0]
-            known = fits.get(start.structure, found)
-            fits[start.structure] = min(known, found, key=lambda fit: fit.cost)
+    longest = min(LONGEST, data.s.size // 4) if best.structure.order >= SHORTEST - 1 else 0
+    every = range(SHORTEST, longest + 1)
+    wanted = [n for n in every if n in (orders or (n,)) and n in (degrees or (n,))]
+    for start in free_lags(data.problem, data.scales, best, wanted):
+        found = refined(data, start.structure, [start.parameters], 1)[0]
+        known = fits.get(start.structure, found)
+        fits[start.structure] = min(known, found, key=lambda fit: fit.cost)
 
 
 def information_criteria(data: FRFData, fits: dict[Structure, Candidate]) -> dict[Structure, float]:
