@@ -159,7 +159,7 @@ def _of_responses(plants: Sequence[Plant], seeds: range) -> list[Case]:
 
 
 def _of_inputs(plants: Sequence[Plant], seeds: range) -> list[Case]:
-    """1500 samples at 0.1 s from rest, levels of random sign held for 1.5 s, 0.3 or 2 % of noise."""
+    """1500 samples at 0.1 s from rest, random signs held for 1.5 s, 0.3 or 2 % of noise."""
     found = []
     for number, plant in enumerate(plants):
         for seed in seeds:

@@ -24,11 +24,10 @@ from ..numerics.engine.window_fit import WindowFit, window_of_rows, with_known_n
 from ..numerics.families.equal_lags import SHORTEST, LagChain, chain_limits, still_improving
 from ..numerics.families.flow import DispersedFlow
 from ..numerics.output_error.interval import LOWER, MOST_ROUNDS, profile_of
-from ..numerics.output_error.selection import Choice, choose_model
+from ..numerics.output_error.selection import Choice, choose_model, many_lags
 from ..numerics.rational.frf_data import FRFData, dead_time_interval
 from ..numerics.rational.search import (
     information_criteria,
-    many_lags,
     parameters,
     residual_variance,
     smallest_cost,

@@ -33,6 +33,7 @@ from functools import partial
 from typing import Any
 
 import numpy as np
+from scipy.signal import fftconvolve
 from scipy.special import erfcx
 
 from ..arrays import ComplexArray, FloatArray
@@ -40,7 +41,7 @@ from ..constants import VERY_STRONG
 from ..engine.eliminate import eliminate
 from ..engine.modal import moved_amplitudes, partial_fractions
 from ..engine.problem import Bounds, KnownFactor, Problem
-from ..engine.responses import HeldInput, SeveralInputs, StepSequence
+from ..engine.responses import HeldInput, SampledInput, SeveralInputs, StepSequence
 from ..engine.structures import REACH, Candidate
 from ..engine.window_fit import WindowFit
 from ..rules import Rule
@@ -62,6 +63,7 @@ _DELAYS, _LAGS = (0.0, 0.4, 0.7, 0.95), (0.05, 0.3, 0.6, 0.9)
 _ALIASES = 20
 """On either side: what others pass is 1e-5 of the response of a flow that spreads over a tenth of a
 sample, and 1e-4 over a twentieth."""
+_NO_POLES = np.empty(0, dtype=np.complex128), np.empty((0, 4), dtype=np.complex128)
 _DOUBLE = 1e-12
 """Instead of a square of q of 0, where a derivative is a quotient of two zeros."""
 
@@ -162,10 +164,29 @@ class FlowFamily(ShapedFamily):
         Where samples are missing, in means over two times, as in `StepSequence`. The slopes
         (m, k) are derivatives with respect to the parameters.
         """
-        drives = _parts(problem.drive)
-        made = np.concatenate([self._rows(drive, problem.known, x) for drive in drives])
-        none = np.empty((0, x.size), dtype=np.complex128)
-        return UnitResponse(made[:, 0], made[:, 1:], np.ones(1), none[:, 0], none)
+        drive, known = problem.drive, problem.known
+        if isinstance(drive, SeveralInputs):
+            wanted = drive.rows or (slice(None),) * len(drive.parts)
+            pairs = zip(drive.parts, wanted, strict=True)
+            made = np.concatenate([self._rows(part, known, x)[rows] for part, rows in pairs])
+        else:
+            made = self._rows(drive, known, x)
+        poles, moved = self._free(x) if problem.segments is not None else _NO_POLES
+        return UnitResponse(made[:, 0], made[:, 1:], np.ones(1), poles, moved[:, : x.size])
+
+    def _free(self, x: FloatArray) -> tuple[ComplexArray, ComplexArray]:
+        """Poles of a free response, and their derivatives.
+
+        What is still in a flow when a record begins leaves it with its slowest rate in the end;
+        a second pole is for what comes before.
+        """
+        _, mean, spread, lag = self.times(x)
+        poles = -np.array([1.0, 2.0]) / (2 * spread**2 * mean)
+        moved = -poles[:, None] * [0.0, 1.0, 2.0, 0.0]
+        if lag:
+            poles = np.append(poles, -1 / lag)
+            moved = np.vstack([moved, [0.0, 0.0, 0.0, 1 / lag]])
+        return poles.astype(np.complex128), moved.astype(np.complex128)
 
     def _rows(self, drive: HeldInput, known: KnownFactor, x: FloatArray) -> FloatArray:
         """Unit response and its slopes (m, 1 + k) in the rows of one part of the data."""
@@ -177,6 +198,11 @@ class FlowFamily(ShapedFamily):
             omega = drive.omega + turns
             parts = self._points(omega.ravel(), x).reshape(*omega.shape, -1)
             return stacked_parts(np.einsum("ak,akj->kj", drive.omega / omega, parts))
+        if isinstance(drive, SampledInput):
+            changes = np.diff(drive.signal, prepend=0.0)[:, None]
+            times = np.asarray(drive.dt * np.arange(drive.signal.size), dtype=np.float64)
+            step = self._step(times, x, *self._residues(known, x))
+            return np.asarray(fftconvolve(changes, step, axes=0)[: times.size])
         assert isinstance(drive, StepSequence)
         sampled = partial(self._sampled, drive, known, x)
         if drive.samples is not None:
@@ -309,8 +335,9 @@ def fit_flows(fits: WindowFit, level: float) -> list[DispersedFlow]:
     problem, scales, penalty = fits.problem, fits.scales, fits.penalty
     drives = _parts(problem.drive)
     points = [isinstance(drive, Sines | HeldSines) for drive in drives]
-    known = [isinstance(drive, StepSequence) for drive in drives] + points
-    if problem.segments is not None or sum(known) < len(drives):
+    # Beside a step the free response to an earlier input takes the place of a flow.
+    kinds = StepSequence | Sines | HeldSines if problem.segments is None else SampledInput
+    if not all(isinstance(drive, kinds) for drive in drives):
         return []
     mean, square = time_moments(problem, fits.best)
     if not square > scales.dt**2:
@@ -334,7 +361,7 @@ def fit_flows(fits: WindowFit, level: float) -> list[DispersedFlow]:
         charge = (family.bounds.low.size + 1) * penalty + (_CHARGE if Rule.FLOW_CHARGE.on else 0.0)
         most = (level + REACH - charge) * fits.variance
         fit = lowest(problem, family, promising, scales.dt, most)
-        criterion = fit.cost / fits.variance + charge
+        criterion = fit.cost / fits.variance + charge + problem.local_count(2 + lagging)
         flows.append(
             DispersedFlow(fit, *family.times(fit.parameters), criterion, criterion - level)
         )

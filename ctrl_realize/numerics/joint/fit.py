@@ -35,7 +35,7 @@ from ..engine.structures import Candidate, converged, search, settled
 from ..engine.window_fit import with_known_noise
 from ..output_error.interval import likelihood_fit
 from ..output_error.result import OutputErrorEstimate
-from ..rational.search import many_lags
+from ..output_error.selection import many_lags
 from .data import JointData
 from .effects import freed
 

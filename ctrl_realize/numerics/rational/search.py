@@ -34,10 +34,7 @@ from ..constants import VERY_STRONG
 from ..engine.modal import parameters_from_poles
 from ..engine.problem import Structure
 from ..engine.structures import Candidate, settled
-from ..engine.window_fit import WindowFit
-from ..families.equal_lags import LONGEST, SHORTEST, LagChain, free_lags
-from ..families.flow import DispersedFlow
-from ..output_error.selection import chains_of, flows_of
+from ..families.equal_lags import LONGEST, SHORTEST, free_lags
 from ..rules import Rule
 from .frf_data import FRFData, refined
 from .starts import delay_grid, grown_starts, starting_points
@@ -55,11 +52,6 @@ _SETTLED = 10.0
 or widen the interval."""
 _KEPT = 4  # starts followed to the end, and fits of every order that are extended: time
 _TRIED = 100  # floors over the range of the response: 10 % apart over four decades
-_MODES, _BEHIND = 16, (0.3, 0.6, 0.9)
-"""Modes of diffusion, and starts of a lag in series with it over the spread of all.
-
-The 16th mode is 256 to 961 times as fast as the first: frequencies that reach three decades above
-it are rare. Benchmark: the table of very many lags."""
 
 
 def dead_time_bound(response: ComplexArray, omega: FloatArray, sigma: FloatArray) -> float:
@@ -373,13 +365,3 @@ def error_floor(size: FloatArray, residual: FloatArray) -> float:
     cost = size.size * cost + np.log(variance).sum(axis=1)
     best = int(np.argmin(cost))
     return float(np.sqrt(tried[best])) if 2 * (cost[0] - cost[best]) > VERY_STRONG else 0.0
-
-
-def many_lags(fits: WindowFit) -> tuple[list[LagChain], list[DispersedFlow]]:
-    """Fit what has more lags than structures have to points of a frequency response.
-
-    These are chains of lags, and diffusion and dispersion alone and beside a lag. There may be
-    records beside the points.
-    """
-    chains = chains_of(fits, _MODES, _BEHIND)
-    return chains, flows_of(fits, chains)

@@ -39,7 +39,7 @@ from ..interval import likelihood_fit
 from ..other_structures import Compared, Requested, other_structures
 from ..process_models import fit_requested
 from ..result import OutputErrorEstimate, followed_by, followed_percent, levels
-from ..selection import chains_of, close_to
+from ..selection import close_to, many_lags
 from .condensed import MOST_LAGS, Condensed, condensed
 from .data import BEYOND, MOST_SAMPLES, Load, SampledData, cut
 from .lags import fit_lags, plain_lags, posterior_of
@@ -189,7 +189,8 @@ def fit_sampled(
             part, data, fits = filtered, filtered.data, filtered.fit
     white = fits.correlation <= WHITE
     if structures is None and requested.fastest is None:
-        fit = likelihood_fit(fits, adequate=white, chains=chains_of(fits))
+        chains, flows = many_lags(fits)
+        fit = likelihood_fit(fits, adequate=white, chains=chains, flows=flows)
     else:
         fit = fit_requested(
             fits, requested, adequate=white, is_noise=lambda _, correlation: correlation <= WHITE,
