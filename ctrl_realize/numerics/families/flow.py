@@ -319,8 +319,8 @@ def fit_flows(fits: WindowFit, level: float) -> list[DispersedFlow]:
     Parameters
     ----------
     fits : WindowFit
-        Of a step record, a frequency response or both; the best of them has the dead time and the
-        spread in time of the initial values.
+        Of a step record, a frequency response, both, or records of any input; the best of them has
+        the dead time and the spread in time of the initial values.
     level : float
         Criterion of the best lags: fits far above it are abandoned.
 
@@ -330,7 +330,7 @@ def fit_flows(fits: WindowFit, level: float) -> list[DispersedFlow]:
         Of steps alone only fits whose spread is at least half of the lag in series; otherwise a
         second lag would be equivalent. A short flow with a long lag and a long flow alone are often
         equally good: both are returned. Empty if the spread in time of the best fit is less than a
-        sample, or if the record has a free response, for which dispersion has no poles.
+        sample, or if a step record has a free response.
     """
     problem, scales, penalty = fits.problem, fits.scales, fits.penalty
     drives = _parts(problem.drive)
