@@ -4,7 +4,8 @@ Data are simulated; CPU time of the process, one call each. ``python -m benchmar
 measured`` prints how well halves of measured records are simulated, beside rivals, and
 ``responses`` what measured frequency responses gave, ``joint`` what they gave with step records,
 ``several`` what several records of a plant give together, ``kinds`` tests of several kinds,
-``lags`` plants of very many lags, ``statements`` what it gains to state a fastest lag.
+``lags`` and ``lags_of_inputs`` plants of very many lags, ``statements`` what it gains to state a
+fastest lag.
 """
 
 from __future__ import annotations
@@ -88,6 +89,7 @@ if __name__ == "__main__":
         "joint": joint.table,
         "kinds": kinds.table,
         "lags": many_lags.table,
+        "lags_of_inputs": many_lags.table_of_inputs,
         "several": several.table,
         "statements": statements.table,
     }

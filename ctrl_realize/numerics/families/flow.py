@@ -63,7 +63,6 @@ _DELAYS, _LAGS = (0.0, 0.4, 0.7, 0.95), (0.05, 0.3, 0.6, 0.9)
 _ALIASES = 20
 """On either side: what others pass is 1e-5 of the response of a flow that spreads over a tenth of a
 sample, and 1e-4 over a twentieth."""
-_NO_POLES = np.empty(0, dtype=np.complex128), np.empty((0, 4), dtype=np.complex128)
 _DOUBLE = 1e-12
 """Instead of a square of q of 0, where a derivative is a quotient of two zeros."""
 
@@ -171,7 +170,9 @@ class FlowFamily(ShapedFamily):
             made = np.concatenate([self._rows(part, known, x)[rows] for part, rows in pairs])
         else:
             made = self._rows(drive, known, x)
-        poles, moved = self._free(x) if problem.segments is not None else _NO_POLES
+        poles, moved = self._free(x)
+        if problem.segments is None:
+            poles, moved = poles[:0], moved[:0]
         return UnitResponse(made[:, 0], made[:, 1:], np.ones(1), poles, moved[:, : x.size])
 
     def _free(self, x: FloatArray) -> tuple[ComplexArray, ComplexArray]:

@@ -193,18 +193,20 @@ def likelihood_fit(
     adequate: bool,
     chains: Sequence[LagChain] = (),
     flows: Sequence[DispersedFlow] = (),
+    follow: bool = True,
     onset: float | None = None,
     may_stick: bool = False,
     near: tuple[CloseDecision, ...] = (),
 ) -> OutputErrorEstimate:
     """Determine dead time and interval from the likelihood.
 
-    `onset` is the time of the visible onset; without it the structures are used alone. With
+    With `follow` dispersion may be the model; otherwise it widens the interval only. `onset` is the
+    time of the visible onset; without it the structures are used alone. With
     `may_stick` the interval reaches to where a stem behind the lags may come loose. `near`
     are close decisions made before.
     """
     equal_lags = [chain for chain in chains if not chain.truncated]
-    fits, choice, points = _compared(fits, equal_lags, flows)
+    fits, choice, points = _compared(fits, equal_lags, flows if follow else ())
     chosen, scales = choice.model, fits.scales
     profiles = curves(fits, points)
     more = least_charge(fits.penalty) - fits.penalty

@@ -65,11 +65,6 @@ _LAGS_OF_TANKS, _LAGS_OF_DIFFUSION = 3, 2
 """Poles from which on there may be more lags than show; the second mode of diffusion is fast: of
 lags that grow fourfold and more one hides beside the first."""
 
-_MODES, _BEHIND = 16, (0.3, 0.6, 0.9)
-"""Modes of diffusion, and starts of a lag in series with it over the spread of all.
-
-The 16th mode is 256 to 961 times as fast as the first: frequencies that reach three decades above
-it are rare. Benchmark: the table of very many lags."""
 _BEHIND_A_FLOW = tuple(Structure(n, r) for n in range(3, 7) for r in range(n, 0, -1))
 """Fewer lags cannot follow a flow that is clearly better than lags."""
 CLOSE = 1e-3
@@ -133,7 +128,9 @@ def many_lags(fits: WindowFit) -> tuple[list[LagChain], list[DispersedFlow]]:
     These are points of a frequency response, also beside records, and responses to other inputs:
     there diffusion has more modes, and may have a lag in series.
     """
-    chains = chains_of(fits, _MODES, _BEHIND)
+    # The 16th mode is 256 to 961 times as fast as the first: data that reach three decades above it
+    # are rare. Starts of the lag are parts of the spread of all. Benchmark: very many lags.
+    chains = chains_of(fits, modes=16, behind=(0.3, 0.6, 0.9))
     return chains, flows_of(fits, chains)
 
 

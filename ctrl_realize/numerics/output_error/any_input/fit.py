@@ -190,7 +190,8 @@ def fit_sampled(
     white = fits.correlation <= WHITE
     if structures is None and requested.fastest is None:
         chains, flows = many_lags(fits)
-        fit = likelihood_fit(fits, adequate=white, chains=chains, flows=flows)
+        # Ten lags in a sweep look like a flow, which then takes their dead time (a world).
+        fit = likelihood_fit(fits, adequate=white, chains=chains, flows=flows, follow=False)
     else:
         fit = fit_requested(
             fits, requested, adequate=white, is_noise=lambda _, correlation: correlation <= WHITE,
