@@ -123,10 +123,10 @@ def flows_of(fits: WindowFit, chains: Sequence[LagChain]) -> list[DispersedFlow]
 
 
 def many_lags(fits: WindowFit) -> tuple[list[LagChain], list[DispersedFlow]]:
-    """Fit what has more lags than structures, where data tell more than the response to a step.
+    """Fit what has more lags than structures have to points of a frequency response.
 
-    These are points of a frequency response, also beside records, and responses to other inputs:
-    there diffusion has more modes, and may have a lag in series.
+    They tell more than the response to a step: diffusion has more modes, and may have a lag in
+    series. There may be records beside the points.
     """
     # The 16th mode is 256 to 961 times as fast as the first: data that reach three decades above it
     # are rare. Starts of the lag are parts of the spread of all. Benchmark: very many lags.

@@ -39,7 +39,7 @@ from ..interval import likelihood_fit
 from ..other_structures import Compared, Requested, other_structures
 from ..process_models import fit_requested
 from ..result import OutputErrorEstimate, followed_by, followed_percent, levels
-from ..selection import close_to, many_lags
+from ..selection import chains_of, close_to, flows_of
 from .condensed import MOST_LAGS, Condensed, condensed
 from .data import BEYOND, MOST_SAMPLES, Load, SampledData, cut
 from .lags import fit_lags, plain_lags, posterior_of
@@ -189,7 +189,8 @@ def fit_sampled(
             part, data, fits = filtered, filtered.data, filtered.fit
     white = fits.correlation <= WHITE
     if structures is None and requested.fastest is None:
-        chains, flows = many_lags(fits)
+        chains = chains_of(fits)
+        flows = flows_of(fits, chains)
         # Ten lags in a sweep look like a flow, which then takes their dead time (a world).
         fit = likelihood_fit(fits, adequate=white, chains=chains, flows=flows, follow=False)
     else:
