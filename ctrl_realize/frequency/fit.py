@@ -57,7 +57,7 @@ def fit_frf(
         Number of poles, or candidates; default 0 (a gain with dead time) to 4, or as many as the
         points determine, and more (up to 10) as long as the largest is the best or dynamics are
         missing: where more than a tenth of the response is left and the residual is correlated
-        along frequency.
+        along frequency. Where three and more are the best, four to eight without zeros as well.
     relative_degree : int or sequence of int, optional
         Poles minus zeros, or candidates; default 1 to the order. With 0, as of order 0, the dead
         time is rounded to whole samples of the model.

@@ -19,11 +19,11 @@ import numpy as np
 from ..numerics.constants import VERY_STRONG
 from ..numerics.engine.problem import Structure
 from ..numerics.engine.profile import Points, dead_time_error, profile_limits, profile_points
-from ..numerics.engine.structures import Candidate, charged, least_charge, plausible, settled
+from ..numerics.engine.structures import Candidate, charged, plausible, settled
 from ..numerics.engine.window_fit import WindowFit, window_of_rows, with_known_noise
 from ..numerics.families.equal_lags import SHORTEST, LagChain, chain_limits, still_improving
 from ..numerics.families.flow import DispersedFlow
-from ..numerics.output_error.interval import LOWER, MOST_ROUNDS, profile_of
+from ..numerics.output_error.interval import LOWER, MOST_ROUNDS, charged_level, profile_of
 from ..numerics.output_error.selection import Choice, choose_model, many_lags
 from ..numerics.rational.frf_data import FRFData, dead_time_interval
 from ..numerics.rational.search import (
@@ -81,7 +81,7 @@ class ComparedFits:
         law, least = choice.chain or choice.flow, fits.criterion[key]
         better = max(least - choice.level, 0.0) if law else 0.0
         most = least - better + VERY_STRONG
-        ends: dict[LagChain | DispersedFlow | None, tuple[float, float]] = {
+        ends: dict[LagChain | DispersedFlow, tuple[float, float]] = {
             one: chain_limits(one, data.scales) for one in chains if one.criterion <= most
         }
         for one in flows:
@@ -92,7 +92,9 @@ class ComparedFits:
         of_lags = [self.interval(data, s, solved=True) for s in _many_lags(fits, choice)]
         unlimited = choice.flow is None and still_improving(equal_lags, least)
         found = ManyLags((*ends.values(), *of_lags), unlimited, flow)
-        return replace(found, better=better, choice=choice, own=ends[law]) if better else found
+        if law is None or not better:
+            return found
+        return replace(found, better=better, choice=choice, own=ends[law])
 
     def interval(self, data: FRFData, key: Structure, *, solved: bool) -> tuple[float, float]:
         """95 % interval of one structure, in units of the data."""
@@ -102,11 +104,10 @@ class ComparedFits:
 
 
 def _many_lags(fits: WindowFit, choice: Choice) -> list[Structure]:
-    """Lags without zeros that are not ruled out, one more than chosen: few points tell so many."""
-    values = charged(fits.criterion, fits.penalty)
-    level = choice.level + (least_charge(fits.penalty) - fits.penalty) * choice.parameters
+    """Four and more lags without zeros that are not ruled out, up to one more than chosen."""
+    values, level = charged(fits.criterion, fits.penalty), charged_level(fits, choice)
     kept = plausible(fits.candidates, values, fits.variance, choice.model, level)
-    return [s for s in kept if s.zeros == 0 and s.order >= SHORTEST and s in fits.candidates]
+    return [s for s in kept if s.zeros == 0 and s.order >= SHORTEST]
 
 
 def compared_fits(

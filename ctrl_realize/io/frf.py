@@ -56,8 +56,8 @@ def read_frf(
     [rad]``, ``real``, ``imag``, ``coherence``, ``std``); without a header, three columns are
     frequency, magnitude and phase. Units are taken from the header; default: frequency in Hz
     (``omega``: rad/s), magnitude as a ratio and phase in degrees. A ratio of other units, as of
-    ``gain [%/mA]``, is kept as it is. If the values contradict this, or
-    the frequency is in rad/s and the phase has no unit, it is an error.
+    ``gain [%/mA]``, is kept as it is. If the values contradict this, or the frequency is in rad/s
+    and the phase has no unit, it is an error.
 
     Parameters
     ----------

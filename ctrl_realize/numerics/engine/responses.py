@@ -299,12 +299,16 @@ class SeveralInputs(HeldInput):
     parts: tuple[HeldInput, ...]
     rows: tuple[IntArray | slice, ...] | None = None
 
+    @property
+    def wanted(self) -> list[tuple[HeldInput, IntArray | slice]]:
+        """Every part with its rows."""
+        rows = self.rows or (slice(None),) * len(self.parts)
+        return list(zip(self.parts, rows, strict=True))
+
     def modes(self, tau: FloatArray, poles: ComplexArray) -> Modes:
         """Evaluate H, E and T at every row wanted; see `HeldInput`."""
-        wanted = self.rows or (slice(None),) * len(self.parts)
         modes = [
-            [values[:, rows] for values in part.modes(tau, poles)]
-            for part, rows in zip(self.parts, wanted, strict=True)
+            [values[:, rows] for values in part.modes(tau, poles)] for part, rows in self.wanted
         ]
         joined = (np.concatenate(values, axis=1) for values in zip(*modes, strict=True))
         static, mode, slope = joined

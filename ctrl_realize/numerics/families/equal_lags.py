@@ -182,19 +182,20 @@ def _over_within_a_sample(chain: LagChain, scales: Scales) -> bool:
 def still_improving(chains: Sequence[LagChain], least: float) -> bool:
     """Whether the fit would improve beyond the longest chain; `least` is the best criterion.
 
-    Far from it the excess of the criterion tells: that of a chain of n lags falls as a power of
-    n - k, faster and faster, and that of another plant towards what no chain explains. Near it a
-    parabola of the last three does. Where the plant is a chain every lag improves the fit.
+    Where the plant is a chain every lag improves the fit. Far from the best the excess of the
+    criterion then falls faster and faster, towards the length of the plant; that of another plant
+    levels off at what no chain explains. Near it a parabola of the last three tells.
     """
     if not chains or chains[-1].candidate.structure.order < LONGEST:
         return False
     excess = np.array([chain.criterion for chain in chains]) - least
     if not np.all(np.diff(excess) < 0):
         return False
-    if excess[-1] > _WORSE:
-        return bool(np.all(np.diff(np.log(excess), 2) < 0))
     last, bend = excess[-2] - excess[-1], np.diff(excess, 2)[-1]
-    return bool(bend <= 0 or last / bend > 1.0)
+    # A hundredth of the excess is what the law leaves of a plant that is as long as the chain.
+    far = excess[-1] > max(_WORSE, excess[-2] / _WORSE)
+    goes_on = np.all(np.diff(np.log(excess), 2) < 0) if far else bend <= 0 or last / bend > 1.0
+    return bool(goes_on) and Rule.IMPROVING.on
 
 
 def chain_profile(chain: LagChain, scales: Scales) -> tuple[FloatArray, FloatArray]:
@@ -262,9 +263,5 @@ def _chain(
     value = fit.cost / fits.variance + (FREE_IN_A_CHAIN + bool(behind) + 2) * fits.penalty
     value += problem.local_count(order)
     error = dead_time_error(problem, fit, fits.variance)
-    if law is TANKS and fit.parameters[2] <= law.low:
-        # Lags that are equal have another dead time: with the same mean and variance of the impulse
-        # response it is earlier by half the variance of the lags over their mean.
-        error += law.low / 6 * float(np.sum(1 / np.abs(fit.poles))) / Z_95
     found = LagChain(Candidate(Structure(order, order), fit.theta, fit.cost), value, error)
     return found, fit.parameters.tolist()

@@ -36,7 +36,7 @@ import numpy as np
 from scipy.signal import fftconvolve
 from scipy.special import erfcx
 
-from ..arrays import ComplexArray, FloatArray
+from ..arrays import ComplexArray, FloatArray, IntArray
 from ..constants import VERY_STRONG
 from ..engine.eliminate import eliminate
 from ..engine.modal import moved_amplitudes, partial_fractions
@@ -61,8 +61,8 @@ _SPREADS = (0.1, 1.2)
 _DELAYS, _LAGS = (0.0, 0.4, 0.7, 0.95), (0.05, 0.3, 0.6, 0.9)
 """Starts: parts of a dead time that is too long, and of the whole spread in time."""
 _ALIASES = 20
-"""On either side: what others pass is 1e-5 of the response of a flow that spreads over a tenth of a
-sample, and 1e-4 over a twentieth."""
+"""On either side. A flow passes exp(-sqrt(m omega)/c) of a fast frequency omega: of the first alias
+that is left out 1e-10 with a mean m of a sample, and 1e-3 with a tenth of one (c = 0.5)."""
 _DOUBLE = 1e-12
 """Instead of a square of q of 0, where a derivative is a quotient of two zeros."""
 
@@ -163,13 +163,8 @@ class FlowFamily(ShapedFamily):
         Where samples are missing, in means over two times, as in `StepSequence`. The slopes
         (m, k) are derivatives with respect to the parameters.
         """
-        drive, known = problem.drive, problem.known
-        if isinstance(drive, SeveralInputs):
-            wanted = drive.rows or (slice(None),) * len(drive.parts)
-            pairs = zip(drive.parts, wanted, strict=True)
-            made = np.concatenate([self._rows(part, known, x)[rows] for part, rows in pairs])
-        else:
-            made = self._rows(drive, known, x)
+        parts = _parts(problem.drive)
+        made = np.concatenate([self._rows(part, problem.known, x)[rows] for part, rows in parts])
         poles, moved = self._free(x)
         if problem.segments is None:
             poles, moved = poles[:0], moved[:0]
@@ -281,8 +276,8 @@ class FlowFamily(ShapedFamily):
         )
 
 
-def _parts(drive: HeldInput) -> tuple[HeldInput, ...]:
-    return drive.parts if isinstance(drive, SeveralInputs) else (drive,)
+def _parts(drive: HeldInput) -> list[tuple[HeldInput, IntArray | slice]]:
+    return drive.wanted if isinstance(drive, SeveralInputs) else [(drive, slice(None))]
 
 
 @dataclass(frozen=True, eq=False)
@@ -334,7 +329,7 @@ def fit_flows(fits: WindowFit, level: float) -> list[DispersedFlow]:
         sample, or if a step record has a free response.
     """
     problem, scales, penalty = fits.problem, fits.scales, fits.penalty
-    drives = _parts(problem.drive)
+    drives = [drive for drive, _ in _parts(problem.drive)]
     points = [isinstance(drive, Sines | HeldSines) for drive in drives]
     # Beside a step the free response to an earlier input takes the place of a flow.
     kinds = StepSequence | Sines | HeldSines if problem.segments is None else SampledInput

@@ -201,16 +201,16 @@ def likelihood_fit(
     """Determine dead time and interval from the likelihood.
 
     With `follow` dispersion may be the model; otherwise it widens the interval only. `onset` is the
-    time of the visible onset; without it the structures are used alone. With
-    `may_stick` the interval reaches to where a stem behind the lags may come loose. `near`
-    are close decisions made before.
+    time of the visible onset; without it the structures are used alone. With `may_stick` the
+    interval reaches to where a stem behind the lags may come loose. `near` are close decisions made
+    before.
     """
     equal_lags = [chain for chain in chains if not chain.truncated]
     fits, choice, points = _compared(fits, equal_lags, flows if follow else ())
     chosen, scales = choice.model, fits.scales
     profiles = curves(fits, points)
     more = least_charge(fits.penalty) - fits.penalty
-    limit = _charged_level(fits, choice) + VERY_STRONG
+    limit = charged_level(fits, choice) + VERY_STRONG
     flows = [flow for flow in flows if flow.criterion + more * flow.parameters <= limit]
     chains = [chain for chain in chains if chain.criterion + more * FREE_IN_A_CHAIN <= limit]
     of_flows = [profile_of(fits, flow.fit) for flow in flows]
@@ -227,7 +227,7 @@ def likelihood_fit(
     limits += [(other.low, other.high) for other in others]
     low = min(chosen.dead_time, *(first for first, _ in limits))
     high = max(chosen.dead_time, *(last for _, last in limits))
-    if unlimited := still_improving(equal_lags, min(fits.criterion.values())) and Rule.IMPROVING.on:
+    if unlimited := still_improving(equal_lags, min(fits.criterion.values())):
         low = scales.earliest
     open_start = onset is not None and choice.flow is None and chosen.structure.zeros > 0
     if onset is not None and open_start and Rule.OPEN_START.on:
@@ -243,7 +243,7 @@ def likelihood_fit(
     static, close = None, near
     if free:
         close += close_choices(fits, choice.level, chosen.structure)
-        close += close_exclusions(fits, _charged_level(fits, choice), chosen.structure)
+        close += close_exclusions(fits, charged_level(fits, choice), chosen.structure)
         chosen, static = least_extrapolating(fits, chosen)
     found = assembled(fits, chosen, adequate, (), profiles, interval, own, static=static)
     distributed = DistributedLags(
@@ -267,7 +267,7 @@ def _compared(
     for _ in range(MOST_ROUNDS):
         choice = choose_model(fits, equal_lags, flows)
         values = charged(fits.criterion, fits.penalty)
-        level = _charged_level(fits, choice)
+        level = charged_level(fits, choice)
         free = plausible(fits.candidates, values, fits.variance, choice.model, level)
         free = [s for s in free if fits.candidates[s] is choice.model or Rule.STRUCTURES.on]
         points |= laid_profiles(fits, [s for s in free if s not in points])
@@ -283,6 +283,6 @@ def _compared(
     return fits, choice, kept
 
 
-def _charged_level(fits: WindowFit, choice: Choice) -> float:
+def charged_level(fits: WindowFit, choice: Choice) -> float:
     """Value of the criterion relative to which structures are ruled out."""
     return choice.level + (least_charge(fits.penalty) - fits.penalty) * choice.parameters

@@ -91,7 +91,8 @@ def fit_structures(
     orders : sequence of int or None
         Increasing. None: from 0 on, until an order is no longer better than the one before.
     degrees : sequence of int or None
-        Relative degrees, rising; None: 1 to the order, 0 of order 0.
+        Relative degrees, rising; None: 1 to the order, 0 of order 0. Where three poles and more are
+        the best, four to eight lags without zeros are tried as well.
 
     Returns
     -------

@@ -191,7 +191,8 @@ def fit_sampled(
     if structures is None and requested.fastest is None:
         chains = chains_of(fits)
         flows = flows_of(fits, chains)
-        # Ten lags in a sweep look like a flow, which then takes their dead time (a world).
+        # Ten lags in a sweep look like a flow, which then takes their dead time (benchmarks.worlds,
+        # swept_wall).
         fit = likelihood_fit(fits, adequate=white, chains=chains, flows=flows, follow=False)
     else:
         fit = fit_requested(
