@@ -134,6 +134,8 @@ DEFECTS = (
        "if unlimited := still_improving(equal_lags, min(fits.criterion.values())):",
        "if unlimited := False:",
        "step_fit lags_flow", FITS),
+    _d("rounding averages out", "a coarse output of any input is as good as its many samples",
+       "return step if coarse else 0.0", "return 0.0", "coarse_output", FITS),
     _d("chain as long", "a plant as long as the longest chain passes for a longer one",
        "far = excess[-1] > max(_WORSE, excess[-2] / _WORSE)", "far = excess[-1] > _WORSE",
        "fit_frf", FREQUENCY),

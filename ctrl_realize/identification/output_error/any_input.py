@@ -23,7 +23,7 @@ from ...numerics.rules import Rule
 from ...numerics.signals.counters import counter_period
 from ...numerics.validation.own_response import OwnResponse
 from .averaging import common_sample_time
-from .flags import sampled_flags
+from .flags import coarse_flag, sampled_flags
 from .loop_flags import late_input, loop_choices, unstable_flags
 from .repeat_flags import repeat_flags
 from .repeatability import Repeatability, delay_outliers, fit_alike, gain_outliers, unlike_records
@@ -179,6 +179,8 @@ def _summary(
     shown, time = joined(used, data, fit.residual.std)
     limit = data.sought if latest is None else latest
     flags = [*sampled_flags(fit, data.dt, data.longest, limit), *_cut(used, found)]
+    if found.quantum:
+        flags.append(coarse_flag(found.quantum, shown))
     if repeats is not None:
         flags += repeat_flags(repeats, fit.dead_time, data.dt)
     sums = found.condensed

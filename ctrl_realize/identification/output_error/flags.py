@@ -81,6 +81,11 @@ def _percent(size: float, data: StepData) -> str:
     return f"{plainly(100 * size / span, 2)} % of the response"
 
 
+def coarse_flag(quantum: float, data: StepData) -> Flag:
+    """Tell of an output that is rounded more than its noise."""
+    return flagged("coarse_quantisation", quantum=quantum, share=_percent(quantum, data))
+
+
 def sampled_flags(
     fit: OutputErrorEstimate, dt: float, length: float, latest: float | None
 ) -> Iterator[Flag]:
@@ -319,7 +324,6 @@ def _record_flags(data: StepData, fit: OutputErrorEstimate, start: float) -> Ite
     if data.hum:
         yield flagged("hum", lines=", ".join(f"{f / data.dt:.4g} Hz" for f in data.hum))
     if data.coarse:
-        share = _percent(data.quantum, data)
-        yield flagged("coarse_quantisation", quantum=data.quantum, share=share)
+        yield coarse_flag(data.quantum, data)
     noise = max(fit.residual.std, data.sigma) if fit.adequate else np.inf
     yield from outliers(data.output, (data.output - fit.fitted) / noise, start + data.clock)

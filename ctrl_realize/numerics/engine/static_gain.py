@@ -132,7 +132,11 @@ class StaticGain:
 
 
 def static_gain(
-    problem: Problem, candidate: Candidate, variance: float, length: float
+    problem: Problem,
+    candidate: Candidate,
+    variance: float,
+    length: float,
+    rounding: Callable[[FloatArray], FloatArray] | None = None,
 ) -> StaticGain:
     """Propagate the errors of dead time, poles and numerator to gain and total delay.
 
@@ -144,6 +148,8 @@ def static_gain(
         Of the noise, per sample.
     length : float
         Duration of the record after the change of the input, in s.
+    rounding : callable, optional
+        Variances (k,) from the rounding of an output, of sums of the data with weights (k, m).
     """
     theta = candidate.theta
     numerator = eliminate(problem, candidate.structure, candidate.parameters[None]).numerator[0]
@@ -173,6 +179,9 @@ def static_gain(
     value = steady_values(there)
     logs = gradient / np.where(value == 0, 1.0, value)[:, None]
     gain_std = errors.std(gradient[:2], variance)[0]
+    rounded = np.zeros(2)
+    if rounding is not None:
+        rounded = np.sqrt(rounding(errors.influence(gradient[:2]) * problem.root_weight))
     share_std, reached_std = errors.std(np.stack([logs[2] - logs[0], logs[2]]), variance)
     if free and theta.size > 1:
         # A lag that no sample shows has a slope of nothing, but is one of those between a sample
@@ -181,14 +190,14 @@ def static_gain(
         known = np.eye(count)[1 : theta.size] * np.sqrt(12 * variance) / np.log(problem.data.size)
         slopes, own = np.split(known, [errors.slopes.shape[1]], axis=1)
         errors = LocalErrors(np.vstack([errors.slopes, slopes]), np.vstack([errors.own, own]))
-    total_std = errors.std(gradient[:2], variance)[1]
+    total_std = np.hypot(errors.std(gradient[:2], variance)[1], rounded[1])
     gain, total, reached = (float(value) for value in steady_values(point, apart=True))
     slow = np.abs(candidate.poles)
     # An integrator has no slowest time constant, but a constant slope.
     slow = slow[slow * length >= INTEGRATOR]
     return StaticGain(
         gain=gain,
-        gain_std=float(gain_std),
+        gain_std=float(np.hypot(gain_std, rounded[0])),
         total=total,
         total_std=float(total_std),
         slowest=float(slow.min(initial=np.inf)) * length,
@@ -243,7 +252,7 @@ class LocalErrors:
 
     def covariance(self) -> FloatArray:
         """Covariance (p, p) of dead time, pole parameters, numerator, for noise of variance 1."""
-        root = self._root(np.ones(self.slopes.shape[1], dtype=np.bool_))
+        root, _ = self._root(np.ones(self.slopes.shape[1], dtype=np.bool_))
         if self.tangent is not None:
             root = root @ self.tangent.T
         return np.asarray(root.T @ root)
@@ -259,16 +268,26 @@ class LocalErrors:
             gradient = gradient @ self.tangent
             gradient[np.abs(gradient) < _ROUNDED * size] = 0.0
         seen = np.any(gradient != 0, axis=0)
-        along = self._root(seen) @ gradient[:, seen].T
+        along = self._root(seen)[0] @ gradient[:, seen].T
         return np.asarray(np.sqrt(variance * np.sum(along**2, axis=0)))
 
-    def _root(self, seen: BoolArray) -> FloatArray:
-        """Root R (r, s) of the covariance ``R^T R`` of some of the slopes' parameters."""
+    def influence(self, gradient: FloatArray) -> FloatArray:
+        """Change (k, m) of functions with these gradients (k, p) with each of the weighted data."""
+        if self.tangent is not None:
+            gradient = gradient @ self.tangent
+        root, basis = self._root(np.ones(self.slopes.shape[1], dtype=np.bool_))
+        return np.asarray((basis @ (root @ gradient.T)).T)
+
+    def _root(self, seen: BoolArray) -> tuple[FloatArray, FloatArray]:
+        """Root R (r, s) of the covariance ``R^T R`` of some of the slopes' parameters.
+
+        With the directions (m, r) in the data that its rows stand for.
+        """
         columns, size = unit_columns(np.concatenate([self.slopes[:, seen], self.own], axis=1))
-        _, singular, turned = np.linalg.svd(columns, full_matrices=False)
+        basis, singular, turned = np.linalg.svd(columns, full_matrices=False)
         singular = np.maximum(singular, max(_NOTHING * singular.max(initial=0.0), SMALLEST))
         count = int(seen.sum())
-        return np.asarray((turned / singular[:, None])[:, :count] / size[:count])
+        return np.asarray((turned / singular[:, None])[:, :count] / size[:count]), basis
 
 
 def local_errors(

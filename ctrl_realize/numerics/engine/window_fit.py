@@ -23,7 +23,7 @@ References
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
@@ -146,7 +146,8 @@ class WindowFit:
     the variance of the residual, plus that of a coarse `rounding` (neighbours are rounded alike),
     times its `correlation`; after prewhitening, times `colour`, the mean square of the whitened
     residual, and `correlation` is that of the noise. `taken` is what a model takes from slow noise:
-    errors of gain and process parameters have the variance times that. `normalized_rms` is the root
+    errors of gain and process parameters have the variance times that, and those of the gain what
+    `rounded` of `static_gain` adds. `normalized_rms` is the root
     mean square of the residual of the chosen structure, in means over bins, over the given noise
     level. `rivals` are the margins by which structures were chosen, or not, for estimating the
     noise.
@@ -163,6 +164,7 @@ class WindowFit:
     rounding: float = 0.0
     colour: float | None = None
     taken: float = 1.0
+    rounded: Callable[[FloatArray], FloatArray] | None = None
     rivals: Mapping[Structure, float] = field(default_factory=dict)
 
     @property
@@ -242,7 +244,8 @@ class WindowFit:
 
     def static(self, candidate: Candidate) -> StaticGain:
         """Gain and total delay of a candidate, with their errors."""
-        return static_gain(self.problem, candidate, self.error_variance, self.scales.length)
+        setting = self.problem, candidate, self.error_variance, self.scales.length
+        return static_gain(*setting, self.rounded)
 
     def criteria(self, candidates: dict[Structure, Candidate]) -> dict[Structure, float]:
         """Information criterion of other candidates on the same data."""

@@ -73,7 +73,8 @@ class SampledFit:
     `explained` is the decrease of the sum of squares due to the input, divided by the residual
     variance: a chi-square. If the records are longer than `data`, `condensed` contains the data
     that were fitted. `noise` is the polynomial that makes the noise white, 1 for white noise;
-    `loads` are those that were found.
+    `loads` are those that were found, `quantum` is the quantisation step of the output if it is
+    coarse, otherwise 0.
     """
 
     fit: OutputErrorEstimate
@@ -82,6 +83,7 @@ class SampledFit:
     noise: FloatArray
     condensed: Condensed | None
     loads: tuple[Load, ...] = ()
+    quantum: float = 0.0
 
     @property
     def needed(self) -> float:
@@ -159,7 +161,8 @@ def fit_sampled(
         found, fit, loads = fit_lags(cut(outputs, inputs, dt, every, requested.known), requested)
         if requested.forms or fit.better is None:
             fit = _at_rest(found.data, _of_measured(found, fit, found.noise))
-            return SampledFit(fit, found.data, explained(found.fit), found.noise, None, loads)
+            of_fit = explained(found.fit), found.noise, None, loads, found.quantum
+            return SampledFit(fit, found.data, *of_fit)
     structures = requested.structures
     # How long a plant must be seen is a question to all structures.
     every, part = samples_in_a_block(outputs, inputs, dt, replace(requested, structures=None))
@@ -169,7 +172,8 @@ def fit_sampled(
     data, stretch = part.data, part.fit
     fits, sums = stretch, None
     long = any(y.size > every * kept.size for y, kept in zip(outputs, data.outputs, strict=True))
-    if long and complete and not part.loads:
+    # More samples do not take the rounding away.
+    if long and complete and not (part.loads or part.quantum):
         y, u = (
             [x / scale for x, scale in zip(signals, data.scales, strict=True)]
             for signals in (outputs, inputs)
@@ -187,6 +191,8 @@ def fit_sampled(
         others = other_structures(filtered.fit, partial(filtered.fit_of, ORDERS))
         if others.better is None and filtered is not part:
             part, data, fits = filtered, filtered.data, filtered.fit
+    if part.quantum:
+        fits = replace(fits, rounded=part.rounding)
     white = fits.correlation <= WHITE
     if structures is None and requested.fastest is None:
         chains = chains_of(fits)
@@ -220,7 +226,7 @@ def fit_sampled(
     close = fit.close + close_to("adequate", correlation, WHITE)
     fitted = fit.fitted * np.repeat(data.scales, data.counts)
     fit = _at_rest(data, replace(fit, residual=residual, close=close, fitted=fitted))
-    return SampledFit(fit, data, explained(stretch), part.noise, sums, part.loads)
+    return SampledFit(fit, data, explained(stretch), part.noise, sums, part.loads, part.quantum)
 
 
 def _of_measured(

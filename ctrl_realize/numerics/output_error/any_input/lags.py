@@ -207,7 +207,10 @@ def fit_lags(
     fits = part.fit
     if requested.huber:
         fits, fitted = _robust(fits, forms, fitted)
-    part, problem, scales = replace(part, fit=fits), fits.problem, fits.scales
+    part = replace(part, fit=fits)
+    if part.quantum:
+        fits = replace(fits, rounded=part.rounding)
+    problem, scales = fits.problem, fits.scales
     # Free lags follow all that equal ones do: these count for weights alone.
     equal = [] if requested.forms else [fit_form(problem, EQUAL, scales, fitted)]
     profiles = profiled(fits, [*fitted, *equal])

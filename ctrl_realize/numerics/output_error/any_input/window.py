@@ -19,9 +19,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from scipy.linalg import block_diag
+from scipy.signal import fftconvolve
 
 from ...arrays import FloatArray, unit_columns, without_gaps
 from ...constants import SMALLEST, STRONG, VERY_STRONG
@@ -42,7 +44,13 @@ from ...engine.structures import (
 )
 from ...engine.window_fit import Window, WindowFit, fit_window, window_of_rows
 from ...rules import Rule
-from ...signals.noise import correlation_time, quantisation_step, winsorised_sigma
+from ...signals.noise import (
+    correlation_time,
+    is_coarse,
+    quantisation_step,
+    rounding_of_sums,
+    winsorised_sigma,
+)
 from ...signals.noise_model import noise_lags, whitening_filter
 from ...signals.onset import correlation_onset
 from ..step_data import step_data
@@ -94,6 +102,32 @@ class SampledWindow:
     def fit_of(self, structures: Sequence[Structure]) -> WindowFit:
         """Fit other structures to the same data."""
         return _fit(self.data.whitened(self.noise), structures, self.scales, self.huber)
+
+    @property
+    def fitted(self) -> list[FloatArray]:
+        """Output of the model for every record before the filter, in its unit of noise."""
+        model = modelled(self.data, self.fit.best.theta, self.model.numerator)
+        return np.split(model, self.data.edges[1:-1])
+
+    @cached_property
+    def quantum(self) -> float:
+        """Quantisation step of the outputs if averaging does not remove their rounding, else 0."""
+        data = self.data
+        step = quantisation_step(np.concatenate(data.measured))
+        every = zip(data.measured, data.scales, self.fitted, strict=True)
+        left = np.concatenate([y - scale * model for y, scale, model in every])
+        coarse = is_coarse(winsorised_sigma(left, 0.5 * step), step) and Rule.COARSE.on
+        return step if coarse else 0.0
+
+    def rounding(self, weights: FloatArray) -> FloatArray:
+        """Variances (k,) of sums of the rows with weights (k, m), by coarse rounding."""
+        found, order = np.zeros(len(weights)), self.noise.size - 1
+        ends = np.cumsum([model.size - order for model in self.fitted])[:-1]
+        of_records = np.split(weights, ends, axis=1)
+        for own, model, scale in zip(of_records, self.fitted, self.data.scales, strict=True):
+            of_samples = fftconvolve(own, self.noise[None, ::-1], axes=1)
+            found += rounding_of_sums(model, of_samples, self.quantum / scale)
+        return found
 
 
 def fit_windows(
