@@ -203,7 +203,7 @@ def fit_alike(
             break
         used = tuple(i for i in used if i not in apart)
     if repeats.p_value < 0.01:
-        between = float(repeats.delays[list(used)].std(ddof=1)) / np.sqrt(len(used))
+        between = float(repeats.delays[list(used)].std(ddof=1) / np.sqrt(len(used)))
         estimate = replace(
             estimate,
             low=max(estimate.low - Z_95 * between, 0.0),
