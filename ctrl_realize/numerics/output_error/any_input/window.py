@@ -103,7 +103,7 @@ class SampledWindow:
         """Fit other structures to the same data."""
         return _fit(self.data.whitened(self.noise), structures, self.scales, self.huber)
 
-    @property
+    @cached_property
     def fitted(self) -> list[FloatArray]:
         """Output of the model for every record before the filter, in its unit of noise."""
         model = modelled(self.data, self.fit.best.theta, self.model.numerator)
