@@ -386,7 +386,7 @@ def test_a_loop_is_diagnosed_from_a_file_with_a_set_point(tmp_path, capsys):
     file, out = tmp_path / "trend.csv", tmp_path / "out"
     pd.DataFrame(columns).to_csv(file, index=False)
     words = ["loop", str(file), "--input", "op", "--output-column", "pv",
-             "--set-point", "sp", "--process", "flow", "-o"]  # fmt: skip
+             "--reference", "sp", "--process", "flow", "-o"]  # fmt: skip
     assert main([*words, str(out)]) == 0
     said = capsys.readouterr().out
     assert "3 of 600 samples were missing" in said

@@ -83,10 +83,6 @@ Limit = Annotated[
     _OPTION(help="Permitted values, such as t86=0.5, gain=0.9:1.1, t86@2=0.4 (steps of 2 %); "
             "repeatable."),
 ]  # fmt: skip
-# how to judge a loop
-SetPoint = Annotated[
-    str | None, _OPTION("--set-point", help="Column of the set point, if it moves.")
-]
 
 Given: TypeAlias = dict[str, Any]
 """Arguments of Python for the options of a group that were given, see `files.with_options`."""

@@ -156,13 +156,7 @@ def valve(
 
 @command(".valve.loop", "run_loop")
 def loop(
-    files: o.Files,
-    folder: o.Folder = None,
-    *,
-    diagnosed: o.Given,
-    set_point: o.SetPoint = None,
-    trend: o.Given,
-    written: o.Given,
+    files: o.Files, folder: o.Folder = None, *, diagnosed: o.Given, trend: o.Given, written: o.Given
 ) -> None:
     """Tell from operating data whether the valve makes a control loop oscillate.
 

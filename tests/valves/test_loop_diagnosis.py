@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.signal import sawtooth
 
 import ctrl_realize as cr
 from ctrl_realize.errors import DataError, OptionError
@@ -232,6 +233,24 @@ def test_records_that_cannot_tell_say_why():
     assert found.signals.pv[400 - 110] == pytest.approx(line)
     assert diagnosed(wave[:60] * 0, 0.5 ** t[:60]).verdict == "cannot tell"
     assert diagnosed(wave, np.full(600, 3.0)).verdict == "cannot tell"
+
+
+def test_a_set_point_in_the_record_moves_as_one_that_is_given():
+    """A linear PI loop behind a triangle, as of an outer loop, passed for stiction."""
+    n = 2600
+    wanted = 3 * sawtooth(2 * np.pi * np.arange(n) / 100, 0.5)
+    op, pv, left, integral = np.zeros(n), np.zeros(n), 0.0, 0.0
+    noise = 0.1 * np.random.default_rng(1).standard_normal(n)
+    for k in range(n):
+        left = np.exp(-0.1) * left + (1 - np.exp(-0.1)) * (op[k - 2] if k > 1 else 0.0)
+        pv[k] = left + noise[k]
+        integral += 0.2 * (wanted[k] - pv[k])
+        op[k] = 2 * (wanted[k] - pv[k]) + integral
+    record = cr.Record(np.arange(2000.0), op[600:], pv[600:], reference=wanted[600:])
+    arrays = diagnosed(record.input, record.output, sp=record.reference)
+    for found in (cr.valves.diagnose_loop(record), arrays):
+        assert found.verdict == "cannot tell"
+        assert "set_point_moves" in {flag.code for flag in found.flags}
 
 
 def test_wrong_arguments_are_refused():

@@ -7,7 +7,6 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from ...data import Record
 from ...errors import OptionError
 from ...io import read_record
 from ...report.loops import write_loop_report
@@ -23,7 +22,6 @@ def run_loop(
     folder: Path | None,
     *,
     diagnosed: Mapping[str, Any],
-    set_point: str | None,
     trend: Mapping[str, Any],
     run: Run,
 ) -> int:
@@ -33,30 +31,15 @@ def run_loop(
     # the longest complete part is judged
     reading = dict(trend) if "resample" in trend else {**trend, "missing": "keep"}
     refuse_other_results(folder, run)
-    if set_point is None:
-        record = read_record(files[0], **reading)
-        result = diagnose_loop(record, **diagnosed)
-    else:
-        record = _with_set_point(files[0], set_point, reading)
-        value, wanted = record.output
-        result = diagnose_loop(record.input, value, wanted, record.dt, **diagnosed)
+    record = read_record(files[0], **reading)
+    result = diagnose_loop(record, **diagnosed)
     say(printable(f"{files[0]}: {record!r}"))
     say(result.report())
-    calls = [("In a terminal", run.typed)]
-    if set_point is None:
-        lines, name = reading_in_python(files, Reading(reading, {}))
-        lines.append(f"print(cr.valves.diagnose_loop({name}{python_keywords(diagnosed)}).report())")
-        calls.append(("In Python", "\n".join(lines)))
+    lines, name = reading_in_python(files, Reading(reading, {}))
+    lines.append(f"print(cr.valves.diagnose_loop({name}{python_keywords(diagnosed)}).report())")
+    calls = [("In a terminal", run.typed), ("In Python", "\n".join(lines))]
     write = partial(
         write_loop_report, diagnosis=result, files=files, settings=diagnosed, calls=calls
     )
     tables = {"methods.csv": (result.table(), True)}
     return write_results(folder, run, tables, write, "the table of methods")
-
-
-def _with_set_point(file: Path, set_point: str, reading: Mapping[str, Any]) -> Record:
-    """Record whose outputs are the process value and the set point."""
-    given = reading.get("output")
-    if given is None or isinstance(given, list):
-        raise OptionError("--set-point needs the column of the process value: --output-column")
-    return read_record(file, **{**reading, "output": [given, set_point]})

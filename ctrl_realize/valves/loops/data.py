@@ -68,6 +68,7 @@ def loop_data(loop: Any, pv: Any, sp: Any, dt: Any) -> LoopData:
                 "process value: choose them when reading, or give arrays"
             )
         op, pv, dt = loop.input, loop.output, loop.dt
+        sp = loop.reference if sp is None else sp
     elif pv is None or dt is None:
         raise DataError(
             f"pv={'None' if pv is None else '...'}, dt={dt!r}; expected a Record, or the arrays "

@@ -47,7 +47,7 @@ def diagnose_loop(
     pv : array_like, shape (N,), optional
         PV, if `loop` is OP.
     sp : array_like, shape (N,), or float, optional
-        Set point; default: constant.
+        Set point; default: that of the record, otherwise constant.
     dt : float, optional
         Sample time in s, if `loop` is OP.
     process : {"self-regulating", "flow", "integrating"}
