@@ -101,10 +101,9 @@ def read_record(
         Matrix or struct of a ``.mat`` or ``.npz`` file, group of an HDF5 or TDMS file, or sheet of
         a workbook to use.
     start : float, str or datetime, optional
-        First time to use, in s or as a date: as the file has it, or ISO 8601. Without a zone it is
-        of the clock of the file.
+        First time to use, in s or as a date.
     stop : float, str or datetime, optional
-        Last time to use, in the same way.
+        Last time to use, in s or as a date.
     missing : {"auto", "refuse", "keep", "hold"}, optional
         Bad cells, gaps and irregular times are kept as missing samples and told, refused, kept, or
         kept with an input that holds its last value meanwhile. Bad cells have no value (empty,

@@ -14,7 +14,7 @@ from ..numerics.arrays import FloatArray
 from ..numerics.signals.counters import clock_change, clock_unit
 from .columns import holds_numbers
 from .tables import Table
-from .text.dates import Dates, direction, in_utc, offsets_of, stamps_of
+from .text.dates import Dates, direction, have_offset, in_utc, stamps_of
 from .units import checked_time_unit, plain_unit, sample_time_unit, to_seconds, unit_named
 
 # from here on neighbouring integers are the same double
@@ -35,8 +35,7 @@ class TimeAxis(NamedTuple):
     """Time in s, and the date of second 0 where the column has dates.
 
     ``doubt`` tells if that may be another date; ``unit`` is that of numbers in the file. With a
-    ``zone``, or the ``offsets`` from UTC of the cells, the date is in UTC; ``form`` is the format
-    of dates.
+    ``zone``, the date is in UTC.
     """
 
     seconds: FloatArray
@@ -44,8 +43,6 @@ class TimeAxis(NamedTuple):
     doubt: str = ""
     unit: str = ""
     zone: str | None = None
-    offsets: tuple[str, ...] = ()
-    form: str = ""
 
 
 class Clock(NamedTuple):
@@ -86,12 +83,11 @@ def time_axis(table: Table, index: int, clock: Clock, date: int | None = None) -
     if time_format is not None or not holds_numbers(table, index):
         unit_used = named if unit == "auto" else unit
         dates = _parsed_dates(table, index, time_format, unit_used, date)
-        offsets = offsets_of(cells)
-        shown = None if offsets else zone
+        shown = None if have_offset(str(cells[0]).strip()) else zone
         if dates.other is not None:
             _refuse_other_clock(table, index, dates, shown)
         axis = _since_first(table, index, dates.stamps, shown)
-        return axis._replace(doubt=dates.doubt, zone=zone, offsets=offsets, form=dates.form)
+        return axis._replace(doubt=dates.doubt, zone=zone)
     if zone is not None:
         _refuse_zone(table, index, zone)
     if unit == "auto" and cells.dtype.kind in "iu" and _FILETIME[0] < cells[0] < _FILETIME[1]:
@@ -209,8 +205,7 @@ def _refuse_other_clock(table: Table, index: int, dates: Dates, zone: str | None
 def _parsed_dates(
     table: Table, index: int, time_format: str | None, unit: str, date: int | None
 ) -> Dates:
-    raw = [str(cell) for cell in table.columns[index].cells]
-    cells = [_PART.sub(".", cell.strip()) for cell in raw]
+    cells = [_PART.sub(".", str(cell).strip()) for cell in table.columns[index].cells]
     if time_format is None:
         cells = [cell.replace(",", ".") for cell in cells]
     if date is not None and all(re.fullmatch(rf"({_CLOCK})( ?[AaPp][Mm])?", x) for x in cells[:3]):
@@ -232,8 +227,8 @@ def _parsed_dates(
     if bad.any():
         row = int(np.argmax(bad))
         raise DataError(
-            f"{table.at(index, row)}: {raw[row].strip()[:60]!r} is neither a number nor a time in "
-            f"the format {dates.form}; give time_format=, or dt= to ignore the column"
+            f"{table.at(index, row)}: {cells[row][:60]!r} is neither a number nor a time in the "
+            f"format {dates.form}; give time_format=, or dt= to ignore the column"
         )
     return dates
 

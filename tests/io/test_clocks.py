@@ -1,6 +1,5 @@
 """What a time column means: its unit, its zone, how times are said; and counters that turn."""
 
-import datetime as dt
 import re
 import warnings
 
@@ -409,61 +408,3 @@ def test_a_clock_that_is_set_behind_a_gap_is_told_before_missing_values(tmp_path
     assert record.n_missing == 7
     assert "7 missing values>" in repr(record)
     assert "1 missing value>" in repr(record[:700.0])
-
-
-def dated(tmp_path, form, zone=""):
-    """Seven hours of minutes that begin at 20:00 on 4 March 2025, numbered."""
-    first = dt.datetime(2025, 3, 4, 20)
-    stamps = (f"{first + dt.timedelta(minutes=k):{form}}{zone}" for k in range(420))
-    path = tmp_path / "dated.csv"
-    path.write_text("Time;OP;PV\n" + "\n".join(f"{at};{k};{k}" for k, at in enumerate(stamps)))
-    return path
-
-
-@pytest.mark.parametrize(
-    ("form", "midnight", "options"),
-    [
-        ("%d.%m.%Y %H:%M:%S", "05.03.2025 00:00:00", {}),  # was 3 May
-        ("%d.%m.%Y %H:%M:%S", "05.03.2025", {"time_format": "%d.%m.%Y %H:%M:%S"}),
-        ("%d.%m.%Y %H:%M:%S", "2025-03-05 00:00", {}),
-        ("%m/%d/%y %I:%M %p", "03/05/25 12:00 AM", {}),
-        ("%d-%b-%Y %H:%M", "05-Mrz-2025", {}),
-        ("%b %d, %Y %H:%M:%S", "Mar 05, 2025 00:00:00", {"time_format": "%b %d, %Y %H:%M:%S"}),
-        ("%Y-%m-%d %H:%M:%S", dt.datetime(2025, 3, 5), {}),
-    ],
-)
-def test_a_part_begins_and_ends_at_dates_as_the_file_writes_them(tmp_path, form, midnight, options):
-    path = dated(tmp_path, form)
-    assert cr.read_record(path, start=midnight, **options).output[0] == 240
-    assert cr.read_record(path, stop=midnight, **options).output[-1] == 240
-
-
-@pytest.mark.parametrize("midnight", ["2025-03-05", "2025-03-05 00:00+01:00", "2025-03-04T23:00Z"])
-def test_a_date_without_zone_is_of_the_clock_of_the_file(tmp_path, midnight):
-    path = dated(tmp_path, "%Y-%m-%dT%H:%M:%S", "+01:00")
-    assert cr.read_record(path, start=midnight).output[0] == 240
-    with pytest.raises(DataError, match="from 2025-03-04 20:00:00 on"):
-        cr.read_record(path, start="2025-03-06")
-
-
-@pytest.mark.parametrize("zone", ["", "+01:00"])
-@pytest.mark.parametrize("given", ["21:00", "today", "03/05/2025", "5 pm"])
-def test_times_of_no_day_and_dates_of_another_format_are_refused(tmp_path, given, zone):
-    path = dated(tmp_path, "%Y-%m-%dT%H:%M:%S", zone)
-    with pytest.raises(OptionError, match=rf"stop='{given}'; expected .*'2025-03-04 20:00:00'"):
-        cr.read_record(path, stop=given)
-
-
-def test_zones_that_a_file_does_not_tell_are_asked_for(tmp_path):
-    with pytest.raises(OptionError, match=r"in none that is known; give time_zone="):
-        cr.read_record(dated(tmp_path, "%Y-%m-%d %H:%M:%S"), start="2025-03-04T23:00Z")
-    path = dated(tmp_path, "%Y-%m-%d %H:%M:%S", "+01:00")
-    path.write_text(path.read_text().replace("2025-03-05 02:59:00+01", "2025-03-05 03:59:00+02"))
-    with pytest.raises(OptionError, match=r"at \+01:00 and \+02:00 from UTC; .*:00\+01:00'"):
-        cr.read_record(path, start="2025-03-04 23:00")
-    assert cr.read_record(path, start="2025-03-04 23:00+01:00").output[0] == 180
-
-
-def test_a_cell_that_is_no_time_is_shown_as_it_is(tmp_path):
-    with pytest.raises(DataError, match=r"'Mar 04, 2025 20:00:00' is neither"):
-        cr.read_record(dated(tmp_path, "%b %d, %Y %H:%M:%S"))

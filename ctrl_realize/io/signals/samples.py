@@ -17,7 +17,7 @@ from ...numerics.arrays import BoolArray, FloatArray
 from ...numerics.signals.sample_grid import filled, held
 from ..columns import check_lengths
 from ..tables import Table
-from ..text.dates import in_utc, stamp_of
+from ..text.dates import in_utc
 from ..time_column import Clock, TimeAxis, time_axis
 from ..units import plain_unit
 from .long_format import LongTable
@@ -127,8 +127,8 @@ def check_part(path: Path, span: tuple[float, float], inside: FloatArray, axis: 
         raise DataError(
             f"{path}: there are {inside.size} samples between {span[0]:g} s and {span[1]:g} s; "
             f"the file covers {np.min(axis.seconds):g} s to {np.max(axis.seconds):g} s"
-            + ("" if axis.start is None else f" from {_begins(axis)} on")
-            + (" in UTC" if axis.zone or len(axis.offsets) > 1 else "")
+            + ("" if axis.start is None else f" from {str(axis.start)[:19].replace('T', ' ')} on")
+            + (" in UTC" if axis.zone else "")
         )
 
 
@@ -144,39 +144,17 @@ def _second(given: Any, name: str, axis: TimeAxis) -> float:
     if axis.doubt:
         raise OptionError(f"{name}={given!r}: {axis.doubt}")
     try:
-        stamp = stamp_of(given, axis.form) if isinstance(given, str) else pd.Timestamp(given)
+        stamp = pd.Timestamp(given)
     except (ValueError, TypeError) as error:
         raise OptionError(
-            f"{name}={given!r}; expected a time in s, or a date and time such as {_begins(axis)!r}"
+            f"{name}={given!r}; expected a time in s, or a date and time such as "
+            f"{str(axis.start)[:19].replace('T', ' ')!r}"
         ) from error
-    if stamp.tzinfo is not None:
-        if not (axis.zone or axis.offsets):
-            raise OptionError(
-                f"{name}={given!r} is in a time zone, and the dates of the file are in none that "
-                "is known; give time_zone=, or a date without a zone"
-            )
-        stamp = stamp.tz_convert("UTC").tz_localize(None)
-    elif axis.zone is not None:
+    if axis.zone is not None and stamp.tzinfo is None:
         stamp = pd.Timestamp(in_utc(np.array([stamp], "datetime64[ns]"), axis.zone)[0])
-    elif len(axis.offsets) > 1:
-        raise OptionError(
-            f"{name}={given!r}: the dates of the file are at {' and '.join(axis.offsets)} from "
-            f"UTC; give one of them with it, such as '{stamp}{axis.offsets[0]}', or time_zone="
-        )
-    elif axis.offsets:
-        stamp = pd.Timestamp(f"{stamp}{axis.offsets[0]}").tz_convert("UTC").tz_localize(None)
+    elif stamp.tzinfo is not None:
+        stamp = stamp.tz_convert("UTC").tz_localize(None)
     return float((stamp - pd.Timestamp(axis.start)) / pd.Timedelta(1, "s"))
-
-
-def _begins(axis: TimeAxis) -> str:
-    """First date of a file, as a clock with its offset shows it."""
-    import pandas as pd
-
-    first = pd.Timestamp(str(axis.start))
-    if len(axis.offsets) == 1 and axis.zone is None:
-        zone = pd.Timestamp(f"{first}{axis.offsets[0]}").tz
-        first = first.tz_localize("UTC").tz_convert(zone)
-    return str(first)[:19]
 
 
 def labels_of(table: Table, parts: Parts, time_unit: str) -> dict[str, Any]:

@@ -9,8 +9,6 @@ gaps of months where the other is regular. Otherwise the date is ambiguous.
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
-from itertools import product
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -24,7 +22,6 @@ _DATES = ("%d-%m-%Y", "%m-%d-%Y", "%d-%m-%y", "%m-%d-%y", "%Y-%m-%d", "%d-%b-%Y"
 _CLOCKS = (
     "", " %H:%M", " %H:%M:%S", " %H:%M:%S.%f", " %I:%M %p", " %I:%M:%S %p", " %I:%M:%S.%f %p",
 )  # fmt: skip
-_OFFSET = r"(Z|UTC|GMT|[+-]\d{2}:?\d{2})"
 _HALF = re.compile(r" ?([AaPp])\.?[Mm]\.?$")
 _MONTHS = {"mrz": "mar", "mär": "mar", "mai": "may", "okt": "oct", "dez": "dec"}
 """German months whose first three letters are not those of the English names."""
@@ -133,33 +130,9 @@ def direction(stamps: Stamps) -> int:
     return -1 if np.sum(np.diff(stamps) < np.timedelta64(0, "ns")) > stamps.size / 2 else 1
 
 
-def offsets_of(cells: Sequence[Any] | np.ndarray[Any, Any]) -> tuple[str, ...]:
-    """Distances from UTC that dates are written with; none if the first has none."""
-    if not re.search(rf":\d.*{_OFFSET}$", str(cells[0]).strip()):
-        return ()
-    ends = sorted({str(cell).strip()[-6:] for cell in cells})
-    found = (match[0] for end in ends if (match := re.search(rf"{_OFFSET}$", end)))
-    return tuple(dict.fromkeys("+00:00" if end[0] in "ZUG" else end for end in found))
-
-
-def stamp_of(text: str, form: str) -> Any:
-    """Date as the cells of a file in this format are read, or in ISO 8601; pandas.Timestamp.
-
-    Raises
-    ------
-    ValueError
-        It is neither, or a time without a date.
-    """
-    import pandas as pd
-
-    if not re.search(r"\d", text):
-        raise ValueError(text)  # now, today
-    forms = [form, *(form.partition(" ")[0] + clock for clock in _CLOCKS)]
-    for one, words in product(forms if "%" in form else [], (text, _plain(text))):
-        found = pd.to_datetime(words, format=one, errors="coerce")
-        if found is not pd.NaT:
-            return found
-    return pd.to_datetime(text, format="ISO8601")
+def have_offset(cell: str) -> bool:
+    """Whether a date is written with its distance from UTC."""
+    return bool(re.search(r":\d.*(Z|UTC|[+-]\d{2}:?\d{2})$", cell))
 
 
 def _plain(cell: str) -> str:
