@@ -101,9 +101,10 @@ def read_record(
         Matrix or struct of a ``.mat`` or ``.npz`` file, group of an HDF5 or TDMS file, or sheet of
         a workbook to use.
     start : float, str or datetime, optional
-        First time to use, in s or as a date.
+        First time to use, in s or as a date: as the file writes it, or in ISO 8601. A date without
+        time of day is its midnight; without an offset from UTC it is on the clock of the file.
     stop : float, str or datetime, optional
-        Last time to use, in s or as a date.
+        Last time to use, likewise.
     missing : {"auto", "refuse", "keep", "hold"}, optional
         Bad cells, gaps and irregular times are kept as missing samples and told, refused, kept, or
         kept with an input that holds its last value meanwhile. Bad cells have no value (empty,

@@ -14,7 +14,7 @@ from ..numerics.arrays import FloatArray
 from ..numerics.signals.counters import clock_change, clock_unit
 from .columns import holds_numbers
 from .tables import Table
-from .text.dates import Dates, direction, have_offset, in_utc, stamps_of
+from .text.dates import PART, Dates, direction, in_utc, stamps_of, zone_of
 from .units import checked_time_unit, plain_unit, sample_time_unit, to_seconds, unit_named
 
 # from here on neighbouring integers are the same double
@@ -24,8 +24,6 @@ _FILETIME = (1.16e17, 1.58e17)
 # 12:34, 12:34.5, 12:34:56 and 12:34:56.789
 _SHORT = r"\d{1,3}:\d{2}(\.\d*)?"
 _CLOCK = rf"{_SHORT}|\d{{1,3}}:\d{{2}}:\d{{2}}(\.\d*)?"
-_PART = re.compile(r"(?<=:\d\d)[,;:](?=\d{3,}$)")
-"""Sign before a part of a second, as some controllers write it."""
 _FIRST = {"hh:mm": "h", "h:mm": "h", "h:min": "h", "mm:ss": "min", "m:ss": "min", "min:s": "min"}
 AS_STATED = 0.01
 """Relative difference of the usual step from the sample time in the header, or from `dt`."""
@@ -34,15 +32,17 @@ AS_STATED = 0.01
 class TimeAxis(NamedTuple):
     """Time in s, and the date of second 0 where the column has dates.
 
-    ``doubt`` tells if that may be another date; ``unit`` is that of numbers in the file. With a
-    ``zone``, the date is in UTC.
+    ``doubt`` tells if a date may be another one; ``unit`` is that of numbers in the file, ``form``
+    the format of its dates. With a ``zone``, that of the clock or empty for offsets that differ,
+    the date is in UTC.
     """
 
     seconds: FloatArray
     start: np.datetime64 | None = None
     doubt: str = ""
     unit: str = ""
-    zone: str | None = None
+    zone: Any = None
+    form: str = ""
 
 
 class Clock(NamedTuple):
@@ -83,11 +83,12 @@ def time_axis(table: Table, index: int, clock: Clock, date: int | None = None) -
     if time_format is not None or not holds_numbers(table, index):
         unit_used = named if unit == "auto" else unit
         dates = _parsed_dates(table, index, time_format, unit_used, date)
-        shown = None if have_offset(str(cells[0]).strip()) else zone
+        own = zone_of([str(cell).strip() for cell in cells], dates.form)
+        shown = zone if own is None else None
         if dates.other is not None:
             _refuse_other_clock(table, index, dates, shown)
         axis = _since_first(table, index, dates.stamps, shown)
-        return axis._replace(doubt=dates.doubt, zone=zone)
+        return axis._replace(doubt=dates.doubt or axis.doubt, zone=zone or own, form=dates.form)
     if zone is not None:
         _refuse_zone(table, index, zone)
     if unit == "auto" and cells.dtype.kind in "iu" and _FILETIME[0] < cells[0] < _FILETIME[1]:
@@ -155,6 +156,7 @@ def _since_first(
         raise DataError(f"{table.at(index, row)}: the time is missing")
     if not stamps.size:
         return TimeAxis(np.empty(0), None)
+    doubt = ""
     if zone is not None:
         if stamps.dtype.kind != "M":
             _refuse_zone(table, index, zone)
@@ -172,11 +174,12 @@ def _since_first(
                 f"{'back' if hours < 0 else 'forward'} by an hour for summer time at {place}; "
                 "time_zone= says otherwise, such as 'UTC'"
             )
+            doubt = "the clock is set for summer time; give time_zone=, such as 'Europe/Berlin'"
             stamps = stamps - (np.arange(stamps.size) >= row)[::order] * np.timedelta64(hours, "h")
     dated = stamps.dtype.kind == "M"
     since = stamps - (stamps[0] if dated else min(stamps[0], stamps[-1]))
     seconds = np.asarray(since / np.timedelta64(1, "ns") / 1e9, dtype=np.float64)
-    return TimeAxis(seconds, stamps[0] if dated else None, zone=zone)
+    return TimeAxis(seconds, stamps[0] if dated else None, doubt, zone=zone)
 
 
 def _refuse_other_clock(table: Table, index: int, dates: Dates, zone: str | None) -> None:
@@ -205,7 +208,7 @@ def _refuse_other_clock(table: Table, index: int, dates: Dates, zone: str | None
 def _parsed_dates(
     table: Table, index: int, time_format: str | None, unit: str, date: int | None
 ) -> Dates:
-    cells = [_PART.sub(".", str(cell).strip()) for cell in table.columns[index].cells]
+    cells = [PART.sub(".", str(cell).strip()) for cell in table.columns[index].cells]
     if time_format is None:
         cells = [cell.replace(",", ".") for cell in cells]
     if date is not None and all(re.fullmatch(rf"({_CLOCK})( ?[AaPp][Mm])?", x) for x in cells[:3]):

@@ -239,6 +239,95 @@ def test_days_of_a_spreadsheet_with_few_digits_have_the_sample_time(tmp_path, dt
     assert record.sample_time == pytest.approx(dt, rel=1e-3)
 
 
+@pytest.mark.parametrize("order", [1, -1])
+@pytest.mark.parametrize(
+    ("form", "shown", "midnight"),
+    [
+        (
+            "%d.%m.%Y %H:%M:%S",
+            "04.03.2025 20:00:00",
+            ["05.03.2025 00:00:00", "5.3.2025 0:00", "05.03.2025"],
+        ),
+        (
+            "%d.%m.%Y %H:%M:%S,%f",
+            "04.03.2025 20:00:00.000000",
+            ["05.03.2025 00:00:00,000000", "05.03.2025 00:00:00"],
+        ),
+        (
+            "%m/%d/%Y %I:%M:%S %p",
+            "03/04/2025 08:00:00 PM",
+            ["03/05/2025 12:00:00 AM", "3/5/2025 12:00 am", "03/05/2025"],
+        ),
+        (
+            "%Y-%m-%dT%H:%M:%S%z",
+            "2025-03-04 20:00:00+01:00",
+            ["2025-03-05T00:00:00+01:00", "2025-03-04T23:00:00Z"],
+        ),
+        (
+            "%Y-%m-%d %H:%M:%S,%f%z",
+            "2025-03-04 20:00:00+01:00",
+            ["2025-03-05 00:00:00,000000+0100"],
+        ),
+        ("%Y%m%dT%H%M%S%z", "2025-03-04 20:00:00+01:00", ["20250305T000000+0100", "20250305"]),
+        ("%b %d, %Y %H:%M:%S", "Mar 04, 2025 20:00:00", ["Mar 05, 2025 00:00:00", "Mar 05, 2025"]),
+        ("%H:%M:%S %d.%m.%Y %z", "20:00:00 04.03.2025 +0100", ["00:00:00 05.03.2025 +0100"]),
+    ],
+)
+def test_a_part_is_read_as_the_stamps_are(tmp_path, form, shown, midnight, order):
+    """05.03.2025 was the third of May, and a date without offset one of UTC."""
+    path = tmp_path / "a.csv"
+    logged(path, "Europe/Berlin", "2025-03-04 20:00", form, 60.0, order)
+    stated = {} if form[1] in "dmY" else {"time_format": form}
+    for text in [*midnight, "2025-03-05", "2025-03-05T00:00", np.datetime64("2025-03-05")]:
+        assert cr.read_record(path, start=text, **stated).output[0] == 240, text
+        assert cr.read_record(path, stop=text, **stated).output[-1] == 240, text
+    with pytest.raises(DataError, match=rf"0 samples .* covers .* from {re.escape(shown)} on"):
+        cr.read_record(path, start="2025-03-06", **stated)
+
+
+REFUSED = {  # a zone, a form, the given date, and what is needed
+    "an hour": ("UTC", "%d.%m.%Y %H:%M:%S", "21:00", "or a date, .* '25.10.2025 20:00:00'"),
+    "an hour of digits": (
+        "UTC",
+        "%Y-%m-%d %H:%M:%S",
+        "2100",
+        "or a date, .* '2025-10-25 20:00:00'",
+    ),
+    "today": ("UTC", "%d.%m.%Y %H:%M:%S", "today", "or a date, .* as in the file or in ISO 8601"),
+    "another order": ("UTC", "%Y-%m-%d %H:%M:%S", "10/26/2025", "as in the file or in ISO 8601"),
+    "an offset": ("UTC", "%Y-%m-%d %H:%M:%S", "2025-10-26T00:00Z", "without one, or time_zone="),
+    "no offset": ("Europe/Berlin", "%Y-%m-%dT%H:%M:%S%z", "2025-10-26", "differ; .* time_zone="),
+    "a clock": ("Europe/Berlin", "%Y-%m-%d %H:%M:%S", "2025-10-26", "set for summer .* time_zone="),
+}
+
+
+@pytest.mark.filterwarnings("ignore:.*the clock is taken to be set back")
+@pytest.mark.parametrize("kind", REFUSED)
+def test_a_date_that_may_be_another_is_refused(tmp_path, kind, capsys):
+    zone, form, text, needed = REFUSED[kind]
+    path = tmp_path / "a.csv"
+    logged(path, zone, "2025-10-25 20:00", form, 60.0)
+    with pytest.raises(OptionError, match=f"stop='{text}'.*{needed}"):
+        cr.read_record(path, stop=text)
+    if not text.isdecimal():  # s on the command line
+        assert main(["identify", str(path), "-o", str(tmp_path / "out"), "--to", text]) == 2
+        assert re.search(f"--to '?{text}", capsys.readouterr().err)
+
+
+def test_a_part_may_begin_in_the_hour_that_is_left_out(tmp_path):
+    path = tmp_path / "a.csv"
+    logged(path, *ZONES["Berlin in spring"][:2], "%Y-%m-%d %H:%M:%S", 60.0)
+    part = cr.read_record(path, start="2025-03-30 02:30", time_zone="Europe/Berlin")
+    assert part.time[0] == 6 * 3600.0
+
+
+def test_stamps_of_parquet_are_compared_on_their_clock(tmp_path):
+    pytest.importorskip("pyarrow")
+    time = pd.date_range("2025-03-04 20:00", periods=480, freq="min", tz="Europe/Berlin", name="t")
+    pd.DataFrame({"u": np.arange(480) % 7, "y": np.arange(480)}, time).to_parquet(tmp_path / "a")
+    assert cr.read_record(tmp_path / "a", start="2025-03-05").output[0] == 240
+
+
 def test_tags_in_a_long_table_share_the_hour_that_comes_twice(tmp_path):
     path = tmp_path / "a.csv"
     t = logged(path, *ZONES["Berlin in autumn"][:2], "%Y-%m-%d %H:%M:%S", 600.0)

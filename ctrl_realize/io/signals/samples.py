@@ -17,7 +17,7 @@ from ...numerics.arrays import BoolArray, FloatArray
 from ...numerics.signals.sample_grid import filled, held
 from ..columns import check_lengths
 from ..tables import Table
-from ..text.dates import in_utc
+from ..text.dates import date_of
 from ..time_column import Clock, TimeAxis, time_axis
 from ..units import plain_unit
 from .long_format import LongTable
@@ -127,8 +127,7 @@ def check_part(path: Path, span: tuple[float, float], inside: FloatArray, axis: 
         raise DataError(
             f"{path}: there are {inside.size} samples between {span[0]:g} s and {span[1]:g} s; "
             f"the file covers {np.min(axis.seconds):g} s to {np.max(axis.seconds):g} s"
-            + ("" if axis.start is None else f" from {str(axis.start)[:19].replace('T', ' ')} on")
-            + (" in UTC" if axis.zone else "")
+            + ("" if axis.start is None else f" from {_beginning(axis)} on")
         )
 
 
@@ -144,17 +143,40 @@ def _second(given: Any, name: str, axis: TimeAxis) -> float:
     if axis.doubt:
         raise OptionError(f"{name}={given!r}: {axis.doubt}")
     try:
-        stamp = pd.Timestamp(given)
-    except (ValueError, TypeError) as error:
+        stamp = date_of(given, axis.form) if isinstance(given, str) else pd.Timestamp(given)
+    except (ValueError, TypeError):
+        stamp = pd.NaT
+    if pd.isna(stamp):
         raise OptionError(
-            f"{name}={given!r}; expected a time in s, or a date and time such as "
-            f"{str(axis.start)[:19].replace('T', ' ')!r}"
-        ) from error
-    if axis.zone is not None and stamp.tzinfo is None:
-        stamp = pd.Timestamp(in_utc(np.array([stamp], "datetime64[ns]"), axis.zone)[0])
-    elif stamp.tzinfo is not None:
-        stamp = stamp.tz_convert("UTC").tz_localize(None)
-    return float((stamp - pd.Timestamp(axis.start)) / pd.Timedelta(1, "s"))
+            f"{name}={given!r}; expected a time in s, or a date, with a time of day or without, "
+            f"as in the file or in ISO 8601, such as {_beginning(axis)!r}"
+        )
+    if stamp.tzinfo is None and axis.zone:
+        # the first of an hour that comes twice, and the end of one that is left out
+        stamp = stamp.tz_localize(axis.zone, ambiguous=True, nonexistent="shift_forward")
+    if stamp.tzinfo is None and axis.zone is not None:
+        raise OptionError(
+            f"{name}={given!r}: the offsets of the file from UTC differ; give the date with its "
+            "offset, or time_zone=, such as 'Europe/Berlin'"
+        )
+    if stamp.tzinfo is not None and axis.zone is None:
+        raise OptionError(
+            f"{name}={given!r}: the dates of the file have no offset from UTC; give the date "
+            "without one, or time_zone=, the zone of the file, such as 'Europe/Berlin'"
+        )
+    first = pd.Timestamp(axis.start).tz_localize("UTC" if stamp.tzinfo else None)
+    return float((stamp - first) / pd.Timedelta(1, "s"))
+
+
+def _beginning(axis: TimeAxis) -> str:
+    """First date on the clock of the file, and in its format."""
+    import pandas as pd
+
+    start: Any = axis.start
+    first = pd.Timestamp(start)
+    if axis.zone is not None:
+        first = first.tz_localize("UTC").tz_convert(axis.zone or "UTC")
+    return first.strftime(axis.form) if "%" in axis.form else first.isoformat(" ", "seconds")
 
 
 def labels_of(table: Table, parts: Parts, time_unit: str) -> dict[str, Any]:

@@ -9,6 +9,7 @@ gaps of months where the other is regular. Otherwise the date is ambiguous.
 from __future__ import annotations
 
 import re
+from itertools import product
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -22,7 +23,10 @@ _DATES = ("%d-%m-%Y", "%m-%d-%Y", "%d-%m-%y", "%m-%d-%y", "%Y-%m-%d", "%d-%b-%Y"
 _CLOCKS = (
     "", " %H:%M", " %H:%M:%S", " %H:%M:%S.%f", " %I:%M %p", " %I:%M:%S %p", " %I:%M:%S.%f %p",
 )  # fmt: skip
+PART = re.compile(r"(?<=:\d\d)[,;:](?=\d{3,}$)")
+"""Sign before a part of a second, as some controllers write it."""
 _HALF = re.compile(r" ?([AaPp])\.?[Mm]\.?$")
+_UNIVERSAL = re.compile(r" (UTC|GMT)$")
 _MONTHS = {"mrz": "mar", "mär": "mar", "mai": "may", "okt": "oct", "dez": "dec"}
 """German months whose first three letters are not those of the English names."""
 _REGULAR = 10.0
@@ -53,7 +57,7 @@ def stamps_of(cells: list[str], time_format: str | None) -> Dates:
     """
     if time_format is not None:
         return Dates(_parsed(cells, time_format), time_format)
-    cells = [re.sub(r" (UTC|GMT)$", "", cell) for cell in cells]  # as stamps without zone are read
+    cells = [_UNIVERSAL.sub("", cell) for cell in cells]  # as stamps without zone are read
     stamps = _parsed(cells, "ISO8601")
     if not np.isnat(stamps).all():
         return Dates(stamps, "ISO 8601")
@@ -130,16 +134,32 @@ def direction(stamps: Stamps) -> int:
     return -1 if np.sum(np.diff(stamps) < np.timedelta64(0, "ns")) > stamps.size / 2 else 1
 
 
-def have_offset(cell: str) -> bool:
-    """Whether a date is written with its distance from UTC."""
-    return bool(re.search(r":\d.*(Z|UTC|[+-]\d{2}:?\d{2})$", cell))
+def date_of(text: str, form: str) -> Any:
+    """Date in the format of a file or in ISO 8601, NaT if it is none; the clock may be left out."""
+    import pandas as pd
+
+    text = PART.sub(".", text.strip())
+    cell, day = _UNIVERSAL.sub("", text), re.split(r"\W*T?%[HI]", form)[0]
+    forms = [form, *(day + clock for clock in _CLOCKS if "%" in day), "ISO8601"]
+    # pandas knows "now" in each format, and takes 2100, an hour, for a year
+    tries = product(forms, (text, cell, _plain(cell)) if re.search(r"\d.{4}", cell) else ())
+    read = (pd.to_datetime(one, format=as_, errors="coerce") for as_, one in tries)
+    stamp: Any = next((one for one in read if not pd.isna(one)), pd.NaT)
+    return stamp.tz_localize("UTC") if cell != text and stamp.tzinfo is None else stamp
+
+
+def zone_of(cells: list[str], form: str) -> Any:
+    """Zone that dates are written with: None without one, empty if their offsets differ."""
+    zone = date_of(cells[0], form).tzinfo
+    end = re.sub(r".*?([A-Z]*|[+-]\d\d:?(\d\d)?)$", r"\1", cells[0])
+    return zone if zone is None or all(cell.endswith(end) for cell in cells) else ""
 
 
 def _plain(cell: str) -> str:
     """Cell with single blanks, English months, AM or PM, and a decimal point."""
     text = _HALF.sub(lambda half: f" {half[1].upper()}M", " ".join(cell.replace(", ", " ").split()))
     text = re.sub(r"[^\W\d_]{3,9}\.?(?=[-/. ]+\d)", _month, text)
-    return re.sub(r"(?<=\d),(?=\d+( |$))", ".", re.sub(r"(?<=\d)T(?=\d)", " ", text))
+    return re.sub(r"(?<=\d),(?=\d+([ Z+-]|$))", ".", re.sub(r"(?<=\d)T(?=\d)", " ", text))
 
 
 def _formats(cell: str) -> list[str]:
