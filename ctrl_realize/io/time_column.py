@@ -208,15 +208,16 @@ def _refuse_other_clock(table: Table, index: int, dates: Dates, zone: str | None
 def _parsed_dates(
     table: Table, index: int, time_format: str | None, unit: str, date: int | None
 ) -> Dates:
-    cells = [PART.sub(".", str(cell).strip()) for cell in table.columns[index].cells]
+    written = [str(cell).strip() for cell in table.columns[index].cells]
+    cells = [PART.sub(".", cell) for cell in written]
     if time_format is None:
         cells = [cell.replace(",", ".") for cell in cells]
     if date is not None and all(re.fullmatch(rf"({_CLOCK})( ?[AaPp][Mm])?", x) for x in cells[:3]):
         days = [str(cell).strip() for cell in table.columns[date].cells]
-        cells = [f"{day} {cell}" for day, cell in zip(days, cells, strict=True)]
+        cells, written = (list(map(" ".join, zip(days, x, strict=True))) for x in (cells, written))
     try:
         if time_format is None and all(re.fullmatch(_CLOCK, cell) for cell in cells[:3]):
-            dates = Dates(_times_of_day(cells, unit, table.place(0)), "12:34:56")
+            dates = Dates(_times_of_day(cells, written, unit, table.place(0)), "12:34:56")
         elif time_format is None and all(re.match(r"-?\d+ days?\b", cell) for cell in cells[:3]):
             dates = Dates(_durations(cells), "0 days 00:00:00")
         else:
@@ -230,7 +231,7 @@ def _parsed_dates(
     if bad.any():
         row = int(np.argmax(bad))
         raise DataError(
-            f"{table.at(index, row)}: {cells[row][:60]!r} is neither a number nor a time in the "
+            f"{table.at(index, row)}: {written[row][:60]!r} is neither a number nor a time in the "
             f"format {dates.form}; give time_format=, or dt= to ignore the column"
         )
     return dates
@@ -244,22 +245,24 @@ def _durations(cells: Sequence[str]) -> np.ndarray[Any, Any]:
     return np.asarray(found.to_numpy(dtype="timedelta64[ns]"))
 
 
-def _times_of_day(cells: list[str], unit: str, place: str) -> np.ndarray[Any, Any]:
+def _times_of_day(
+    cells: list[str], written: list[str], unit: str, place: str
+) -> np.ndarray[Any, Any]:
     """Times as 12:34:56 or 12:34:56.789, on one day or across midnight, or as `unit` says.
 
     ``12:34`` may be hours and minutes, or minutes and seconds: `unit` is that of the first number.
-    NaT where a cell is none. `place` is that of the first cell.
+    NaT where a cell is none. `written` are the cells in the file; `place` is that of the first.
     """
     shorts = [bool(re.fullmatch(_SHORT, cell)) for cell in cells]
     first = _FIRST.get(unit.lower(), plain_unit(unit))
     if any(shorts) and not all(shorts):
         raise DataError(
-            f"times with two and three fields, such as {cells[shorts.index(True)]!r}; expected one "
-            "kind"
+            f"times with two and three fields, such as {written[shorts.index(True)]!r}; expected "
+            "one kind"
         )
     if any(shorts) and first not in ("h", "min"):
         raise OptionError(
-            f"{cells[0]!r} in {place} may be hours and minutes, or minutes and seconds; give "
+            f"{written[0]!r} in {place} may be hours and minutes, or minutes and seconds; give "
             "time_unit='h' or time_unit='min', the unit of the first field"
         )
     ends = ("", "") if not any(shorts) else ("00:", "") if first == "min" else ("", ":00")

@@ -422,6 +422,23 @@ def test_a_clock_runs_in_the_unit_that_was_said_or_is_asked_about(
 
 
 @pytest.mark.parametrize(
+    ("header", "cells", "quoted"),
+    [
+        ("Timestamp", ["Mar 04, 2025 23:57:00"] * 4, "'Mar 04, 2025 23:57:00' is neither"),
+        ("Timestamp", ["03/04/2025, 11:57:00 PM"] * 4, "'03/04/2025, 11:57:00 PM' is neither"),
+        ("time", ["12:34,5"] * 4, "'12:34,5' in line 2 may be"),
+        ("time", ["12:34:56,5", "12:34,5"] * 2, "such as '12:34,5'; expected one kind"),
+        ("Date;Time", ["1.2.2025;12:34:56,5"] * 3 + ["1.2.2025;noon,5"], "'1.2.2025 noon,5'"),
+    ],
+)
+def test_a_time_that_is_none_is_quoted_as_it_stands_in_the_file(tmp_path, header, cells, quoted):
+    path = tmp_path / "a.csv"
+    path.write_text(f"{header};u;y\n" + "".join(f"{at};{k};1\n" for k, at in enumerate(cells)))
+    with pytest.raises((OptionError, DataError), match=quoted):
+        read_record(path)
+
+
+@pytest.mark.parametrize(
     ("delimiters", "cells", "clear"),
     [
         (",", ["1,234", "2,345", "3,456"], False),
