@@ -46,7 +46,7 @@ def _members(path: Path, max_bytes: float) -> dict[str, AnyArray]:
     with zipfile.ZipFile(path) as archive:
         members = archive.infolist()
         if not any(member.filename.endswith(".npy") for member in members):
-            raise FileFormatError(f"{path} is a zip file without arrays: save the data as CSV")
+            raise FileFormatError(f"{path} is a zip file without arrays: unpack it first")
         if len(members) > MAX_ARRAYS:
             raise FileFormatError(f"{path} has {len(members)} arrays, the limit is {MAX_ARRAYS}")
         check_size(path, sum(member.file_size for member in members), max_bytes, ", unpacked,")
