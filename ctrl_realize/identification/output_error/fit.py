@@ -414,7 +414,8 @@ def _fit_linear(
         result = fit_own_gains(several, fit, start)
     else:
         result = way(several, requested)
-    return replace(result, flags=result.flags + flags + at_limits + same_record_flags(several))
+    flags += at_limits + same_record_flags(several, averaged=stepped)
+    return replace(result, flags=result.flags + flags)
 
 
 def _left_out(

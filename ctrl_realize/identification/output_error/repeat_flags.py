@@ -77,8 +77,11 @@ def _range(values: FloatArray) -> str:
     return f"{values.min():.3g} to {values.max():.3g}"
 
 
-def same_record_flags(records: tuple[Record, ...]) -> tuple[Flag, ...]:
-    """Find records whose outputs agree in every digit, which noise never lets happen."""
+def same_record_flags(records: tuple[Record, ...], *, averaged: bool) -> tuple[Flag, ...]:
+    """Find records whose outputs agree in every digit, which noise never lets happen.
+
+    The noise of a mean is that of its residual, which duplicates leave as it is.
+    """
     first: dict[bytes, int] = {}
     again = []
     for i, record in enumerate(records, 1):
@@ -89,4 +92,11 @@ def same_record_flags(records: tuple[Record, ...]) -> tuple[Flag, ...]:
     if not again:
         return ()
     pairs = ", ".join(again[:3]) + (f" and {len(again) - 3} more" if len(again) > 3 else "")
-    return (flagged("same_records", again=len(again), records=len(records), pairs=pairs),)
+    return (
+        flagged(
+            "same_records.mean" if averaged else "same_records",
+            again=len(again),
+            records=len(records),
+            pairs=pairs,
+        ),
+    )

@@ -151,6 +151,18 @@ def test_records_of_other_inputs_are_compared_too():
     assert {"gains_differ", "lags_differ"} <= told([first, driven(2, gain=1.2, lag=1.5)])
 
 
+def test_a_duplicate_is_told_by_what_it_does_to_the_standard_error():
+    """A mean of equal records has the noise of one; squared residuals of both count twice."""
+    for one, ratio, words in (
+        (step(1.0, 1), 1.0, "1 of 2 records are duplicates (no. 2 is no. 1): they make the mean"),
+        (driven(1), 2**-0.5, "standard error assumes independent noise and is too small"),
+    ):
+        single, twice = one_lag([one]), one_lag([one, one])
+        found = twice.gain_std_given_structure / single.gain_std_given_structure
+        assert found == pytest.approx(ratio, rel=0.02)
+        assert words in next(str(flag) for flag in twice.flags if flag.code == "same_records")
+
+
 def test_the_gains_of_a_canal_differ_with_the_opening_of_its_gate(shared_data):
     folder = shared_data / "wis_canal"
     records = [
