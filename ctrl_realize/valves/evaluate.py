@@ -85,9 +85,9 @@ def valve_report(
     Notes
     -----
     The interval of a mean is that of Student's distribution from three repeats on, and the
-    propagated noise before that. Interval of the dead band: widths of a play that the F-test does
-    not reject, given the levels of the staircase [1]_. All rules are stated in `DEFINITIONS`, with
-    the source of each as far as it was read.
+    propagated noise before that; what the samples leave open is added. Interval of the dead band:
+    widths of a play that the F-test does not reject, given the levels of the staircase [1]_. All
+    rules are stated in `DEFINITIONS`, with the source of each as far as it was read.
 
     References
     ----------

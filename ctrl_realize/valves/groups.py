@@ -122,7 +122,8 @@ def _group(steps: list[StepMetrics], records: Sequence[Record], fit: bool) -> Si
     common = any(one.common for one in steps)
 
     def mean(name: str, own: Sequence[StepMetrics]) -> Interval:
-        return mean_of([(one.values[name], one.errors[name]) for one in own], common)
+        found = [(one.values[name], one.errors[name], *one.sampling[name]) for one in own]
+        return mean_of(found, common)
 
     means = {name: mean(name, moved) for name in STEP_METRICS}
     estimates = {
@@ -143,18 +144,19 @@ def _group(steps: list[StepMetrics], records: Sequence[Record], fit: bool) -> Si
     )
 
 
-def mean_of(pairs: Sequence[tuple[float, float]], common: bool) -> Interval:
-    """Mean of repeats with its 95 % interval.
+def mean_of(estimates: Sequence[tuple[float, float, float, float]], common: bool) -> Interval:
+    """Mean of repeats with its 95 % interval, from the values, their standard errors and samplings.
 
     From three repeats on by their scatter and Student's distribution; before that, and never less,
-    by their standard errors, which no mean reduces if the repeats have them in common.
+    by their standard errors, which no mean reduces if the repeats have them in common. What the
+    samples leave open is added; repeats are sampled alike.
     """
     from scipy.special import stdtrit
 
-    known = np.array([pair for pair in pairs if np.isfinite(pair).all()])
+    known = np.array([one for one in estimates if np.isfinite(one[:2]).all()])
     if not known.size:
         return Interval()
-    values, errors = known.T
+    values, errors, *sampling = known.T
     count = values.size
     half = Z_95 * float(np.sqrt(np.mean(errors**2) / (1 if common else count)))
     if count >= 3:
@@ -162,8 +164,8 @@ def mean_of(pairs: Sequence[tuple[float, float]], common: bool) -> Interval:
         half = max(half, float(stdtrit(count - 1, 0.975)) * scatter)
     elif count == 2:
         half = max(half, 0.5 * float(np.ptp(values)))
-    value = float(np.mean(values))
-    return Interval(value, value - half, value + half, count)
+    value, below, above = (float(np.mean(one)) for one in (values, *sampling))
+    return Interval(value, value - below - half, value + above + half, count)
 
 
 def scatter_of(values: Sequence[float]) -> Interval:

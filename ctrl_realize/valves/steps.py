@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import astuple, dataclass, field
 
 import numpy as np
 
@@ -99,6 +99,9 @@ class StepMetrics:
         change, ``gain`` in % of travel per % of command, ``slew_rate`` in % of travel per s.
     errors : mapping of str to float
         Their standard errors, from the noise of the record.
+    sampling : mapping of str to (float, float)
+        How far below and above the value the number may lie because the response between two
+        samples is not known; zero where it changes slowly.
     dt : float
         Sample time of `response` in s.
     mean_delay : float
@@ -135,6 +138,7 @@ class StepMetrics:
     travel_error: float
     values: dict[str, float]
     errors: dict[str, float]
+    sampling: dict[str, tuple[float, float]]
     dt: float
     mean_delay: float
     command_edge: Edge = field(repr=False)
@@ -217,6 +221,7 @@ def _measured(
         travel_error=travel_error * abs(travel), common=bool(common),
         values={name: one.value for name, one in estimates.items()},
         errors={name: one.std for name, one in estimates.items()},
+        sampling={name: (one.below, one.above) for name, one in estimates.items()},
         dt=record.dt, mean_delay=mean_delay, command_edge=edge, response=shape,
     )  # fmt: skip
 
@@ -227,7 +232,7 @@ def _times(response: UnitResponse, dt: float, change: float, settled: bool) -> d
     def seconds(one: Estimate) -> Estimate:
         # an interval that is longer than the hold tells nothing
         known = 2 * Z_95 * one.std < response.shape.size
-        return Estimate(one.value * dt, one.std * dt) if known else UNKNOWN
+        return Estimate(*(dt * x for x in astuple(one))) if known else UNKNOWN
 
     found = {"dead_time": seconds(response.first_motion())}
     if not settled:
@@ -237,7 +242,10 @@ def _times(response: UnitResponse, dt: float, change: float, settled: bool) -> d
     rise_error = float(np.hypot(high.std, low.std)) * dt
     if rise > 0:
         rate = (_RATE[1] - _RATE[0]) * change / rise
-        found["slew_rate"] = Estimate(rate, rate * float(np.hypot(rise_error / rise, _RATE_ERROR)))
+        error = rate * float(np.hypot(rise_error / rise, _RATE_ERROR))
+        longer, shorter = (high.above + low.below) * dt, (high.below + low.above) * dt
+        above = rate * shorter / (rise - shorter) if shorter < rise else float("inf")
+        found["slew_rate"] = Estimate(rate, error, rate * longer / (rise + longer), above)
     over = response.overshoot()
     return found | {
         "t63": seconds(response.crossing(LEVEL_63)),

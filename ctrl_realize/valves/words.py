@@ -26,6 +26,8 @@ def in_words(one: Interval, unit: str) -> tuple[str, str]:
     """
     if not one.is_known:
         return "unknown", ""
+    if np.isinf(one.high):
+        return f"{one.value:.4g} {unit}", f"(at least {one.low:.4g} {unit})"
     if not np.isfinite([one.low, one.high]).all():
         return (in_time(one.value) if unit == "s" else f"{one.value:.4g} {unit}"), ""
     ends = one.low, one.high

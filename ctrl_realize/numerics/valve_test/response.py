@@ -3,7 +3,8 @@
 A crossing is read off a polynomial that is fitted to the samples about it: a parabola or a
 cubic in the window in which the smoothed response is near the level. The error is propagated
 from the noise of those samples and of the two levels (first-order propagation, [1]_ section 5.1.2);
-the choice of the window is our own.
+the choice of the window is our own. Where the samples are too few for it, the crossing lies
+between two of them, and the samples beside these bound it.
 
 References
 ----------
@@ -28,9 +29,16 @@ from .play import slope_of
 
 _REACH = 0.1
 """Half height of the window about a crossing, of the whole change."""
+_LOUD = 0.01
+"""Noise, of the whole change, from which on it is worth more than the course of the response."""
+_BENT = 3.0
+"""Standard deviations from its polynomial by which a response is none: its samples are far apart.
+"""
 _SECOND, _BEGINNING = 15.0, 0.4
 """Standard deviations of the second threshold of an onset, and part of the change that they may be:
 with 0.9 of it the dead time of a lag is 7 % too long, and beyond it is none."""
+_AT_REST = 2.0
+"""Standard deviations up to which a sample is at rest: 2.3 % of those at rest are beyond."""
 _REST = 8
 """Samples before a step from which `first_motion` takes the level before it."""
 _PEAK = 4
@@ -42,10 +50,16 @@ _T86 = 1 - float(np.exp(-2))
 
 @dataclass(frozen=True)
 class Estimate:
-    """A number and its standard error; NaN if it is not known."""
+    """A number and its standard error; NaN if it is not known.
+
+    Without noise it lies between ``value - below`` and ``value + above``: the response between two
+    samples is not known, and repeats that are sampled alike have this in common.
+    """
 
     value: float
     std: float
+    below: float = 0.0
+    above: float = 0.0
 
 
 UNKNOWN = Estimate(float("nan"), float("nan"))
@@ -162,10 +176,18 @@ class UnitResponse:
         found = first_motion(output, _REST, self.noise.sigma, self.noise.quantum, 0.0)
         if found is None or found.sign < 0:
             return UNKNOWN
+        onset, moved = max(found.onset, 0.0), found.crossing
         # The line through two points of one deviation each, five and fifteen of them high, meets
         # the baseline with an error of sqrt(1.5^2 + 0.5^2) deviations over its slope.
-        rise = max(found.crossing - found.onset, 0.5)
-        return Estimate(max(found.onset, 0.0), float(np.hypot(1.58 * rise / 5, 0.29)))
+        error = 1.58 * max(moved - onset, 0.5) / 5
+        sigma, high = self.noise.sigma, float(self.shape[moved])
+        if high < _SECOND * sigma:
+            return Estimate(onset, float(np.hypot(error, 0.29)))
+        # Beyond both thresholds at once it tells no line: it moves after the last sample at rest.
+        still = np.flatnonzero(self.shape[:moved] <= _AT_REST * sigma)
+        last = int(still[-1]) if still.size else 0
+        onset = max(onset, last)
+        return Estimate(onset, error * 5 * sigma / high, onset - last, moved - onset)
 
     def mean_delay(self) -> float:
         """Area between the response and its final level: dead time plus lags, in samples."""
@@ -191,11 +213,12 @@ class UnitResponse:
         part = self.shape[low : high + 1]
         if index.size < 5:
             return self._interpolated(level, near)
-        powers = np.arange(3 if index.size < 10 else 4)
+        powers = np.arange(3 if index.size < 10 and self.noise.sigma > _LOUD else 4)
         inverse = np.linalg.pinv(index[:, None] ** powers)
         curve = np.polynomial.Polynomial(inverse @ part)
         root = _root(curve, level)
-        if not index[0] - 1 <= root <= index[-1] + 1:
+        misfit = float(np.linalg.norm(part - curve(index)) / np.sqrt(index.size - powers.size))
+        if not index[0] - 1 <= root <= index[-1] + 1 or misfit > _BENT * self.noise.sigma:
             return self._interpolated(level, near)
         weights = root**powers @ inverse
         own = self.noise.sigma * float(np.linalg.norm(weights) * np.sqrt(self.noise.correlation))
@@ -205,16 +228,27 @@ class UnitResponse:
         return Estimate(near + root, self._error(own, level, steepness))
 
     def _interpolated(self, level: float, near: int) -> Estimate:
-        """Interpolate between the two samples of a fast crossing."""
-        here = self.shape
-        for k in (near, near + 1, near - 1):
-            if 1 <= k < here.size and (here[k - 1] - level) * (here[k] - level) <= 0:
-                slope = float(here[k] - here[k - 1])
-                if slope:
-                    place = k - 1 + (level - float(here[k - 1])) / slope
-                    bend = np.abs(np.diff(here[max(k - 2, 0) : k + 2], 2)).max(initial=0.0)
-                    own = float(np.hypot(self.noise.sigma, bend / 8))
-                    return Estimate(place, self._error(own, level, slope))
+        """Interpolate between the two samples of a fast crossing.
+
+        Where the slope rises to one maximum and falls after it, as behind lags or a limited rate,
+        the course lies above the lower and below the higher of the chord and the lines through
+        the samples before and after, extended.
+        """
+        # at rest before the step
+        here = np.concatenate([np.zeros(2), self.shape, self.shape[-1:]])
+        for k in (near + 2, near + 3, near + 1):
+            if 3 <= k < here.size - 1 and (here[k - 1] - level) * (here[k] - level) <= 0:
+                chord = float(here[k] - here[k - 1])
+                if chord:
+                    part = float(level - here[k - 1]) / chord
+                    # slopes in units of the chord
+                    first, before, _, after = (np.diff(here[k - 3 : k + 2]) / chord).tolist()
+                    late = part / min(max(before, part, 1e-9), 1.0)
+                    early = 1 - (1 - part) / min(max(after, 1 - part, 1e-9), 1.0)
+                    if first >= before >= 1:  # the maximum is past: below the line before as well
+                        early = max(early, part / before)
+                    error = self._error(self.noise.sigma, level, chord)
+                    return Estimate(k - 3 + part, error, part - early, late - part)
         return Estimate(float(near), 1.0)
 
     def _error(self, own: float, level: float, slope: float) -> float:
@@ -252,7 +286,7 @@ def _root(curve: np.polynomial.Polynomial, level: float) -> float:
 
 def _smoothing(shape: FloatArray, noise: Noise) -> int:
     """Window of the moving mean: 1 % of noise if it stays below a quarter of the rise."""
-    wanted = int(np.ceil(noise.correlation * (noise.sigma / 0.01) ** 2))
+    wanted = int(np.ceil(noise.correlation * (noise.sigma / _LOUD) ** 2))
     for width in (1, 3, 5, 9, 15, 25, 41, 65, 101, 161, 257, 401):
         smooth = _smoothed(shape, width)
         high = int(np.argmax(smooth >= 0.8)) if (smooth >= 0.8).any() else shape.size

@@ -71,6 +71,11 @@ def _draw_sizes(
     if unit == "s" and known:
         factor, unit = style.axis_time_unit(max(one.estimates[metric].high for one in known), axes)
     lines: list[Line2D] = []
+    every = [one.estimates[metric] for one in known]
+    ends = [end * factor for one in every for end in (one.low, one.value, one.high)]
+    ends = [0.0, *filter(np.isfinite, ends)]
+    low, high = min(ends), max(ends)
+    edge = high + 0.08 * (high - low)
     for way, (colour, marker, line) in _WAYS.items():
         own = [one for one in known if one.direction == way]
         if not own:
@@ -78,7 +83,9 @@ def _draw_sizes(
         size = [one.size for one in own]
         found = [one.estimates[metric] for one in own]
         for x, each in zip(size, found, strict=True):
-            axes.plot([x, x], [each.low * factor, each.high * factor], color=colour, alpha=0.5)
+            # an interval that is open upwards ends at the edge of the axes
+            top = min(each.high * factor, edge)
+            axes.plot([x, x], [each.low * factor, top], color=colour, alpha=0.5)
         styled = {"color": colour, "marker": marker, "linestyle": line, "linewidth": 1.2, **looks}
         lines += axes.plot(size, [one.value * factor for one in found], label=way, **styled)
     if known:
@@ -86,10 +93,7 @@ def _draw_sizes(
         ticks = sorted({float(f"{one.size:.2g}") for one in known})
         axes.set_xticks(ticks, [f"{tick:g}" for tick in ticks])
         axes.minorticks_off()
-        ends = [factor * end for one in known
-                for end in (one.estimates[metric].low, one.estimates[metric].high)]  # fmt: skip
-        low, high = min(0.0, *ends), max(0.0, *ends)
-        axes.set_ylim(low - (0.08 * (high - low) if low < 0 else 0.0), high + 0.08 * (high - low))
+        axes.set_ylim(low - (0.08 * (high - low) if low < 0 else 0.0), edge)
     else:
         style.no_curve(axes, "unknown for all sizes")
     name = "slew rate" if metric == "slew_rate" else definition.name
