@@ -109,7 +109,7 @@ def _largest(found: list[tuple[Interval, str]]) -> tuple[Interval, str]:
 
 
 def _rate(groups: list[SizeAndDirection]) -> tuple[Interval, str]:
-    """Largest rate; the rates of the two largest sizes show whether it is a limit."""
+    """Largest rate: a lower bound, unless the rates of two sizes show that it is a limit."""
     known = [one for one in groups if one.estimates["slew_rate"].is_known]
     if not known:
         return Interval(), ""
@@ -121,8 +121,9 @@ def _rate(groups: list[SizeAndDirection]) -> tuple[Interval, str]:
         and abs(one.size - best.size) > 0.3 * best.size
         for one in others
     )
-    words = "the rate is limited" if limited else "the limit may be higher"
-    return rate, f"{words_of(best)}; {words}"
+    if limited:
+        return rate, f"{words_of(best)}; the rate is limited"
+    return replace(rate, high=float("inf")), f"{words_of(best)}; the limit may be higher"
 
 
 def check_limits(limits: Mapping[str, Any] | None) -> None:

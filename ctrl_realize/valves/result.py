@@ -104,12 +104,16 @@ class ValveReport(Result):
 
     @property
     def missing_tests(self) -> dict[str, tuple[str, ...]]:
-        """Tests that would tell the unknown metrics: test -> names of these metrics."""
+        """Tests that would tell the unknown metrics: test -> names of these metrics.
+
+        Also of rates whose interval is open upwards, if no full stroke has told them.
+        """
         found: dict[str, list[str]] = {}
         for one in self.metrics[: len(DEFINITIONS)]:
             # a fit that was not asked for, or that no linear model allows, lacks no test
             fitted = one.key == "fitted_dead_time" and self.steps
-            if not one.interval.is_known and not fitted:
+            open_rate = np.isinf(one.interval.high) and not one.where.startswith("stroke")
+            if (open_rate or not one.interval.is_known) and not fitted:
                 found.setdefault(one.definition.needs, []).append(one.definition.name)
         return {test: tuple(names) for test, names in found.items()}
 

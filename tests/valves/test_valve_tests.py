@@ -85,6 +85,23 @@ def test_a_limited_rate_gives_stroke_times_and_is_told_as_such():
     assert (table.diff().dropna() > 0).all(axis=None)
 
 
+@pytest.mark.parametrize(
+    ("limit", "judgement"),
+    [((20, None), "cannot tell"), ((5, None), "met"), (50, "cannot tell"), (5, "not met")],
+)
+def test_a_rate_that_a_lag_hides_is_a_lower_bound(limit, judgement):
+    """The 7.3 %/s of a lag of 0.5 s made 100 %/s miss a limit of 20, and meet one of 50 %/s."""
+    command = command_of([50, 60, 50, 60, 50], 6.0)
+    moved = cr.actuators.SlewRateLimit(100.0).simulate(command, DT)
+    record = record_of(command, moved, 0.03, 0, lag=0.5)
+    report = valves.valve_report(record, limits={"slew_rate_opening": limit}, **QUICK)
+    rate = report.metric("slew_rate_opening")
+    assert rate.judgement == judgement
+    assert held(rate.interval, 100.0)
+    assert rate.definition.name in report.missing_tests["full strokes in both directions"]
+    assert f"at least {rate.interval.low:.4g} %/s" in report.report()
+
+
 @pytest.mark.parametrize("width", [0.0, 0.6])
 def test_the_interval_of_the_dead_band_holds_a_backlash(width):
     command = command_of(stairs(), 4.0)
