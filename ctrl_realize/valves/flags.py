@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from itertools import chain
 
 import numpy as np
 
@@ -14,8 +15,9 @@ from .part import TestPart
 from .steps import Ranges, StepMetrics
 
 _BY_CHANCE = 1e-3
-_LARGEST = 110.0
-"""Step in % of the span beyond which the range is wrong: NAMUR NE 43 has 3.6 to 21 mA, 109 %."""
+_BEYOND = 0.05
+"""Part of the span by which a command leaves a wrong range; NAMUR NE 43 has 3.8 to 20.5 mA, 0.031.
+"""
 _LATER = 1.25
 """Dead times that differ by less do not matter, whatever their errors."""
 
@@ -28,9 +30,12 @@ def flags_of(
 ) -> Iterator[Flag]:
     """List the flags of a test."""  # fmt: skip
     largest = max((abs(one.size) for one in steps), default=0.0)
-    if largest > _LARGEST:
-        low, high = ranges.command
-        yield flagged("range_in_doubt", size=largest, low=low, high=high)
+    held = [level for one in chain(*parts) for level in (one.before, one.after)]
+    held += [one.after for one in steps]
+    (low, high), span = ranges.command, ranges.command_span
+    away = max((abs((level - low) / span - 0.5) - 0.5 for level in held), default=0.0)
+    if away > _BEYOND:
+        yield flagged("range_in_doubt", away=100 * away, low=low, high=high)
     gains = [one.values["gain"] for one in steps if one.moved and abs(one.size) >= 0.5 * largest]
     if gains and np.median(gains) < 0:
         high, low = ranges.travel

@@ -556,13 +556,26 @@ def test_a_wrong_range_of_the_command_and_a_reversed_travel_are_flagged_with_wha
     record = record_of(command, command, 0.02, 0)
     wrong = valves.valve_report(record, command_range=(4, 20), **QUICK)
     (flag,) = (one for one in wrong.flags if one.code == "range_in_doubt")
-    assert "625 %" in str(flag)
+    assert "outside command_range 4 to 20" in str(flag)
     falling = cr.Record(record.time, command, 100 - record.output, units=PERCENT)
     (flag,) = valves.valve_report(falling, **QUICK).flags
     assert "travel_range=(100, 0)" in str(flag)
     right = valves.valve_report(falling, travel_range=(100, 0), **QUICK)
     assert right.flags == ()
     assert right.metric("hysteresis").interval.is_known
+
+
+@pytest.mark.parametrize(
+    ("levels", "given", "doubted"),
+    [([50, 60, 50], (0, 10), True), ([12, 18, 12], (20, 4), False), ([-2, 103, -2], None, False)],
+)
+def test_a_command_outside_its_range_is_flagged_whatever_its_steps(levels, given, doubted):
+    """Steps of 10 units in a range of 10 were full strokes, without a word."""
+    command = command_of(levels, 4.0)
+    report = valves.valve_report(
+        record_of(command, command, 0.02, 0), command_range=given, travel_range=given, **QUICK
+    )
+    assert ("range_in_doubt" in {flag.code for flag in report.flags}) == doubted
 
 
 def test_records_of_operation_end_in_a_verdict_that_names_the_missing_tests():
