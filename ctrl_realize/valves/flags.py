@@ -41,7 +41,8 @@ def flags_of(
         high, low = ranges.travel
         yield flagged("range_in_doubt.reversed", low=low, high=high)
     if not steps and all(part.kind != "ramp" for own in parts for part in own):
-        yield flagged("no_valve_test")
+        # one part without a step or a ramp is a baseline: the command holds one level all the time
+        yield flagged("no_valve_test.constant" if all(parts) else "no_valve_test")
     still = [one for one in steps if not one.moved]
     if still:
         sizes = sorted({round(abs(one.size), 2) for one in still})

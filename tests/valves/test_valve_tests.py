@@ -591,6 +591,15 @@ def test_records_of_operation_end_in_a_verdict_that_names_the_missing_tests():
     assert "valve_test_plan" in report.report()
 
 
+def test_a_constant_command_is_called_constant_not_operation():
+    command = np.full(400, 50.0)
+    report = valves.valve_report(record_of(command, command, 0.02, 0))
+    (flag,) = report.flags
+    assert flag.code == "no_valve_test"
+    assert "the command is constant" in str(flag)
+    assert "operation" not in str(flag)
+
+
 def test_noise_spikes_and_drives_in_milliamperes_leave_the_parts_as_they_are():
     valve = cr.bench.valve()
     records = valve.step_campaign(1, amplitudes=(16.0, 4.0), repeats=3)
